@@ -5,21 +5,21 @@ use std::path::Path;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{UVec2, Vec3};
-use wgray::backend::Backend;
-use wgray::cpu::Cpu;
-use wgray::cpu::ellipsoid::intersect_ellipsoid;
-use wgray::cpu::light::segments_to_light;
-use wgray::cpu::phong::{Lobes, phong_block};
-use wgray::cpu::ray::Ray;
-use wgray::cpu::rectangle::intersect_rectangle;
-use wgray::cpu::shadow::{Block, cone_to_light, may_block, shadow_bits};
-use wgray::cpu::surface::surface_at;
-use wgray::cpu::triangle::intersect_triangle;
-use wgray::film::Region;
-use wgray::gpu::{self, Choice, Gpu, Options, compose::Shaders};
-use wgray::job::{self, Cut};
-use wgray::pack::{ELLIPSOID, FAR, GRID, Packed, RECTANGLE, TRIANGLE, pack};
 use wgray::scene::{Overrides, Scene};
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::cpu::Cpu;
+use wgray_render::cpu::ellipsoid::intersect_ellipsoid;
+use wgray_render::cpu::light::segments_to_light;
+use wgray_render::cpu::phong::{Lobes, phong_block};
+use wgray_render::cpu::ray::Ray;
+use wgray_render::cpu::rectangle::intersect_rectangle;
+use wgray_render::cpu::shadow::{Block, cone_to_light, may_block, shadow_bits};
+use wgray_render::cpu::surface::surface_at;
+use wgray_render::cpu::triangle::intersect_triangle;
+use wgray_render::gpu::{self, Choice, Gpu, Options, compose::Shaders};
+use wgray_render::job::{self, Cut};
+use wgray_render::pack::{ELLIPSOID, FAR, GRID, Packed, RECTANGLE, TRIANGLE, pack};
 
 fn scene(path: &str, size: u32) -> Packed {
     let overrides = Overrides {

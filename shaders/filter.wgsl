@@ -1,6 +1,6 @@
 // Reconstruction filters by importance sampling: samples lie where the filter is large and have its sign as weight, so
 // that a pixel needs no samples of its neighbours. Ernst, Stamminger and Greiner, "Filter Importance Sampling", IEEE
-// Symposium on Interactive Ray Tracing, 2006. `src/pack/filter.rs` makes the table of a filter's bins.
+// Symposium on Interactive Ray Tracing, 2006. `crates/render/src/pack/filter.rs` makes the table of a filter's bins.
 
 // The bin of a uniform number: bins go from the pixel's centre outwards, the same to both sides.
 fn filter_bin(u: f32, bins: u32) -> u32 {

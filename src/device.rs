@@ -6,16 +6,16 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use crate::backend::Backend;
-use crate::contain::contained;
-use crate::cpu::Cpu;
 use crate::error::{Error, RenderError};
-#[cfg(feature = "gpu")]
-use crate::gpu::{self, Gpu, Rounding, compose::Shaders};
-use crate::pack::Packed;
 use crate::render::Options;
+use wgray_image::contain::contained;
+use wgray_render::backend::Backend;
+use wgray_render::cpu::Cpu;
 #[cfg(feature = "gpu")]
-use crate::scene::Problem;
+use wgray_render::gpu::{self, Gpu, Rounding, compose::Shaders};
+use wgray_render::pack::Packed;
+#[cfg(feature = "gpu")]
+use wgray_scene::Problem;
 
 /// The requested device. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

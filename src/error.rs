@@ -1,12 +1,9 @@
 //! Error types of scenes, devices and renders.
 
-use std::fmt;
-use std::ops::Range;
-
 use thiserror::Error;
 
-use crate::film::Region;
-use crate::scene::{Problem, SceneError};
+pub use wgray_render::error::{RenderError, ShaderError, ShaderErrors};
+use wgray_scene::{Problem, SceneError};
 
 /// An error of loading, rendering or saving a scene.
 #[derive(Debug, Error)]
@@ -24,126 +21,4 @@ pub enum Error {
     /// An image that could not be rendered or written.
     #[error(transparent)]
     Render(#[from] RenderError),
-}
-
-/// An error in a shader.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{place}: {message}")]
-pub struct ShaderError {
-    /// File, line and column of the source, such as `camera.wgsl:12:9`, or the stage that failed.
-    pub place: String,
-    /// The message.
-    pub message: String,
-    /// The marked source line and its neighbors, if the place is known.
-    pub excerpt: Option<String>,
-}
-
-/// All errors of the shaders; at least one.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub struct ShaderErrors(pub Vec<ShaderError>);
-
-impl fmt::Display for ShaderErrors {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, error) in self.0.iter().enumerate() {
-            let line = if i == 0 { "" } else { "\n" };
-            write!(f, "{line}{error}")?;
-        }
-        Ok(())
-    }
-}
-
-/// The reason why an image could not be rendered.
-#[derive(Debug, Error)]
-pub enum RenderError {
-    /// No device matches the request.
-    #[error("{0}")]
-    NoDevice(String),
-    /// A shader is invalid.
-    #[error(transparent)]
-    Shader(#[from] ShaderError),
-    /// The driver reported an error.
-    #[error("{device}: {message}")]
-    Device {
-        /// The adapter's name.
-        device: String,
-        /// The message of the driver.
-        message: String,
-    },
-    /// The device was lost, for example because its driver was reset, with all of its memory. Another one may be opened.
-    #[error("{device}: the device was lost: {message}")]
-    Lost {
-        /// The adapter's name.
-        device: String,
-        /// The message of the driver.
-        message: String,
-    },
-    /// The device has too little memory.
-    #[error("{device}: out of memory: {message}")]
-    OutOfMemory {
-        /// The adapter's name.
-        device: String,
-        /// The allocation that failed, and the memory in use.
-        message: String,
-    },
-    /// The driver ends long loops early, even in a kernel that renders a single sample of a pixel.
-    #[error(
-        "{device}: this driver ends long loops early, even for a single sample of a pixel; use fewer shapes, lights or \
-         light samples, or the CPU"
-    )]
-    CutShort {
-        /// The adapter's name.
-        device: String,
-    },
-    /// The scene exceeds a limit of the device.
-    #[error("{device}: {message}; the CPU has no such limit")]
-    TooLarge {
-        /// The adapter's name.
-        device: String,
-        /// The size and the limit.
-        message: String,
-    },
-    /// A call that needs a film before one was begun or resumed.
-    #[error("no film; begin or resume one first")]
-    NoFilm,
-    /// A call while another is pending.
-    #[error("a call is pending; wait for it, or poll until it is done")]
-    Pending,
-    /// A region outside of the film or the image.
-    #[error("the {what} x0,y0,x1,y1 = {region} must lie within the {of} {limits}")]
-    Outside {
-        /// Name of the region.
-        what: &'static str,
-        /// Its pixels.
-        region: Region,
-        /// Name of the region that must contain it.
-        of: &'static str,
-        /// Its pixels.
-        limits: Region,
-    },
-    /// A film that cannot be resumed for this scene.
-    #[error("the film does not fit the scene: {0}")]
-    WrongFilm(String),
-    /// Adaptive samples before the first samples of all pixels, which decide how many are needed.
-    #[error(
-        "samples {} to {} come too early: some pixels of the film do not have their first {first} yet",
-        samples.start, samples.end
-    )]
-    TooEarly {
-        /// The samples.
-        samples: Range<u32>,
-        /// Number of first samples of every pixel.
-        first: u32,
-    },
-    /// The image, with this size in bytes, does not fit into memory.
-    #[error("an image in memory needs {} MiB, which are not available; render a crop", .0 >> 20)]
-    Memory(u64),
-    /// A checkpoint or part to resume from cannot be read.
-    #[error("{0}")]
-    Input(std::io::Error),
-    /// The work was cancelled.
-    #[error("cancelled")]
-    Cancelled,
-    /// The output failed.
-    #[error(transparent)]
-    Output(#[from] std::io::Error),
 }

@@ -61,53 +61,24 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-#[doc(hidden)]
-pub mod backend;
-mod color;
-#[doc(hidden)]
-pub mod compare;
-#[doc(hidden)]
-pub mod contain;
-#[doc(hidden)]
-pub mod cpu;
-#[cfg(feature = "dev")]
-#[doc(hidden)]
-pub mod dev;
-#[doc(hidden)]
-pub mod device;
+#[cfg(feature = "cli")]
+pub mod cli;
+mod device;
 pub mod error;
-#[cfg(feature = "gpu")]
-mod excerpt;
-pub mod film;
-mod gltf;
-#[cfg(feature = "gpu")]
-#[doc(hidden)]
-pub mod gpu;
 pub mod image;
-#[doc(hidden)]
-pub mod job;
-#[doc(hidden)]
-pub mod memory;
-pub mod mesh;
-mod note;
-#[doc(hidden)]
-pub mod pack;
 mod picture;
-#[doc(hidden)]
-pub mod render;
-pub mod scene;
-mod shader_files;
-#[doc(hidden)]
-pub mod visible;
-mod waiting;
+mod render;
 
 pub use device::{Device, DeviceInfo};
 pub use error::Error;
-pub use film::Region;
 pub use glam::DVec3;
-#[cfg(feature = "gpu")]
-pub use gpu::{Info, adapters};
 pub use image::{Aov, AovSource, Pixels};
 pub use picture::{Channel, Picture};
 pub use render::{Growing, Options, render, render_growing};
 pub use scene::{Description, Overrides, Scene};
+pub use wgray_image::Region;
+pub use wgray_render::film;
+#[cfg(feature = "gpu")]
+pub use wgray_render::gpu::{Info, adapters};
+pub use wgray_scene as scene;
+pub use wgray_scene::mesh;

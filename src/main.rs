@@ -2,8 +2,11 @@
 // These end the program where a stream is closed or full.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
-mod cli;
+use wgray::cli::Allocator;
+
+#[global_allocator]
+static ALLOCATOR: Allocator = Allocator;
 
 fn main() -> std::process::ExitCode {
-    cli::main()
+    wgray::cli::main()
 }

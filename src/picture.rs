@@ -5,9 +5,10 @@ use std::path::Path;
 
 use crate::device::DeviceInfo;
 use crate::error::{Error, RenderError};
-use crate::film::{Film, Region};
 use crate::image::{self, Aov, Band, Format, Layout, Output, Pending, Pixels, SaveOptions, Target};
-use crate::pack::FirstHit;
+use wgray_image::Region;
+use wgray_render::film::Film;
+use wgray_render::pack::FirstHit;
 
 /// A rendered picture, or the part of one that was asked for: linear radiance, and the layers beside it.
 #[derive(Clone, Debug, PartialEq)]

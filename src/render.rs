@@ -4,15 +4,16 @@ use std::ops::ControlFlow;
 
 use tracing::warn;
 
-use crate::backend::Backend;
 use crate::device::{Device, DeviceInfo, FaultHandler, Recovery, Renderer};
 use crate::error::{Error, RenderError};
-use crate::film::{Film, Form, Region};
 use crate::image::{Aov, AovSource, Layout};
-use crate::job::{self, Bands, Cut, Flow, NoCheckpoint, Order};
-use crate::pack::{FirstHit, Packed, pack};
 use crate::picture::Picture;
-use crate::scene::{Problem, Scene};
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::film::{Film, Form};
+use wgray_render::job::{self, Bands, Cut, Flow, NoCheckpoint, Order};
+use wgray_render::pack::{FirstHit, Packed, pack};
+use wgray_scene::{Problem, Scene};
 
 /// How a scene is rendered. Size, samples and seed are the scene's, which [`Overrides`](crate::Overrides) can change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

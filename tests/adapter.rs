@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::sync::OnceLock;
 
-use wgray::gpu::{Choice, Device, choose};
+use wgray_render::gpu::{Choice, Device, choose};
 
 /// Part of the name, driver or type of the adapter to test, where there are several.
 const ADAPTER: &str = "WGRAY_TEST_ADAPTER";

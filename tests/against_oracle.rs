@@ -1,8 +1,8 @@
 //! Pictures of all scenes, and what their pixels show first, against the oracle's.
 
 use glam::{DVec2, DVec3};
-use wgray::pack::{FirstHit, NOTHING};
 use wgray::scene::{Description, Pattern, SamplesDescription};
+use wgray_render::pack::{FirstHit, NOTHING};
 
 use crate::oracle::{Flaw, Meeting, Oracle};
 use crate::pictures::{both, first_hits, means, render};

@@ -269,7 +269,7 @@ fn a_function_that_is_further_from_the_truth_is_found() {
         let bound = &BOUNDS[bound];
         let text = shared_source().text;
         assert!(text.contains(from), "'{from}' is not there to be changed");
-        let mut source = wgray::gpu::compose::Source::default();
+        let mut source = wgray_render::gpu::compose::Source::default();
         source.append("changed", &text.replacen(from, to, 1));
         let module = parse(&source);
         let functions = functions(&module, &source);

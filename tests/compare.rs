@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use wgray::compare::{self, COLOR, Channel, Difference, Kind, PIXELS_PER_DEGREE, Picture, PixelCoord, Plane, layers};
+use wgray_image::compare::{
+    self, COLOR, Channel, Difference, Kind, PIXELS_PER_DEGREE, Picture, PixelCoord, Plane, layers,
+};
 
 /// A picture of red, green and blue by a function of column, row and channel.
 fn picture(width: u32, height: u32, kind: Kind, value: impl Fn(u32, u32, u32) -> f32) -> Picture {

@@ -1,14 +1,15 @@
-//! The contract of backends (`wgray::backend::Backend`), sentence by sentence, held by one suite: the CPU and the device, the
+//! The contract of backends (`wgray_render::backend::Backend`), sentence by sentence, held by one suite: the CPU and the device, the
 //! scene as constants and in buffers, with adaptive sampling and layers and without. Backends that break it are found.
 
 use std::ops::Range;
 
-use wgray::backend::Backend;
-use wgray::cpu::Cpu;
 use wgray::error::RenderError;
-use wgray::film::{Film, Region};
-use wgray::pack::{FirstHit, Packed};
 use wgray::scene::{AdaptiveDescription, Description};
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::cpu::Cpu;
+use wgray_render::film::Film;
+use wgray_render::pack::{FirstHit, Packed};
 
 use crate::pictures::{backend, exact_ways};
 use crate::{patterns, scenes};

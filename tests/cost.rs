@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use wgray::gpu::{Forms, check_kernels};
-use wgray::pack::{Packed, pack};
 use wgray::scene::Scene;
+use wgray_render::gpu::{Forms, check_kernels};
+use wgray_render::pack::{Packed, pack};
 
 use crate::sources;
 

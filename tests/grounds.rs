@@ -2,11 +2,11 @@
 //! surface hides its own light, and shadows are right where things touch. The oracle, in f64, is the truth.
 
 use glam::DVec3;
-use wgray::cpu::camera::camera_ray;
-use wgray::cpu::geometry::closest_hit;
-use wgray::cpu::surface::surface_at;
-use wgray::pack::{NOTHING, NOWHERE};
 use wgray::scene::Description;
+use wgray_render::cpu::camera::camera_ray;
+use wgray_render::cpu::geometry::closest_hit;
+use wgray_render::cpu::surface::surface_at;
+use wgray_render::pack::{NOTHING, NOWHERE};
 
 use crate::oracle::{Flaw, Oracle};
 use crate::pictures::{differing, exact_ways, means, reference, render};

@@ -4,22 +4,22 @@
 
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
-use naga::{Handle, Module, ScalarKind, Type};
-use wgray::cpu::differential::{Arrival, Derivative, Differential};
-use wgray::cpu::diffuse::Angles;
-use wgray::cpu::footprint::Footprint;
-use wgray::cpu::light::Segments;
-use wgray::cpu::mesh::{Spot, face_primitive, shear_of};
-use wgray::cpu::path::Path;
-use wgray::cpu::phong::Lobes;
-use wgray::cpu::primitive::Tangents;
-use wgray::cpu::principled::{Mixture, principled_mixture};
-use wgray::cpu::ray::{Hit, Ray};
-use wgray::cpu::shadow::{Block, cone_to_light};
-use wgray::cpu::slab::{fan, slabs};
-use wgray::cpu::surface::Surface;
-use wgray::pack::tree::{Aabb, build};
-use wgray::pack::{
+use wgray_render::cpu::differential::{Arrival, Derivative, Differential};
+use wgray_render::cpu::diffuse::Angles;
+use wgray_render::cpu::footprint::Footprint;
+use wgray_render::cpu::light::Segments;
+use wgray_render::cpu::mesh::{Spot, face_primitive, shear_of};
+use wgray_render::cpu::path::Path;
+use wgray_render::cpu::phong::Lobes;
+use wgray_render::cpu::primitive::Tangents;
+use wgray_render::cpu::principled::{Mixture, principled_mixture};
+use wgray_render::cpu::ray::{Hit, Ray};
+use wgray_render::cpu::shadow::{Block, cone_to_light};
+use wgray_render::cpu::slab::{fan, slabs};
+use wgray_render::cpu::surface::Surface;
+use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type};
+use wgray_render::pack::tree::{Aabb, build};
+use wgray_render::pack::{
     Camera, ELLIPSOID, FAR, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material, NOTHING, NOWHERE, Node, PAD,
     Primitive, SMALLEST_ALPHA, Sphere, Texture,
 };

@@ -3,15 +3,15 @@
 //! It uses the geometry, materials, lights and random numbers as any integrator does.
 
 use glam::{UVec2, Vec3, Vec4};
-use wgray::cpu::camera::camera_ray;
-use wgray::cpu::geometry::{closest_hit, hidden_samples, material_of, spot_of, surface_of};
-use wgray::cpu::light::{segment, segments_to_light};
-use wgray::cpu::math::{dot, normalize};
-use wgray::cpu::ray::Ray;
-use wgray::cpu::rng::unit_float;
-use wgray::cpu::sampling::{decision_bits, sample_key, sample_square};
-use wgray::cpu::shadow::Block;
-use wgray::pack::{NOTHING, NOWHERE, Packed, RANDOM};
+use wgray_render::cpu::camera::camera_ray;
+use wgray_render::cpu::geometry::{closest_hit, hidden_samples, material_of, spot_of, surface_of};
+use wgray_render::cpu::light::{segment, segments_to_light};
+use wgray_render::cpu::math::{dot, normalize};
+use wgray_render::cpu::ray::Ray;
+use wgray_render::cpu::rng::unit_float;
+use wgray_render::cpu::sampling::{decision_bits, sample_key, sample_square};
+use wgray_render::cpu::shadow::Block;
+use wgray_render::pack::{NOTHING, NOWHERE, Packed, RANDOM};
 
 use crate::pictures::{Way, differing, exact_ways, reference, render_with};
 use crate::{scenes, sources};

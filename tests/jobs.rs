@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use wgray::backend::Backend;
-use wgray::cpu::Cpu;
 use wgray::error::RenderError;
-use wgray::film::{Film, Region};
-use wgray::job::checkpoint::{Checkpoint, CheckpointError, Opening};
-use wgray::job::{Bands, CheckpointStore, Cut, Flow, Identity, NoCheckpoint, Order, Piece, StoredPiece, Tile};
-use wgray::pack::Packed;
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::cpu::Cpu;
+use wgray_render::film::Film;
+use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, Opening};
+use wgray_render::job::{Bands, CheckpointStore, Cut, Flow, Identity, NoCheckpoint, Order, Piece, StoredPiece, Tile};
+use wgray_render::pack::Packed;
 
 use crate::contract::{bits, subjects};
 use crate::pictures::{self, Way, whole};
@@ -208,7 +209,7 @@ fn of_samples(packed: &Packed, samples: u32) -> Film {
 
 fn last_pass(bands: &mut Bands) -> Film {
     let mut films = Vec::new();
-    let mut output = |band: wgray::job::Finished| {
+    let mut output = |band: wgray_render::job::Finished| {
         films.push(band.film);
         Ok(())
     };
@@ -387,7 +388,7 @@ fn what_is_no_longer_needed_does_not_pile_up() {
     for round in 1..40 {
         let piece = Piece {
             region: film.region,
-            reached: wgray::job::Reached {
+            reached: wgray_render::job::Reached {
                 pass: round - 1..round,
                 next: [0, 0],
             },

@@ -3,10 +3,12 @@
 
 use std::fmt::Write as _;
 
-use naga::{Handle, Module, ScalarKind, Type, TypeInner};
-use wgpu::util::DeviceExt;
-use wgray::gpu::compose::Source;
-use wgray::gpu::{Device, Rounding, check};
+use wgray_render::gpu::compose::Source;
+use wgray_render::gpu::naga;
+use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type, TypeInner};
+use wgray_render::gpu::wgpu;
+use wgray_render::gpu::wgpu::util::DeviceExt;
+use wgray_render::gpu::{Device, Rounding, check};
 
 use crate::sources::{file_of, shared_source, type_name};
 

@@ -1,12 +1,13 @@
 //! Layers that are means over the samples, and alpha: their sums, known answers, and the same bits by every way.
 
 use glam::{Vec3, Vec4};
-use wgray::film::{Film, Form, Layer, Region};
-use wgray::gpu::{Gpu, Options as GpuOptions};
-use wgray::job::Cut;
-use wgray::pack::Packed;
 use wgray::scene::ViewSettings;
 use wgray::{Aov, Channel, Description, Device, Options, Picture};
+use wgray_image::Region;
+use wgray_render::film::{Film, Form, Layer};
+use wgray_render::gpu::{Gpu, Options as GpuOptions};
+use wgray_render::job::Cut;
+use wgray_render::pack::Packed;
 
 use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, whole};
 use crate::scenes::parse;
@@ -347,7 +348,7 @@ fn alpha_is_the_share_of_the_samples_that_meet_anything() {
             // The colours are weighted by it, and the environment is not seen.
             let color = Vec3::new(0.5, 0.25, 4.0) * share;
             assert_eq!(
-                Vec3::from(wgray::film::mean(film.sums[i])),
+                Vec3::from(wgray_render::film::mean(film.sums[i])),
                 color,
                 "{place:?}, pixel {i}"
             );
@@ -465,7 +466,7 @@ fn layers_of_paths_are_refused_under_another_integrator() {
         };
         assert_eq!(told, expected, "{name}");
     }
-    let packed = wgray::pack::pack(&scene);
+    let packed = wgray_render::pack::pack(&scene);
     assert_eq!(packed.clone().with_layers(), packed, "no other film");
 }
 
@@ -478,7 +479,7 @@ fn a_film_of_another_form_takes_another_kernel() {
         return;
     };
     let options = GpuOptions {
-        exact: device.info.exact.then_some(wgray::gpu::Rounding::Device),
+        exact: device.info.exact.then_some(wgray_render::gpu::Rounding::Device),
         baked: false,
     };
     let mut gpu = Gpu::new(device, &plain, sources::shaders(), options).unwrap();

@@ -2,10 +2,10 @@
 
 use glam::{Vec2, Vec3};
 use wgray::Scene;
-use wgray::cpu::camera::camera_ray;
-use wgray::cpu::lens::{lens_ray, lens_sample};
-use wgray::cpu::sequence::sobol_sample;
-use wgray::pack::Packed;
+use wgray_render::cpu::camera::camera_ray;
+use wgray_render::cpu::lens::{lens_ray, lens_sample};
+use wgray_render::cpu::sequence::sobol_sample;
+use wgray_render::pack::Packed;
 
 use crate::pictures::{both, differing, exact_ways, means, render};
 use crate::scenes::{self, parse};
@@ -203,7 +203,7 @@ fn samples_of_the_lens_are_spread_over_it_and_not_tied_to_the_pixel() {
         let mut of_lens = [0; 4];
         for sample in 0..16 {
             let pixel = glam::UVec2::new(pixel, 9);
-            let ray = wgray::cpu::pixel::camera_sample(&packed, pixel, sample).ray;
+            let ray = wgray_render::cpu::pixel::camera_sample(&packed, pixel, sample).ray;
             let lens = ray.origin / packed.camera.lens_u.length();
             let straight =
                 (ray.direction / ray.direction.y + ray.origin * packed.camera.inverse_focus) * pixels() as f32;

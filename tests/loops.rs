@@ -2,11 +2,11 @@
 //! times together, without a word; `shaders/receipt.wgsl` tells. Each test holds on drivers without such a limit too.
 
 use wgray::error::RenderError;
-use wgray::film::Film;
-use wgray::gpu::compose::Shaders;
-use wgray::job::{self, Cut};
-use wgray::pack::Packed;
 use wgray::scene::{AdaptiveDescription, Description, Pattern, PlaneDescription, ShapeDescription, SphereDescription};
+use wgray_render::film::Film;
+use wgray_render::gpu::compose::Shaders;
+use wgray_render::job::{self, Cut};
+use wgray_render::pack::Packed;
 
 use crate::pictures::{Way, backend_with, differing, exact_ways, reference, render, whole};
 use crate::sources::{self, edited, edited_shaders, with};
@@ -204,11 +204,11 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
     // A kernel that does not sign is not believed, whatever the driver.
     let unsigned = edited_shaders("receipt.wgsl", "atomicAdd(&receipt.ended, 1u);", "");
     let device = adapter::device().expect("a device");
-    let options = wgray::gpu::Options {
+    let options = wgray_render::gpu::Options {
         exact: None,
         baked: false,
     };
-    let refused = wgray::gpu::Gpu::new(device, &packed, &unsigned, options).err();
+    let refused = wgray_render::gpu::Gpu::new(device, &packed, &unsigned, options).err();
     assert!(matches!(refused, Some(RenderError::CutShort { .. })), "{refused:?}");
 }
 

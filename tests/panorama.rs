@@ -2,10 +2,10 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use wgray::Scene;
-use wgray::cpu::panorama::{panorama_differential, panorama_ray};
-use wgray::film::Region;
-use wgray::job::Cut;
-use wgray::pack::{NOTHING, Packed};
+use wgray_image::Region;
+use wgray_render::cpu::panorama::{panorama_differential, panorama_ray};
+use wgray_render::job::Cut;
+use wgray_render::pack::{NOTHING, Packed};
 
 use crate::pictures::{backend, both, crop, differing, film, first_hits, means, render};
 use crate::scenes::parse;

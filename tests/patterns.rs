@@ -9,7 +9,7 @@ use crate::sources;
 
 /// The patterns with the names that files have for them.
 pub fn all() -> Vec<(String, Pattern)> {
-    let file = sources::rust("src/scene/description/render.rs");
+    let file = sources::rust("crates/scene/src/description/render.rs");
     let names = file.items.iter().find_map(|item| match item {
         syn::Item::Enum(e) if e.ident == "Pattern" => Some(e.variants.iter().map(|v| snake_case(&v.ident.to_string()))),
         _ => None,

@@ -1,13 +1,14 @@
 //! Pictures by every way to one: the CPU, and on the device the scene as constants, from buffers, and as plain WGSL.
 
 use glam::Vec4;
-use wgray::backend::Backend;
-use wgray::cpu::Cpu;
-use wgray::film::{Film, Region};
-use wgray::gpu::compose::Shaders;
-use wgray::gpu::{Gpu, Options, Rounding};
-use wgray::job::Cut;
-use wgray::pack::{FirstHit, Packed};
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::cpu::Cpu;
+use wgray_render::film::Film;
+use wgray_render::gpu::compose::Shaders;
+use wgray_render::gpu::{Gpu, Options, Rounding};
+use wgray_render::job::Cut;
+use wgray_render::pack::{FirstHit, Packed};
 
 use crate::{adapter, sources};
 
@@ -83,7 +84,7 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cu
         }
         Ok(())
     };
-    let result = wgray::job::render(backend, region, packed.pixel_samples, cut, &mut |_| true, &mut output);
+    let result = wgray_render::job::render(backend, region, packed.pixel_samples, cut, &mut |_| true, &mut output);
     result.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(
         all.sums.len() as u64,
@@ -114,7 +115,7 @@ pub fn reference(packed: &Packed) -> Film {
 }
 
 pub fn first_hits(packed: &Packed, way: Way) -> Vec<FirstHit> {
-    let hits = wgray::job::first_hits(&mut *backend(packed, way), whole(packed));
+    let hits = wgray_render::job::first_hits(&mut *backend(packed, way), whole(packed));
     hits.unwrap_or_else(|error| panic!("{way:?}: {error}"))
 }
 

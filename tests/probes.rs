@@ -1,104 +1,110 @@
 //! Every shared function, run on the device and on the CPU over thousands of inputs: the same bits.
 
 use glam::{UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
-use naga::ScalarKind;
-use wgray::cpu::adaptive::{
+use wgray_render::cpu::adaptive::{
     display_slope_squared, display_variance, look_with, mean_of, moments_with, samples_wanted, squared_deviation,
     variance_of_mean, whole_look,
 };
-use wgray::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
-use wgray::cpu::dielectric::{Passage, dielectric_sample, eta_of, refracts_inwards, transmittance};
-use wgray::cpu::differential::{
+use wgray_render::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
+use wgray_render::cpu::dielectric::{Passage, dielectric_sample, eta_of, refracts_inwards, transmittance};
+use wgray_render::cpu::differential::{
     Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
     refracted_derivative, refracted_differential, transferred,
 };
-use wgray::cpu::diffuse::{
+use wgray_render::cpu::diffuse::{
     Angles, angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval, rough_share,
 };
-use wgray::cpu::disk::{disk_blocks, intersect_disk};
-use wgray::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
-use wgray::cpu::filter::{filter_bin, filter_offset};
-use wgray::cpu::footprint::{
+use wgray_render::cpu::disk::{disk_blocks, intersect_disk};
+use wgray_render::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
+use wgray_render::cpu::filter::{filter_bin, filter_offset};
+use wgray_render::cpu::footprint::{
     Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, wrap_u, wrap_v,
 };
-use wgray::cpu::ggx::{
+use wgray_render::cpu::ggx::{
     ggx_albedo, ggx_albedo_along, ggx_albedo_fit, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample,
 };
-use wgray::cpu::lens::{circle_point, lens_ray, lens_sample, polygon_sample};
-use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local, spot_falloff};
-use wgray::cpu::light_sample::{
+use wgray_render::cpu::lens::{circle_point, lens_ray, lens_sample, polygon_sample};
+use wgray_render::cpu::light::{Segments, segment, segments_to_light, segments_to_local, spot_falloff};
+use wgray_render::cpu::light_sample::{
     ellipsoid_area, ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, whole_below,
 };
-use wgray::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
-use wgray::cpu::lobe::{
+use wgray_render::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
+use wgray_render::cpu::lobe::{
     LobeSample, direction_turn, facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, is_polished,
     lobe_frame, plain_alpha, streak_place, vector_from_lobe, vector_to_lobe,
 };
-use wgray::cpu::math::{
+use wgray_render::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, max4, min, normalize, positive_zero, power, power_whole, sine,
 };
-use wgray::cpu::mesh::{
+use wgray_render::cpu::mesh::{
     Crossing, Shear, Spot, color_between, face_arrival, face_bulge, face_first_hit, face_footprint, face_frame,
     face_lets_pass, face_normal, face_normal_derivative, face_primitive, face_surface, face_tangents, face_uv,
     face_uv_derivative, highest, lift, lowest, mesh_pad, normal_from_mesh, permuted, point_to_mesh, shear_of, sheared,
     spot_by_itself, triangle_crossing, turned_to, vector_from_mesh, vector_to_mesh,
 };
-use wgray::cpu::metal::{conductor_fresnel, metal_eval, metal_factor, metal_fresnel, metal_pdf, metal_sample};
-use wgray::cpu::modified_phong::{
+use wgray_render::cpu::metal::{conductor_fresnel, metal_eval, metal_factor, metal_fresnel, metal_pdf, metal_sample};
+use wgray_render::cpu::modified_phong::{
     PhongFactors, modified_phong_eval, modified_phong_pdf, modified_phong_sample, phong_factors, phong_lobe,
 };
-use wgray::cpu::node::{
+use wgray_render::cpu::node::{
     children_in_fan, children_passed, far_side, four_in_fan, four_passed, in_order, larger, leaf_items, octant_of,
     passed_bits, smaller, step_length, steps,
 };
-use wgray::cpu::normal_map::mapped_normal;
-use wgray::cpu::panorama::{panorama_angles, panorama_differential, panorama_ray};
-use wgray::cpu::path::{
+use wgray_render::cpu::normal_map::mapped_normal;
+use wgray_render::cpu::panorama::{panorama_angles, panorama_differential, panorama_ray};
+use wgray_render::cpu::path::{
     Path, Scattered, glass_path, is_specular, is_usable, mirrored_path, passed_path, reflected_path, refracted_path,
     usable_normal,
 };
-use wgray::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_samples};
-use wgray::cpu::plane::{intersect_plane, plane_blocks};
-use wgray::cpu::primitive::{
+use wgray_render::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_samples};
+use wgray_render::cpu::plane::{intersect_plane, plane_blocks};
+use wgray_render::cpu::primitive::{
     Tangents, blocks, intersect, is_centered, is_round, local_tangents, primitive_gradient, primitive_normal,
     primitive_uv, uv_derivative,
 };
-use wgray::cpu::principled::{
+use wgray_render::cpu::principled::{
     Mixture, bounded_color, coat_eval, facets_eval, glass_chance, glass_eval, glass_fresnel, glass_pdf, half_between,
     is_flat, luminance, mirrored_pdf, passes_straight, principled_eval, principled_mixture, principled_pdf,
     principled_sample, refracting_density, refracting_half, schlick, sheen_albedo, sheen_chance, sheen_lobe,
     to_frame_around,
 };
-use wgray::cpu::procedural::{
+use wgray_render::cpu::procedural::{
     along_edge, around_footprint, far_product, nearest_step, phase, procedural_share, sine_ratio, wave_integral,
     wave_integral_2, wave_mean, wave_value, widened_edge,
 };
-use wgray::cpu::ray::{
+use wgray_render::cpu::ray::{
     Hit, Ray, by_itself, closer, crosses_plane, nearer_hit, no_hit, plane_distance, point_to_local, scaled_crossing,
     vector_to_local, vector_to_world,
 };
-use wgray::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
-use wgray::cpu::rng::{hash4, unit_float};
-use wgray::cpu::rough_dielectric::{
+use wgray_render::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
+use wgray_render::cpu::rng::{hash4, unit_float};
+use wgray_render::cpu::rough_dielectric::{
     dielectric_gain, refracting_normal, rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample,
 };
-use wgray::cpu::sampling::{
+use wgray_render::cpu::sampling::{
     decision_bits, grid_sample, jittered_sample, random_sample, rotated_grid_sample, sample_key, sample_square, wrap,
 };
-use wgray::cpu::sequence::{
+use wgray_render::cpu::sequence::{
     halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_bits, sobol_reversed, sobol_sample,
 };
-use wgray::cpu::shadow::{Block, Cone, block_sample, cone_to_light, cuts, may_block, shadow_bits};
-use wgray::cpu::slab::{Fan, Slabs, box_passage, fan, fan_passage, inverse_of, is_passed, slabs};
-use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
-use wgray::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
-use wgray::cpu::surroundings::{MapCell, cap_above, cell_towards, column_after, direction_in_cell, normal_bin};
-use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
-use wgray::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, turned_up};
-use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
-use wgray::cpu::warp::{cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around};
-use wgray::gpu::Device;
-use wgray::pack::{Camera, FirstHit, Instance, Light, LightNode, Material, NOTHING, Node, Primitive, Sphere, Texture};
+use wgray_render::cpu::shadow::{Block, Cone, block_sample, cone_to_light, cuts, may_block, shadow_bits};
+use wgray_render::cpu::slab::{Fan, Slabs, box_passage, fan, fan_passage, inverse_of, is_passed, slabs};
+use wgray_render::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
+use wgray_render::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
+use wgray_render::cpu::surroundings::{MapCell, cap_above, cell_towards, column_after, direction_in_cell, normal_bin};
+use wgray_render::cpu::texel::{
+    gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index,
+};
+use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, turned_up};
+use wgray_render::cpu::triangle::{intersect_triangle, triangle_blocks};
+use wgray_render::cpu::warp::{
+    cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around,
+};
+use wgray_render::gpu::Device;
+use wgray_render::gpu::naga::ScalarKind;
+use wgray_render::pack::{
+    Camera, FirstHit, Instance, Light, LightNode, Material, NOTHING, Node, Primitive, Sphere, Texture,
+};
 
 use crate::adapter::{self, allowed, judge};
 use crate::inputs::inputs;
@@ -690,7 +696,7 @@ fn a_function_that_differs_by_one_ulp_is_found() {
             "{name}: '{from}' is not there to be changed"
         );
         let text = source.text.replacen(from, to, 1);
-        source = wgray::gpu::compose::Source::default();
+        source = wgray_render::gpu::compose::Source::default();
         source.append("changed", &text);
         let module = parse(&source);
         let (_, function) = functions(&module, &source)

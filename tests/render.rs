@@ -4,11 +4,12 @@
 use std::ops::Range;
 
 use glam::Vec4;
-use wgray::backend::Backend;
-use wgray::film::{Film, Region};
-use wgray::job::Cut;
-use wgray::pack::{FirstHit, Packed};
 use wgray::scene::{Description, Integrator, Pattern};
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::film::Film;
+use wgray_render::job::Cut;
+use wgray_render::pack::{FirstHit, Packed};
 
 use crate::adapter::{self, KNOWN, allowed, bit_exact, judge};
 use crate::nearly::{EDGES, Nearly};

@@ -1,8 +1,8 @@
 //! A picture does not depend on the unit of length, nor on where the origin is: no acne, no lost contact shadows.
 
 use glam::DVec3;
-use wgray::film::Film;
 use wgray::scene::{CameraDescription, Description, LightDescription, ShapeDescription};
+use wgray_render::film::Film;
 
 use crate::oracle::{Flaw, Oracle};
 use crate::pictures::reference;

@@ -3,7 +3,7 @@
 
 use std::sync::OnceLock;
 
-use wgray::gpu::compose::{ROUNDING, Shaders, Source};
+use wgray_render::gpu::compose::{ROUNDING, Shaders, Source};
 
 use crate::adapter::{self, bit_exact};
 use crate::kernel::functions;

@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use wgray::pack::{Packed, pack};
 use wgray::scene::{Assets, Description};
+use wgray_render::pack::{Packed, pack};
 
 use crate::sources;
 

@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use naga::{ArraySize, Module, ScalarKind, TypeInner};
 use syn::{FnArg, Item, Pat, ReturnType, Type};
-use wgray::gpu::compose::{KERNELS, Shaders, Source, built_in};
+use wgray_render::gpu::compose::{KERNELS, Shaders, Source, built_in};
+use wgray_render::gpu::naga;
+use wgray_render::gpu::naga::{ArraySize, Module, ScalarKind, TypeInner};
 
 /// A folder of shaders to test in place of the ones in the program: what `scripts/mutate` has changed.
 const SHADERS: &str = "WGRAY_TEST_SHADERS";

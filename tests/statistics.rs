@@ -2,8 +2,8 @@
 //! grids. The numbers are the same in every run, so that a test that passes once passes always.
 
 use glam::Vec2;
-use wgray::pack::Packed;
 use wgray::scene::Pattern;
+use wgray_render::pack::Packed;
 
 use crate::kernel::functions;
 use crate::pictures::{means, reference};

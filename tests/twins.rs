@@ -3,11 +3,11 @@
 
 use std::collections::BTreeSet;
 
-use wgray::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source, built_in};
-use wgray::gpu::spirv::instructions;
-use wgray::gpu::{FloatControls, Rounding, bake, check};
-use wgray::pack::Packed;
 use wgray::scene::Integrator;
+use wgray_render::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source, built_in};
+use wgray_render::gpu::spirv::instructions;
+use wgray_render::gpu::{FloatControls, Rounding, bake, check};
+use wgray_render::pack::Packed;
 
 use crate::scenes;
 use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};
@@ -40,7 +40,7 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
     ),
 ];
 
-/// Files of `src/cpu` that are no file's twin.
+/// Files of `crates/render/src/cpu` that are no file's twin.
 const NO_TWIN: &[&str] = &[
     "ewa.rs",
     "mod.rs",
@@ -137,7 +137,7 @@ fn is_shared(file: &str) -> bool {
 }
 
 fn twin_of(file: &str) -> syn::File {
-    sources::rust(&format!("src/cpu/{}", file.replace(".wgsl", ".rs")))
+    sources::rust(&format!("crates/render/src/cpu/{}", file.replace(".wgsl", ".rs")))
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn functions_and_records_are_the_same() {
 fn a_twin_that_drifted_is_found() {
     let shared = shared_source();
     let changed = |file: &str, from: &str, to: &str| {
-        let text = std::fs::read_to_string(sources::path(&format!("src/cpu/{file}"))).expect("a twin");
+        let text = std::fs::read_to_string(sources::path(&format!("crates/render/src/cpu/{file}"))).expect("a twin");
         assert!(text.contains(from), "{file}: '{from}' is not there to be changed");
         syn::parse_file(&text.replacen(from, to, 1)).expect("still Rust")
     };
@@ -217,7 +217,7 @@ fn an_argument_updated_in_place_stands_for_a_result() {
 
 #[test]
 fn every_twin_is_some_files() {
-    for entry in std::fs::read_dir(sources::path("src/cpu")).expect("the twins") {
+    for entry in std::fs::read_dir(sources::path("crates/render/src/cpu")).expect("the twins") {
         let name = entry
             .expect("an entry")
             .file_name()
@@ -227,7 +227,7 @@ fn every_twin_is_some_files() {
         let twin = built_in().any(|(file, _)| file == wgsl);
         assert!(
             twin || NO_TWIN.contains(&name.as_str()),
-            "src/cpu/{name} is no file's twin"
+            "crates/render/src/cpu/{name} is no file's twin"
         );
     }
 }

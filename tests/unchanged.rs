@@ -7,9 +7,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use bytemuck::cast_slice;
-use wgray::film::Film;
-use wgray::pack::{FirstHit, Packed, pack};
 use wgray::scene::{Description, GltfChoice, Integrator, Overrides, Scene};
+use wgray_render::film::Film;
+use wgray_render::pack::{FirstHit, Packed, pack};
 
 use crate::pictures::{Way, first_hits, reference};
 use crate::random_scenes::any_scene;

@@ -1,24 +1,24 @@
 //! Values as the 32-bit words of their scalars, in the order of their fields: how they travel to a kernel and back.
 
 use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
-use wgray::cpu::dielectric::Passage;
-use wgray::cpu::differential::{Arrival, Derivative, Differential};
-use wgray::cpu::diffuse::Angles;
-use wgray::cpu::footprint::{Ellipse, Footprint};
-use wgray::cpu::light::Segments;
-use wgray::cpu::lobe::LobeSample;
-use wgray::cpu::mesh::{Crossing, Shear, Spot};
-use wgray::cpu::modified_phong::PhongFactors;
-use wgray::cpu::path::{Path, Scattered};
-use wgray::cpu::phong::Lobes;
-use wgray::cpu::primitive::Tangents;
-use wgray::cpu::principled::Mixture;
-use wgray::cpu::ray::{Hit, Ray};
-use wgray::cpu::shadow::{Block, Cone};
-use wgray::cpu::slab::{Fan, Slabs};
-use wgray::cpu::surface::Surface;
-use wgray::cpu::surroundings::MapCell;
-use wgray::pack::{
+use wgray_render::cpu::dielectric::Passage;
+use wgray_render::cpu::differential::{Arrival, Derivative, Differential};
+use wgray_render::cpu::diffuse::Angles;
+use wgray_render::cpu::footprint::{Ellipse, Footprint};
+use wgray_render::cpu::light::Segments;
+use wgray_render::cpu::lobe::LobeSample;
+use wgray_render::cpu::mesh::{Crossing, Shear, Spot};
+use wgray_render::cpu::modified_phong::PhongFactors;
+use wgray_render::cpu::path::{Path, Scattered};
+use wgray_render::cpu::phong::Lobes;
+use wgray_render::cpu::primitive::Tangents;
+use wgray_render::cpu::principled::Mixture;
+use wgray_render::cpu::ray::{Hit, Ray};
+use wgray_render::cpu::shadow::{Block, Cone};
+use wgray_render::cpu::slab::{Fan, Slabs};
+use wgray_render::cpu::surface::Surface;
+use wgray_render::cpu::surroundings::MapCell;
+use wgray_render::pack::{
     Camera, Environment, FirstHit, Instance, Light, LightNode, Material, Node, Primitive, Sphere, Texture,
 };
 
@@ -82,7 +82,7 @@ pod![
     Instance
 ];
 
-/// Records of `src/cpu/`; a field that is missing here does not compile.
+/// Records of `crates/render/src/cpu/`; a field that is missing here does not compile.
 macro_rules! records {
     ($($ty:ident { $($field:ident),* $(,)? })*) => {$(
         impl Words for $ty {

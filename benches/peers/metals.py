@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the metals of src/scene/metals.rs: n and k for linear red, green and blue, from the measured spectra that Mitsuba ships.
+"""Prints the metals of crates/scene/src/metals.rs: n and k for linear red, green and blue, from the measured spectra that Mitsuba ships.
 
     benches/peers/run --install-only                                    once
     target/peers/venv/bin/python benches/peers/metals.py

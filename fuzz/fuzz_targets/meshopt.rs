@@ -9,7 +9,7 @@ use serde_json::json;
 use wgray::Scene;
 use wgray_fuzz::{Choices, container, file, small_model};
 
-const STREAMS: &str = include_str!("../../src/gltf/meshopt/streams.txt");
+const STREAMS: &str = include_str!("../../crates/scene/src/gltf/meshopt/streams.txt");
 
 /// Mode, filter, stride, count and bytes of each.
 fn streams() -> &'static [(&'static str, &'static str, u64, u64, Vec<u8>)] {

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use wgray::compare::Picture;
+use wgray_image::compare::Picture;
 use wgray_fuzz::file;
 
 fuzz_target!(|bytes: &[u8]| {

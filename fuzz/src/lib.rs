@@ -1,8 +1,8 @@
 //! What the fuzz targets share: choices out of bytes, files for readers that take a path, and one sample of a picture.
 
-#[path = "../../src/gltf/changed.rs"]
+#[path = "../../crates/scene/src/gltf/changed.rs"]
 mod changed;
-#[path = "../../src/gltf/everything.rs"]
+#[path = "../../crates/scene/src/gltf/everything.rs"]
 mod everything;
 
 use std::fs;

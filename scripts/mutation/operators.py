@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes every mistake that cargo-mutants knows in src/cpu, one at a time, and asks whether the tests find it.
+"""Makes every mistake that cargo-mutants knows in crates/render/src/cpu, one at a time, and asks whether the tests find it.
 
 cargo-mutants would compile the project anew for each of two thousand.  Here it only lists them; all are built at once,
 behind a switch that an environment variable sets.  What does not compile is left out, as cargo-mutants does.
@@ -62,7 +62,7 @@ class Mutation:
 
 def all_mutations():
     out = subprocess.run(
-        ["cargo", "mutants", "--list", "--json", "--file", "src/cpu/**/*.rs"], cwd=ROOT, stdout=subprocess.PIPE, check=True
+        ["cargo", "mutants", "--list", "--json", "--file", "crates/render/src/cpu/**/*.rs"], cwd=ROOT, stdout=subprocess.PIPE, check=True
     ).stdout
     text = {path: (ROOT / path).read_text() for path in {entry["file"] for entry in json.loads(out)}}
     return [Mutation(number, entry, text[entry["file"]]) for number, entry in enumerate(json.loads(out), 1)]

@@ -47,12 +47,12 @@ def copy(folder):
     """A copy of the project with the switch, in which mistakes can be made."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    for name in ["Cargo.toml", "Cargo.lock", "rustfmt.toml", "src", "shaders", "scenes", "tests", "examples", "benches", "docs", "README.md"]:
+    for name in ["Cargo.toml", "Cargo.lock", "rustfmt.toml", "src", "crates", "shaders", "scenes", "tests", "examples", "benches", "docs", "README.md"]:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name)
         else:
             shutil.copy2(ROOT / name, folder / name)
-    lib = folder / "src/lib.rs"
+    lib = folder / "crates/render/src/lib.rs"
     lib.write_text(lib.read_text() + SWITCH)
 
 
@@ -66,14 +66,14 @@ def cargo(folder, *arguments):
 
 
 def build(folder):
-    """The test binaries of a copy: the library's own, `lib`, and that of tests/main.rs, `main`."""
-    code, messages = cargo(folder, "test", "--release", "--no-run", "--lib", "--test", "main")
+    """The test binaries of a copy: that of crates/render, `lib`, and that of tests/main.rs, `main`."""
+    code, messages = cargo(folder, "test", "--release", "--no-run", "-p", "wgray", "-p", "wgray-render", "--lib", "--test", "main")
     if code != 0:
         raise SystemExit("the copy of the project does not compile")
     binaries = {}
     for message in messages:
         if message.get("executable") and message.get("profile", {}).get("test"):
-            name = "lib" if message["target"]["kind"] == ["lib"] else message["target"]["name"]
+            name = {"wgray_render": "lib"}.get(message["target"]["name"], message["target"]["name"])
             # cargo gives all copies' binaries the same path
             binaries[name] = shutil.copy2(message["executable"], folder / f"tests-{name}")
     return binaries

@@ -55,7 +55,7 @@ def make_twins(all_mutations, folder):
     """A copy of the project whose twins make the mistake of the number in WGRAY_MUTANT."""
     copy(folder)
     for file in sorted({m.file for m in all_mutations}):
-        path = folder / f"src/cpu/{file}.rs"
+        path = folder / f"crates/render/src/cpu/{file}.rs"
         text = path.read_text()
         of_file = [m for m in all_mutations if m.file == file]
         places = sorted(((place(text, m.rust[0], path), m) for m in of_file), key=lambda p: p[0], reverse=True)
@@ -94,7 +94,7 @@ def main():
     all_mutations = mutations()
     for m in all_mutations:
         place((ROOT / f"shaders/{m.file}.wgsl").read_text(), m.wgsl[0], f"shaders/{m.file}.wgsl")
-        place((ROOT / f"src/cpu/{m.file}.rs").read_text(), m.rust[0], f"src/cpu/{m.file}.rs")
+        place((ROOT / f"crates/render/src/cpu/{m.file}.rs").read_text(), m.rust[0], f"crates/render/src/cpu/{m.file}.rs")
     if arguments.list:
         print("\n".join(map(str, all_mutations)))
         return 0

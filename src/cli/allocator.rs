@@ -8,10 +8,9 @@ use std::time::Duration;
 
 use super::log;
 
-struct Allocator;
-
-#[global_allocator]
-static ALLOCATOR: Allocator = Allocator;
+/// The global allocator of the program: the system allocator, except that an allocation failure ends the program with exit code 7.
+#[derive(Debug)]
+pub struct Allocator;
 
 // SAFETY: the system allocator upholds the contract, and its results are returned unchanged.
 unsafe impl GlobalAlloc for Allocator {
@@ -37,7 +36,7 @@ unsafe impl GlobalAlloc for Allocator {
 }
 
 fn checked(memory: *mut u8, size: usize) -> *mut u8 {
-    if memory.is_null() && !wgray::memory::is_fallible() {
+    if memory.is_null() && !wgray_image::memory::is_fallible() {
         end(size);
     }
     memory
@@ -59,7 +58,7 @@ pub fn end(size: usize) -> ! {
         true => writeln!(line, r#"{{"level":"error","message":"{message}","exit_code":7}}"#),
         false => writeln!(line, "error: {message}"),
     };
-    wgray::image::remove_temporary_files();
+    wgray_image::remove_temporary_files();
     line.print();
     #[cfg(unix)]
     // SAFETY: `_exit` ends the process without running any of its code.

@@ -1,16 +1,16 @@
 //! `wgray check`: validates scenes and, with the feature `gpu`, shaders, without a device.
 
+use crate::scene::Note;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use wgray::scene::Note;
 
+use crate::scene::{CameraPath, Define, Integrator, Overrides, Projection, Scene, SceneError};
 use clap::ValueHint;
+use wgray_image::visible::visible;
 #[cfg(feature = "gpu")]
-use wgray::gpu::{Forms, check_kernels, compose::Shaders};
-use wgray::pack::{Packed, pack};
-use wgray::scene::{CameraPath, Define, Integrator, Overrides, Projection, Scene, SceneError};
-use wgray::visible::visible;
+use wgray_render::gpu::{Forms, check_kernels, compose::Shaders};
+use wgray_render::pack::{Packed, pack};
 
 use super::log::{self, Level};
 use super::scene_options::SceneOptions;

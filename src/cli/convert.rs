@@ -4,11 +4,11 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::error::RenderError;
+use crate::image::{Output, Pending};
+use crate::scene::{Define, Description, Overrides, Scene};
 use anyhow::anyhow;
 use clap::ValueHint;
-use wgray::error::RenderError;
-use wgray::image::{Output, Pending};
-use wgray::scene::{Define, Description, Overrides, Scene};
 
 use super::farm::text::word;
 use super::log::{self, Level};

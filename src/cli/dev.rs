@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, SystemTime};
 
+use crate::error::RenderError;
+use crate::image::Output;
+use crate::scene::{Define, Description, Overrides, Scene, SceneError};
 use anyhow::{Context as _, anyhow};
 use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
-use wgray::dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sources, StartError, measure};
-use wgray::error::RenderError;
-use wgray::gpu::AdapterChoice;
-use wgray::image::Output;
-use wgray::scene::{Define, Description, Overrides, Scene, SceneError};
+use wgray_dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sources, StartError, measure};
+use wgray_render::gpu::AdapterChoice;
 
 use super::Usage;
 use super::log::{self, Facts, Level};

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 #[cfg(feature = "gpu")]
-use wgray::gpu::{self, FloatControls, Info};
+use wgray_render::gpu::{self, FloatControls, Info};
 
 pub fn run() -> ExitCode {
     super::ended(list(&mut io::stdout().lock()), ExitCode::SUCCESS)

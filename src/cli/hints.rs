@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use wgray::visible::visible;
+use wgray_image::visible::visible;
 
 /// Options of other renderers and their equivalents.
 const OPTIONS: [(&str, &str); 21] = [

@@ -6,11 +6,11 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::error::RenderError;
+use crate::image::{Output, Pending};
 use clap::{CommandFactory as _, ValueHint};
 use clap_mangen::Man;
 use clap_mangen::roff::{Roff, bold, roman};
-use wgray::error::RenderError;
-use wgray::image::{Output, Pending};
 
 use super::exit_codes::EXIT_CODES;
 use super::{Cli, Usage};

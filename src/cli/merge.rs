@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{fs, io};
 
+use crate::error::RenderError;
+use crate::image;
 use anyhow::{Context as _, bail};
-use wgray::error::RenderError;
-use wgray::image;
-use wgray::job::Parts;
+use wgray_render::job::Parts;
 
 use super::frames::{self, Frame};
 use super::log::{self, Level};

@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::time::Duration;
 
-use wgray::device::DeviceInfo;
-use wgray::image::{Metadata, is_complete, read_metadata};
-use wgray::job::{hash_of_scene, hash_of_shaders};
-use wgray::pack::Packed;
-use wgray::scene::Scene;
+use crate::device::DeviceInfo;
+use crate::image::{Metadata, is_complete, read_metadata};
+use crate::scene::Scene;
+use wgray_render::job::hash_of_scene;
+use wgray_render::pack::Packed;
 
 /// Name of the mark of an image that was written before it was complete: `32 of 64 samples`.
 const PARTIAL: &str = "partial";
@@ -42,7 +42,7 @@ impl RenderMetadata {
         )];
         let mut add = |name: &str, text: String| pairs.push((name.to_owned(), text));
         add("scene_hash", hash_of_scene(packed));
-        add("shader_hash", hash_of_shaders());
+        add("shader_hash", wgray_shaders::hash());
         let render = &scene.render;
         add("integrator", render.integrator.name().to_owned());
         let samples = render.pixel_samples;

@@ -27,18 +27,19 @@ mod schema;
 mod signal;
 mod stats;
 
+use crate::scene::Note;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-use wgray::scene::Note;
 
+use crate::error::{Error, RenderError, ShaderError, ShaderErrors};
+use crate::scene::{Overrides, Problem, Scene, SceneError};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use serde_json::Value;
-use wgray::compare::Unreadable;
-use wgray::error::{Error, RenderError, ShaderError, ShaderErrors};
-use wgray::scene::{Overrides, Problem, Scene, SceneError};
+use wgray_image::compare::Unreadable;
 
+pub use self::allocator::Allocator;
 use self::log::{Facts, Level};
 
 #[derive(Debug, Parser)]
@@ -138,7 +139,7 @@ pub fn main() -> ExitCode {
     };
     prepare_environment(threads);
     signal::file_size_limit_is_an_error();
-    wgray::contain::install_quiet_hook(); // panics caused by a lost device are converted to errors
+    wgray_image::contain::install_quiet_hook(); // panics caused by a lost device are converted to errors
     let result = start_threads(threads).and_then(|()| match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),

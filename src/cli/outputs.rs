@@ -4,9 +4,9 @@
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
 
-use wgray::error::RenderError;
-use wgray::film::Region;
-use wgray::image::{self, Aov, Format, Layers, Output, Pending, Target};
+use crate::error::RenderError;
+use crate::image::{self, Aov, Format, Layers, Output, Pending, Target};
+use wgray_image::Region;
 
 use super::Usage;
 use super::metadata::is_finished;

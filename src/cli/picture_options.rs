@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::image::{BitDepth, ExrCompression, ExrType, Format, Metadata, SaveOptions, Saved};
+use crate::scene::{ViewSettings, ViewTransform};
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
-use wgray::image::{BitDepth, ExrCompression, ExrType, Format, Metadata, SaveOptions, Saved};
-use wgray::scene::{ViewSettings, ViewTransform};
 
 use super::Usage;
 use super::numbers::whole;

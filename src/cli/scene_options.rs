@@ -1,10 +1,10 @@
 //! Options that configure a scene or model file, shared by all commands that read scenes.
 
-use clap::ValueHint;
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
-use wgray::scene::{
+use crate::scene::{
     Background, EnvironmentDescription, GltfChoice, Orbit, Overrides, Presentation, Scene, Selection, UpAxis, View,
 };
+use clap::ValueHint;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 /// The options as parsed.
 #[derive(Clone, Debug, Default, clap::Args)]

@@ -4,6 +4,6 @@ use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 pub fn run() -> ExitCode {
-    let schema = wgray::scene::schema();
+    let schema = crate::scene::schema();
     super::ended(io::stdout().lock().write_all(schema.as_bytes()), ExitCode::SUCCESS)
 }

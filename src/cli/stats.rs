@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
+use crate::image::Pending;
 use serde::Serialize;
-use wgray::image::Pending;
 
 /// The fields of the file.
 #[derive(Debug, Serialize)]

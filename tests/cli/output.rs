@@ -1,9 +1,9 @@
 //! What a render writes: pictures, layers and figures.
 
-use wgray::cpu::Cpu;
-use wgray::film::Region;
 use wgray::image::{difference, encode, read_exr};
-use wgray::job::{self, Cut};
+use wgray_image::Region;
+use wgray_render::cpu::Cpu;
+use wgray_render::job::{self, Cut};
 
 use super::{Place, SCENE, read_png};
 use crate::patterns;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use wgray::dev::{Against, Command, Frame, View};
+use wgray_dev::{Against, Command, Frame, View};
 
 use super::running::{Files, KERNEL, Running, SCENE};
 

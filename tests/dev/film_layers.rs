@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use wgray::dev::{Command, Content, FilmLayer, Frame, LayerName, View};
-use wgray::film::{Film, Layer};
+use wgray_dev::{Command, Content, FilmLayer, Frame, LayerName, View};
+use wgray_render::film::{Film, Layer};
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
 

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
-use wgray::dev::{Command, Move, Sources};
 use wgray::scene::Overrides;
+use wgray_dev::{Command, Move, Sources};
 
 use super::running::Running;
 use crate::model::Model;
@@ -42,7 +42,7 @@ fn wait_for(running: &Running, strongest: [f64; 3]) {
     running.wait("the image of the file", |running| {
         let frame = running.frame().filter(|frame| frame.header.done)?;
         let pixels = match &frame.content {
-            wgray::dev::Content::Color(pixels) => &pixels.colors,
+            wgray_dev::Content::Color(pixels) => &pixels.colors,
             _ => return None,
         };
         let middle = pixels.get(11 * 24 + 12)?;

@@ -1,7 +1,7 @@
 //! Messages of viewers that mean no good: each is refused in words, and the scene file stays.
 
 use serde_json::{Value, json};
-use wgray::dev::{Command, Set};
+use wgray_dev::{Command, Set};
 
 use super::running::{Files, SCENE, serve};
 use super::viewer::Viewer;

@@ -1,6 +1,6 @@
 //! Unused kernels are checked too, and kernels that a driver truncates are reported.
 
-use wgray::dev::{Command, Move, View};
+use wgray_dev::{Command, Move, View};
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
 
@@ -106,7 +106,7 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
     }
     files.write(
         KERNEL,
-        wgray::gpu::compose::Shaders::built_in().text("kernels/render.wgsl"),
+        wgray_render::gpu::compose::Shaders::built_in().text("kernels/render.wgsl"),
     );
     running.wait_rendered(&files);
 
@@ -126,7 +126,7 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
     files.tint(0.25);
     files.write(
         FIRST_HITS,
-        wgray::gpu::compose::Shaders::built_in().text("kernels/first_hits.wgsl"),
+        wgray_render::gpu::compose::Shaders::built_in().text("kernels/first_hits.wgsl"),
     );
     running.wait_rendered(&files);
 }

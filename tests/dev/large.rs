@@ -1,6 +1,6 @@
 //! Images that are too large to display are shown smaller.
 
-use wgray::dev::{Command, View};
+use wgray_dev::{Command, View};
 
 use super::running::{Files, SCENE};
 

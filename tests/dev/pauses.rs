@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use wgray::dev::{Command, Preview, Report, Session, Settings};
-use wgray::gpu::AdapterChoice;
+use wgray_dev::{Command, Preview, Report, Session, Settings};
+use wgray_render::gpu::AdapterChoice;
 
 use super::responsive::heavy;
 use super::running::{Files, Running, SCENE, SETTLED};

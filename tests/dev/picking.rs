@@ -3,8 +3,8 @@
 use std::fs;
 
 use serde_json::json;
-use wgray::dev::{Command, Object, SceneView, Set, Sources};
 use wgray::scene::Overrides;
+use wgray_dev::{Command, Object, SceneView, Set, Sources};
 
 use super::running::{Files, Running};
 use crate::model::Model;

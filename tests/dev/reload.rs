@@ -3,8 +3,8 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
-use wgray::dev::{Command, Move};
-use wgray::gpu::compose::Shaders;
+use wgray_dev::{Command, Move};
+use wgray_render::gpu::compose::Shaders;
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
 

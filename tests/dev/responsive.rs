@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use wgray::dev::{Command, Move};
+use wgray_dev::{Command, Move};
 
 use super::running::{Files, LONGEST, SCENE};
 

@@ -7,14 +7,15 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
-use wgray::dev::{Content, Diagnostic, Frame, Listener, Session, Settings, Sources, State};
-use wgray::film::{Film, Region, mean};
-use wgray::gpu::compose::{Shaders, built_in};
-use wgray::gpu::{AdapterChoice, Gpu, Options, choose};
 use wgray::image::Pixels;
-use wgray::job::{self, Cut};
-use wgray::pack::{Packed, pack};
 use wgray::scene::{Overrides, Scene};
+use wgray_dev::{Content, Diagnostic, Frame, Listener, Session, Settings, Sources, State};
+use wgray_image::Region;
+use wgray_render::film::{Film, mean};
+use wgray_render::gpu::compose::{Shaders, built_in};
+use wgray_render::gpu::{AdapterChoice, Gpu, Options, choose};
+use wgray_render::job::{self, Cut};
+use wgray_render::pack::{Packed, pack};
 
 /// However busy the machine is, what is waited for comes within this time, or never.
 pub const LONGEST: Duration = Duration::from_secs(40);

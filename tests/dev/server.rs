@@ -4,7 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
-use wgray::dev::{Command, Listener, Move};
+use wgray_dev::{Command, Listener, Move};
 
 use super::running::{Files, LONGEST, SCENE, serve};
 

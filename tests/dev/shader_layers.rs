@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use wgray::dev::{Command, Content, Frame, LayerName, View};
 use wgray::image::Pixels;
+use wgray_dev::{Command, Content, Frame, LayerName, View};
 
 use super::running::{Files, KERNEL, Running, SCENE};
 

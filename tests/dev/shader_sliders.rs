@@ -1,8 +1,8 @@
 //! Marked constants of shaders: a slider shows what an edit of the file would, bit for bit, and without the compiler where
 //! that is possible.
 
-use wgray::dev::{Command, Content, Kind, SliderState, Value};
 use wgray::image::Pixels;
+use wgray_dev::{Command, Content, Kind, SliderState, Value};
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
 

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use wgray::dev::{Command, Move};
+use wgray_dev::{Command, Move};
 
 use super::running::{Files, SCENE, serve};
 use super::viewer::{Received, Viewer};

@@ -2,10 +2,10 @@
 
 use std::fs;
 
-use wgray::backend::Backend as _;
-use wgray::cpu::Cpu;
-use wgray::dev::{Against, Command, Content, Move, View};
-use wgray::film::Region;
+use wgray_dev::{Against, Command, Content, Move, View};
+use wgray_image::Region;
+use wgray_render::backend::Backend as _;
+use wgray_render::cpu::Cpu;
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
 

@@ -3,8 +3,8 @@
 use std::fs;
 
 use serde_json::{Value, json};
-use wgray::dev::{Command, Move, Set, Sources};
 use wgray::scene::Overrides;
+use wgray_dev::{Command, Move, Set, Sources};
 
 use super::running::{Files, Running, SCENE, SETTLED};
 

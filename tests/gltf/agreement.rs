@@ -1,7 +1,7 @@
 //! A glTF file with many features at once has the same bits on both paths.
 
 use serde_json::json;
-use wgray::pack::pack;
+use wgray_render::pack::pack;
 
 use super::build::{Builder, Packing, QUAD, QUAD_UVS};
 use super::read::scene_with;

@@ -1,7 +1,7 @@
-// Makes src/gltf/meshopt/streams.txt: streams by the encoder of npm's meshoptimizer, and what its decoder makes of them.
+// Makes crates/scene/src/gltf/meshopt/streams.txt: streams by the encoder of npm's meshoptimizer, and what its decoder makes of them.
 //
 //     npm install meshoptimizer@1.3.0
-//     node tests/gltf/meshopt.mjs > src/gltf/meshopt/streams.txt
+//     node tests/gltf/meshopt.mjs > crates/scene/src/gltf/meshopt/streams.txt
 //
 // With a number behind it, so many streams of random kinds are made, too many to be kept.
 //

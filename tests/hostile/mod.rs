@@ -1,9 +1,9 @@
 //! Files from strangers, through the real program: files of every kind that are changed at random, and small ones that ask for much.
 //! `scripts/test-slow hostile` changes a thousand of each kind.
 
-#[path = "../../src/gltf/changed.rs"]
+#[path = "../../crates/scene/src/gltf/changed.rs"]
 mod changed;
-#[path = "../../src/gltf/everything.rs"]
+#[path = "../../crates/scene/src/gltf/everything.rs"]
 mod everything;
 mod limits;
 mod mutation;

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use glam::DVec3;
-use wgray::pack::{Packed, pack};
 use wgray::scene::{Assets, Description};
+use wgray_render::pack::{Packed, pack};
 
 use crate::random::Random;
 

@@ -2,8 +2,8 @@
 //! smaller one that touches its triangles. So must what rays and shadow rays meet.
 
 use glam::DVec3;
-use wgray::cpu::camera::camera_ray;
-use wgray::pack::Packed;
+use wgray_render::cpu::camera::camera_ray;
+use wgray_render::pack::Packed;
 
 use super::forms::{Form, scene};
 use crate::pictures::{Way, first_hits, reference, render};

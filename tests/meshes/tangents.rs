@@ -5,14 +5,14 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
-use wgray::cpu::differential::Arrival;
-use wgray::cpu::geometry::{material_of, spot_of, surface_of};
-use wgray::cpu::mesh::{Spot, face_frame, face_tangents, face_uv};
-use wgray::cpu::normal_map::mapped_normal;
-use wgray::cpu::primitive::Tangents;
-use wgray::cpu::ray::{Hit, Ray};
-use wgray::cpu::texture::appearance;
-use wgray::pack::{NOTHING, Packed};
+use wgray_render::cpu::differential::Arrival;
+use wgray_render::cpu::geometry::{material_of, spot_of, surface_of};
+use wgray_render::cpu::mesh::{Spot, face_frame, face_tangents, face_uv};
+use wgray_render::cpu::normal_map::mapped_normal;
+use wgray_render::cpu::primitive::Tangents;
+use wgray_render::cpu::ray::{Hit, Ray};
+use wgray_render::cpu::texture::appearance;
+use wgray_render::pack::{NOTHING, Packed};
 
 use super::forms::{HEAD, Sheet, scene};
 use crate::pictures::reference;
@@ -149,7 +149,7 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     let material = material_of(packed, &spot);
     let found = appearance(packed, &spot, hit, material, surface, Arrival::default(), 1).normal;
     let Tangents { u, v } = face_tangents(&spot);
-    let by_triangle = wgray::cpu::surface::Surface {
+    let by_triangle = wgray_render::cpu::surface::Surface {
         du: u,
         dv: v,
         ..surface

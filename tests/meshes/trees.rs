@@ -6,17 +6,17 @@ use std::sync::Arc;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use wgray::cpu::geometry::{closest_hit, hidden_samples};
-use wgray::cpu::light::{segment, segments_to_light};
-use wgray::cpu::mesh::{highest, lowest, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
-use wgray::cpu::primitive::intersect;
-use wgray::cpu::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
-use wgray::cpu::shadow::{Block, block_sample, shadow_bits};
-use wgray::cpu::slab::{box_passage, is_passed, slabs};
-use wgray::cpu::surface::{Surface, largest};
-use wgray::cpu::traverse::{closest_primitive, hidden_by_primitives};
-use wgray::pack::tree::{self, Aabb};
-use wgray::pack::{
+use wgray_render::cpu::geometry::{closest_hit, hidden_samples};
+use wgray_render::cpu::light::{segment, segments_to_light};
+use wgray_render::cpu::mesh::{highest, lowest, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
+use wgray_render::cpu::primitive::intersect;
+use wgray_render::cpu::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
+use wgray_render::cpu::shadow::{Block, block_sample, shadow_bits};
+use wgray_render::cpu::slab::{box_passage, is_passed, slabs};
+use wgray_render::cpu::surface::{Surface, largest};
+use wgray_render::cpu::traverse::{closest_primitive, hidden_by_primitives};
+use wgray_render::pack::tree::{self, Aabb};
+use wgray_render::pack::{
     BLOCK, CASTS_SHADOW, FAR, INSTANCE, Instance, Item, Light, NO_SHADOW, NOTHING, NOWHERE, Packed, RANDOM,
 };
 
@@ -99,7 +99,7 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32
                 let i = &scene.instances[item.index as usize];
                 let start = point_to_mesh(i, origin);
                 let [towards, u, v] = [to.towards, to.u, to.v].map(|v| vector_to_mesh(i, v));
-                let direction = segment(wgray::cpu::light::Segments { towards, u, v }, at);
+                let direction = segment(wgray_render::cpu::light::Segments { towards, u, v }, at);
                 let s = slabs(start, direction, mesh_pad(i, start));
                 let mesh = &scene.meshes[i.mesh as usize];
                 mesh.triangles.iter().enumerate().any(|(slot, triangle)| {

@@ -3,11 +3,11 @@
 
 use glam::{DMat3, DVec3, UVec2, Vec3, Vec4Swizzles as _};
 use rayon::prelude::*;
-use wgray::cpu::geometry::{closest_hit, hidden_samples};
-use wgray::cpu::ray::Ray;
-use wgray::cpu::shadow::Block;
-use wgray::cpu::surface::Surface;
-use wgray::pack::{CASTS_SHADOW, FAR, GRID, Instance, Light, NOTHING, NOWHERE, Packed};
+use wgray_render::cpu::geometry::{closest_hit, hidden_samples};
+use wgray_render::cpu::ray::Ray;
+use wgray_render::cpu::shadow::Block;
+use wgray_render::cpu::surface::Surface;
+use wgray_render::pack::{CASTS_SHADOW, FAR, GRID, Instance, Light, NOTHING, NOWHERE, Packed};
 
 use super::forms::{Form, HEAD, scene};
 use crate::random::Random;

@@ -184,7 +184,7 @@ fn glass_makes_no_light_whatever_its_normals_are() {
             );
             let description = wgray::scene::Description::parse(&text, "test").expect("a scene");
             let beside = wgray::scene::Assets::beside(folder.path());
-            let packed = wgray::pack::pack(&description.validate_with(&beside).expect("a sound scene"));
+            let packed = wgray_render::pack::pack(&description.validate_with(&beside).expect("a sound scene"));
             for way in both() {
                 let film = render(&packed, way);
                 let found = mean(&film)[0];

@@ -4,16 +4,16 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec2, Vec3};
-use wgray::cpu::energy::principled_energy;
-use wgray::cpu::lobe::facet_alpha;
-use wgray::cpu::metal::metal_eval;
-use wgray::cpu::principled::{Mixture, principled_eval, principled_mixture, principled_pdf, principled_sample};
-use wgray::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf};
-use wgray::cpu::scattering::facets_of;
-use wgray::cpu::sequence::sobol_sample;
-use wgray::cpu::surface::Surface;
-use wgray::cpu::thin::{thin_eval, thin_pdf};
-use wgray::pack::{METAL, Material, NOWHERE, Packed, ROUGH_GLASS};
+use wgray_render::cpu::energy::principled_energy;
+use wgray_render::cpu::lobe::facet_alpha;
+use wgray_render::cpu::metal::metal_eval;
+use wgray_render::cpu::principled::{Mixture, principled_eval, principled_mixture, principled_pdf, principled_sample};
+use wgray_render::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf};
+use wgray_render::cpu::scattering::facets_of;
+use wgray_render::cpu::sequence::sobol_sample;
+use wgray_render::cpu::surface::Surface;
+use wgray_render::cpu::thin::{thin_eval, thin_pdf};
+use wgray_render::pack::{METAL, Material, NOWHERE, Packed, ROUGH_GLASS};
 
 use crate::pictures::{both, render};
 

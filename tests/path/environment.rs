@@ -5,10 +5,10 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::{DVec3, UVec2, Vec3};
-use wgray::cpu::environment::{arriving_from, sample_environment};
-use wgray::cpu::sequence::sobol_sample;
-use wgray::pack::{ENVIRONMENT, Packed, pack};
 use wgray::scene::{Assets, Description, Image, Texels};
+use wgray_render::cpu::environment::{arriving_from, sample_environment};
+use wgray_render::cpu::sequence::sobol_sample;
+use wgray_render::pack::{ENVIRONMENT, Packed, pack};
 
 use super::mean;
 use crate::pictures::{Way, both, differing, exact_ways, render, render_with};
@@ -337,7 +337,7 @@ fn a_hidden_image_lights_and_is_mirrored() {
                 render(&described(&keys, Some(&white), (16, 4), balls), way)
             };
             let (seen, hidden) = (picture(true), picture(false));
-            let at = |film: &wgray::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
+            let at = |film: &wgray_render::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
             assert_eq!(at(&seen, 0), [1.0; 3], "{environment}, {way:?}");
             assert_eq!(at(&hidden, 0), [0.0; 3], "{environment}, {way:?}");
             let middle = 8 * 16 + 8;
@@ -534,7 +534,7 @@ fn an_unoccluded_wall_has_little_noise() {
 
 #[test]
 fn a_direction_and_its_cell_are_each_others() {
-    use wgray::cpu::surroundings::{cell_towards, direction_in_cell};
+    use wgray_render::cpu::surroundings::{cell_towards, direction_in_cell};
     for (width, height) in [(1, 1), (2, 1), (3, 2), (16, 8), (8192, 4096)] {
         for column in [0, width / 3, width / 2, width - 1] {
             for row in [0, 1, height / 3, height / 2, height - 1, height] {

@@ -45,7 +45,7 @@ fn images_of_every_kind_are_read() {
         let scene = load(folder.path(), &format!("file = '{name}'")).unwrap();
         assert!(scene.notes.is_empty(), "{:?}", scene.notes);
         assert!(scene.files.iter().any(|file| file.ends_with(name)), "{:?}", scene.files);
-        let packed = wgray::pack::pack(&scene);
+        let packed = wgray_render::pack::pack(&scene);
         let at = packed.environment.texels as usize;
         let value = f32::from_bits(packed.texels[at]);
         // 188 of 255 by the sRGB curve is 0.5029.
@@ -176,7 +176,7 @@ fn named_surroundings_are_made_quickly() {
         let scene = load(folder.path(), &format!("name = '{name}'")).unwrap();
         let took = start.elapsed().as_secs_f64();
         println!("{name}: {took:.3} s");
-        let packed = wgray::pack::pack(&scene);
+        let packed = wgray_render::pack::pack(&scene);
         println!("{name}, packed: {:.3} s", start.elapsed().as_secs_f64() - took);
         assert!(packed.emitters.len() == 1 && packed.environment.width > 0, "{name}");
     }

@@ -1,8 +1,8 @@
 //! Lamps that the camera does not see: it sees what is behind them, and all else sees them.
 
 use glam::UVec2;
-use wgray::cpu::geometry::pixel_first_hit;
-use wgray::pack::{NOTHING, Packed};
+use wgray_render::cpu::geometry::pixel_first_hit;
+use wgray_render::pack::{NOTHING, Packed};
 
 use crate::pictures::{both, differing, exact_ways, means, reference, render};
 use crate::scenes;

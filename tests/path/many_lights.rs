@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use glam::{UVec2, UVec4, Vec3};
-use wgray::cpu::light_choice::{chosen_light, met_density};
-use wgray::cpu::ray::Hit;
-use wgray::cpu::rng::hash4;
-use wgray::pack::{NOTHING, Packed};
 use wgray::scene::{Description, PointLightDescription};
+use wgray_render::cpu::light_choice::{chosen_light, met_density};
+use wgray_render::cpu::ray::Hit;
+use wgray_render::cpu::rng::hash4;
+use wgray_render::pack::{NOTHING, Packed};
 
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_ways, reference, render};
@@ -241,7 +241,7 @@ fn a_hundred_thousand_lamps_render() {
         description = description.with_light(PointLightDescription::new(place, [1e-3; 3]));
     }
     let started = std::time::Instant::now();
-    let packed: Packed = wgray::pack::pack(&description.validate().expect("a sound scene"));
+    let packed: Packed = wgray_render::pack::pack(&description.validate().expect("a sound scene"));
     println!("100,000 lamps packed in {:?}", started.elapsed());
     assert_eq!(leaves(&packed).len(), 100_000);
     let expected = reference(&packed);
@@ -265,7 +265,7 @@ fn meshes_that_shine_are_in_the_tree() {
     let load = |text: &str| {
         let description = Description::parse(text, "test").expect("a scene");
         let beside = wgray::scene::Assets::beside(folder.path());
-        wgray::pack::pack(&description.validate_with(&beside).expect("a sound scene"))
+        wgray_render::pack::pack(&description.validate_with(&beside).expect("a sound scene"))
     };
     // Two of three shine; the ball is nearly the sphere of a radius that gives the same area.
     let mesh = |material: &str, x: f64| {

@@ -5,14 +5,14 @@ use std::f64::consts::{PI, TAU};
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3};
-use wgray::cpu::diffuse::{angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval};
-use wgray::cpu::lobe::{LobeSample, facet_alpha, facet_loss};
-use wgray::cpu::metal::{metal_eval, metal_pdf, metal_sample};
-use wgray::cpu::modified_phong::{modified_phong_eval, modified_phong_pdf, modified_phong_sample};
-use wgray::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample};
-use wgray::cpu::sequence::sobol_sample;
-use wgray::cpu::thin::{thin_eval, thin_pdf, thin_sample};
-use wgray::pack::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
+use wgray_render::cpu::diffuse::{angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval};
+use wgray_render::cpu::lobe::{LobeSample, facet_alpha, facet_loss};
+use wgray_render::cpu::metal::{metal_eval, metal_pdf, metal_sample};
+use wgray_render::cpu::modified_phong::{modified_phong_eval, modified_phong_pdf, modified_phong_sample};
+use wgray_render::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample};
+use wgray_render::cpu::sequence::sobol_sample;
+use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_sample};
+use wgray_render::pack::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
 
 /// What a material is: its functions.
 struct Lobes {
@@ -335,8 +335,8 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
     let mut counts = vec![0.0; HEIGHTS * LONGITUDES];
     for i in 0..SAMPLES {
         // Independent numbers: a sequence's are too even for this test.
-        let bits = wgray::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
-        let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray::cpu::rng::unit_float);
+        let bits = wgray_render::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
+        let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray_render::cpu::rng::unit_float);
         let Some(wi) = lobes.sample(wo, Vec2::new(a, b), c) else {
             continue;
         };

@@ -15,7 +15,7 @@ mod principled;
 mod spots;
 mod strategies;
 
-use wgray::pack::Packed;
+use wgray_render::pack::Packed;
 
 use crate::scenes;
 
@@ -28,7 +28,7 @@ pub fn scene(samples: u32, depth: u32, rest: &str) -> Packed {
 }
 
 /// The mean of a film's pixels, by channel.
-pub fn mean(film: &wgray::film::Film) -> [f64; 3] {
+pub fn mean(film: &wgray_render::film::Film) -> [f64; 3] {
     let count = film.sums.len() as f64;
     let sum = film.means().fold([0.0; 3], |sum: [f64; 3], mean| {
         [0, 1, 2].map(|i| sum[i] + f64::from(mean[i]))

@@ -1,6 +1,6 @@
 //! Spot lights against closed forms.
 
-use wgray::pack::Packed;
+use wgray_render::pack::Packed;
 
 use super::mean;
 use crate::pictures::{both, means, render};

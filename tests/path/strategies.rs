@@ -1,7 +1,7 @@
 //! Samples of light alone, samples of materials alone and both together converge to one mean: so densities and weights fit each
 //! other.
 
-use wgray::gpu::compose::Shaders;
+use wgray_render::gpu::compose::Shaders;
 
 use super::{mean, scene};
 use crate::pictures::{Way, render_with};

@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use proptest::prelude::*;
 use proptest::sample::select;
-use wgray::pack::{Packed, pack};
 use wgray::scene::*;
+use wgray_render::pack::{Packed, pack};
 
 use self::files::AROUND;
 pub use self::files::folder;

@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
-use wgray::gpu::compose::Shaders;
 use wgray::scene::{Description, Scene};
+use wgray_render::gpu::compose::Shaders;
 
 use crate::adapter::{self, bit_exact};
 use crate::nearly::Nearly;
@@ -161,7 +161,7 @@ fn shaders_that_differ_by_one_ulp_are_found_by_random_scenes() {
     assert!(reason.contains("pixels differ"), "{reason}");
     let path = save(&d, "scene-of-a-negative-control.toml");
     let scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(wgray::pack::pack(&scene), any_scene::packed(&d));
+    assert_eq!(wgray_render::pack::pack(&scene), any_scene::packed(&d));
 }
 
 /// Random scenes have everything that scene files can: every type that the parser knows, but for these.
@@ -189,7 +189,7 @@ fn random_scenes_have_everything() {
         );
     }
     let mut known: BTreeSet<String> = patterns::all().into_iter().map(|(name, _)| name).collect();
-    let parts = sources::path("src/scene/description")
+    let parts = sources::path("crates/scene/src/description")
         .read_dir()
         .expect("the parts of a description");
     let parts = parts.map(|entry| entry.expect("a file").path());

@@ -2,12 +2,14 @@
 //! pixel's variance. `unbiased.rs` has what comes of it.
 
 use glam::{DVec3, UVec2, Vec4};
-use wgray::cpu::adaptive::{display_slope_squared, display_variance, moments_with, samples_wanted, variance_of_mean};
-use wgray::cpu::pixel::pixel_radiance;
-use wgray::film::Region;
-use wgray::job::Cut;
-use wgray::pack::Packed;
 use wgray::scene::{AdaptiveDescription, Overrides, Pattern, PixelFilterDescription, PixelFilterKind, Scene};
+use wgray_image::Region;
+use wgray_render::cpu::adaptive::{
+    display_slope_squared, display_variance, moments_with, samples_wanted, variance_of_mean,
+};
+use wgray_render::cpu::pixel::pixel_radiance;
+use wgray_render::job::Cut;
+use wgray_render::pack::Packed;
 
 use super::cornell;
 use crate::pictures::{backend, crop, differing, exact_ways, film, reference, render, whole};

@@ -1,12 +1,12 @@
 //! Reconstruction filters: integrals and moments of their tables, the positions and weights that come of them, and pictures.
 
 use glam::Vec4;
-use wgray::cpu::pixel::filtered;
-use wgray::cpu::sequence::sobol_sample;
-use wgray::film::mean;
-use wgray::pack::filter::{height, table};
-use wgray::pack::{BINS, Packed};
 use wgray::scene::{Pattern, PixelFilterDescription, PixelFilterKind};
+use wgray_render::cpu::pixel::filtered;
+use wgray_render::cpu::sequence::sobol_sample;
+use wgray_render::film::mean;
+use wgray_render::pack::filter::{height, table};
+use wgray_render::pack::{BINS, Packed};
 
 use super::cornell;
 use crate::pictures::{Way, differing, exact_ways, render};

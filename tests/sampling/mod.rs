@@ -5,8 +5,8 @@ mod filters;
 mod sequences;
 mod unbiased;
 
-use wgray::pack::Packed;
 use wgray::scene::{Description, Pattern};
+use wgray_render::pack::Packed;
 
 use crate::{patterns, scenes};
 

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use wgray::gpu::{Device, Gpu, Options, Rounding};
-use wgray::job::Cut;
-use wgray::pack::Packed;
+use wgray_render::gpu::{Device, Gpu, Options, Rounding};
+use wgray_render::job::Cut;
+use wgray_render::pack::Packed;
 
 use super::{cpu_picture, scene, write_exr, write_png};
 use crate::meshes::forms::Sheet;

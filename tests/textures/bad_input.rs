@@ -190,7 +190,7 @@ fn a_file_is_kept_once_however_it_is_named() {
              color = {{ texture = '{name}' }}\n"
         )
     };
-    let packed = |text: &str| wgray::pack::pack(&load(folder.path(), text).unwrap());
+    let packed = |text: &str| wgray_render::pack::pack(&load(folder.path(), text).unwrap());
     let alone = packed(&image("a", "a.png", ""));
     let three = packed(&format!(
         "{}{}{}",
@@ -238,7 +238,7 @@ fn gray_palettes_and_opacity_are_read_as_their_colours() {
     let texels = |name: &str| {
         let material = "[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }\n";
         let text = format!("[textures.t]\ntype = 'image'\nfile = '{name}.png'\n{material}");
-        wgray::pack::pack(&load(folder.path(), &text).unwrap()).texels
+        wgray_render::pack::pack(&load(folder.path(), &text).unwrap()).texels
     };
     for name in ["gray", "gray_alpha", "rgba", "palette"] {
         assert_eq!(texels(name), texels("rgb"), "{name}");

@@ -3,15 +3,15 @@
 use std::path::Path as File;
 
 use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
-use wgray::cpu::camera::{camera_differential, camera_ray};
-use wgray::cpu::differential::{Arrival, reflected_derivative};
-use wgray::cpu::footprint::surface_footprint;
-use wgray::cpu::geometry::{arrival_of, closest_hit, footprint_of, material_of, spot_of, surface_of};
-use wgray::cpu::integrators::phong::scatter;
-use wgray::cpu::path::Path;
-use wgray::cpu::path::is_specular;
-use wgray::cpu::surface::{Surface, with_coordinates};
-use wgray::pack::{NOTHING, NOWHERE, Packed, Primitive};
+use wgray_render::cpu::camera::{camera_differential, camera_ray};
+use wgray_render::cpu::differential::{Arrival, reflected_derivative};
+use wgray_render::cpu::footprint::surface_footprint;
+use wgray_render::cpu::geometry::{arrival_of, closest_hit, footprint_of, material_of, spot_of, surface_of};
+use wgray_render::cpu::integrators::phong::scatter;
+use wgray_render::cpu::path::Path;
+use wgray_render::cpu::path::is_specular;
+use wgray_render::cpu::surface::{Surface, with_coordinates};
+use wgray_render::pack::{NOTHING, NOWHERE, Packed, Primitive};
 
 use super::scene;
 use crate::meshes::forms::Sheet;
@@ -85,7 +85,7 @@ impl Exact<'_> {
             1.0 - at.y * 2.0 / f64::from(camera.height),
         );
         let offset = right * x + up * y;
-        if camera.projection == wgray::pack::ORTHOGRAPHIC {
+        if camera.projection == wgray_render::pack::ORTHOGRAPHIC {
             return (camera.position.as_dvec3() + offset, forward);
         }
         (camera.position.as_dvec3(), (forward + offset).normalize())
@@ -238,7 +238,7 @@ fn texture_coordinates_on_an_ellipsoid_change_as_on_neighbouring_rays() {
             let Some((q, surface, arrival, _)) = arrive(&scene, at) else {
                 continue;
             };
-            if q.kind != wgray::pack::ELLIPSOID {
+            if q.kind != wgray_render::pack::ELLIPSOID {
                 continue;
             }
             let found = surface_footprint(&q, surface, arrival.x.position, arrival.y.position);

@@ -15,8 +15,8 @@ mod specular;
 
 use std::path::Path;
 
-use wgray::pack::{Packed, pack};
 use wgray::scene::{Assets, Description};
+use wgray_render::pack::{Packed, pack};
 
 use crate::pictures::reference;
 

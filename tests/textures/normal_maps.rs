@@ -1,14 +1,14 @@
 //! Normal maps: where their normals point.
 
 use glam::Vec3;
-use wgray::cpu::differential::Arrival;
-use wgray::cpu::geometry::{material_of, spot_of, surface_of};
-use wgray::cpu::path::usable_normal;
-use wgray::cpu::phong::phong_lobes;
-use wgray::cpu::ray::{Hit, Ray, no_hit};
-use wgray::cpu::surface::surface_at;
-use wgray::cpu::texture::appearance;
-use wgray::pack::Packed;
+use wgray_render::cpu::differential::Arrival;
+use wgray_render::cpu::geometry::{material_of, spot_of, surface_of};
+use wgray_render::cpu::path::usable_normal;
+use wgray_render::cpu::phong::phong_lobes;
+use wgray_render::cpu::ray::{Hit, Ray, no_hit};
+use wgray_render::cpu::surface::surface_at;
+use wgray_render::cpu::texture::appearance;
+use wgray_render::pack::Packed;
 
 use super::{scene, write_exr};
 use crate::random::Random;

@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use glam::{DVec2, Vec2};
-use wgray::cpu::footprint::Footprint;
-use wgray::cpu::procedural::procedural_share;
-use wgray::cpu::texture::texture_color;
-use wgray::pack::{CHECKER, LINES};
+use wgray_render::cpu::footprint::Footprint;
+use wgray_render::cpu::procedural::procedural_share;
+use wgray_render::cpu::texture::texture_color;
+use wgray_render::pack::{CHECKER, LINES};
 
 use super::filters::textured;
 use crate::random::Random;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use glam::UVec4;
-use wgray::cpu::specular::{fresnel, refracted_cosine};
-use wgray::pack::{ELLIPSOID, Packed};
+use wgray_render::cpu::specular::{fresnel, refracted_cosine};
+use wgray_render::pack::{ELLIPSOID, Packed};
 
 use super::{cpu_picture, scene};
 

@@ -1,6 +1,6 @@
 //! Measurement of a layer by all requested metrics.
 
-use wgray::compare::{self, COLOR, Flip, Layer, Picture};
+use wgray_image::compare::{self, COLOR, Flip, Layer, Picture};
 
 use super::metric::Metric;
 use super::report::{LayerReport, Number};

@@ -8,12 +8,12 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::error::RenderError;
+use crate::image::{Output, Pending};
 use anyhow::Context as _;
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError};
-use wgray::compare::{self, COLOR, Flip, Kind, Layer, Picture, layer_of};
-use wgray::error::RenderError;
-use wgray::image::{Output, Pending};
-use wgray::visible::visible_lines;
+use wgray_image::compare::{self, COLOR, Flip, Kind, Layer, Picture, layer_of};
+use wgray_image::visible::visible_lines;
 
 use super::Usage;
 use measure::measure;

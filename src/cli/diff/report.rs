@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Serialize, Serializer};
-use wgray::compare::{Largest, Picture, PixelCoord, Values};
+use wgray_image::compare::{Largest, Picture, PixelCoord, Values};
 
 use super::metric::{Limit, METRICS, Metric};
 

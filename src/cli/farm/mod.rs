@@ -12,11 +12,11 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use std::{fs, io};
 
+use crate::error::RenderError;
+use crate::image::{Output, Pending};
 use clap::Subcommand;
 use clap::builder::NonEmptyStringValueParser;
-use wgray::error::RenderError;
-use wgray::image::{Output, Pending};
-use wgray::job::Tile;
+use wgray_render::job::Tile;
 
 use self::given::{Given, Rendering};
 use self::text::{plain, word};

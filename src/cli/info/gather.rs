@@ -4,15 +4,15 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::DVec3;
-use serde::Serialize;
-use wgray::device::DevicePlan;
-use wgray::film::Region;
-use wgray::job::{Cut, bands};
-use wgray::pack::Packed;
-use wgray::scene::{
+use crate::device::DevicePlan;
+use crate::scene::{
     Camera, CameraPath, Geometry, Light, ModelContents, Projection, Reflection, Scene, Texels, TextureKind,
 };
+use glam::DVec3;
+use serde::Serialize;
+use wgray_image::Region;
+use wgray_render::job::{Cut, bands};
+use wgray_render::pack::Packed;
 
 use super::kernel::features;
 
@@ -307,7 +307,6 @@ fn reflection(reflection: &Reflection) -> &'static str {
         Reflection::Conductor { .. } => "conductor",
         Reflection::Dielectric { .. } => "dielectric",
         Reflection::Principled(_) => "principled",
-        _ => "other",
     }
 }
 
@@ -338,7 +337,6 @@ fn lights(scene: &Scene, packed: &Packed) -> Lights {
         Light::Point { .. } => "point",
         Light::Directional { .. } => "directional",
         Light::Spot { .. } => "spot",
-        _ => "other",
     };
     let environment = scene.environment.as_ref().map(|environment| match &environment.image {
         Some(image) => format!("image, {} x {} texels", image.image.width, image.image.height),

@@ -1,9 +1,9 @@
 //! Names of the optional features of a kernel.
 
-use wgray::pack::{
+use crate::scene::Integrator;
+use wgray_render::pack::{
     BACKGROUND, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Packed, Specialization,
 };
-use wgray::scene::Integrator;
 
 /// Returns all kernel features, each with a flag that is true if the scene uses it.
 pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {

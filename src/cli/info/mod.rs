@@ -8,12 +8,12 @@ use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use crate::device::{Device, plan_device};
+use crate::scene::{Define, Overrides};
 use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
-use wgray::device::{Device, plan_device};
-use wgray::pack::pack;
-use wgray::scene::{Define, Overrides};
-use wgray::visible::visible_lines;
+use wgray_image::visible::visible_lines;
+use wgray_render::pack::pack;
 
 use super::numbers::samples;
 use super::render::parse_size;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use wgray::scene::ModelContents;
+use crate::scene::ModelContents;
 
 use super::gather::{Info, Kinds, Textured};
 

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::device::Device;
+use crate::image::Aov;
+use crate::render::Options;
+use crate::scene::{Define, Integrator, Overrides, Pattern, Scene, is_gltf};
 use clap::ValueHint;
 use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser as _};
-use wgray::device::Device;
-use wgray::film::Region;
-use wgray::image::Aov;
-use wgray::job::Tile;
-use wgray::render::Options;
-use wgray::scene::{Define, Integrator, Overrides, Pattern, Scene, is_gltf};
+use wgray_image::Region;
+use wgray_render::job::Tile;
 
 use crate::cli::Usage;
 use crate::cli::frames::{Frame, Frames};

@@ -7,18 +7,18 @@ mod preview;
 mod trial;
 mod work;
 
+use crate::scene::Note;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;
-use wgray::scene::Note;
 
+use crate::device::DeviceInfo;
+use crate::error::RenderError;
+use crate::scene::{Problem, Scene, is_model};
 use anyhow::Context as _;
 use tracing::info;
-use wgray::device::DeviceInfo;
-use wgray::error::RenderError;
-use wgray::film::Region;
-use wgray::job::{CheckpointStore, NoCheckpoint};
-use wgray::scene::{Problem, Scene, is_model};
+use wgray_image::Region;
+use wgray_render::job::{CheckpointStore, NoCheckpoint};
 
 use self::once_log::OnceLog;
 use self::plan::Plan;

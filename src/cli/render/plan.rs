@@ -4,16 +4,16 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use crate::device::{FaultHandler, Recovery, Renderer};
+use crate::error::RenderError;
+use crate::image::Layout;
+use crate::render::Options;
+use crate::scene::{Scene, ViewSettings};
 use tracing::info;
-use wgray::device::{FaultHandler, Recovery, Renderer};
-use wgray::error::RenderError;
-use wgray::film::Region;
-use wgray::image::Layout;
-use wgray::job::checkpoint::{Checkpoint, CheckpointError, Opening};
-use wgray::job::{self, Identity, PartHeader, Tile};
-use wgray::pack::Packed;
-use wgray::render::Options;
-use wgray::scene::{Scene, ViewSettings};
+use wgray_image::Region;
+use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, Opening};
+use wgray_render::job::{self, Identity, PartHeader, Tile};
+use wgray_render::pack::Packed;
 
 use super::args::Args;
 use super::once_log::OnceLog;

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::{Duration, Instant};
 
-use wgray::image::{Format, Output, Pending, Target};
+use crate::image::{Format, Output, Pending, Target};
 
 use super::once_log::OnceLog;
 use crate::cli::log::Level;

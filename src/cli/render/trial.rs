@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use crate::error::RenderError;
 use anyhow::Context as _;
-use wgray::backend::Backend;
-use wgray::error::RenderError;
-use wgray::film::Region;
-use wgray::job::{self, Cut};
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::job::{self, Cut};
 
 use super::plan::Plan;
 use super::{Job, interrupted};

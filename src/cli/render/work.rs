@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use wgray::backend::Backend;
-use wgray::device::Renderer;
-use wgray::error::RenderError;
-use wgray::film::Region;
-use wgray::image::{self, Band, Layout, Pending, Sink};
-use wgray::job::{self, Bands, CheckpointStore, Cut, Finished, Flow, Order, PartHeader};
-use wgray::render::{middle_depth, needs_first_hits};
+use crate::device::Renderer;
+use crate::error::RenderError;
+use crate::image::{self, Band, Layout, Pending, Sink};
+use crate::render::{middle_depth, needs_first_hits};
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::job::{self, Bands, CheckpointStore, Cut, Finished, Flow, Order, PartHeader};
 
 use super::plan::Plan;
 use super::preview::Previews;

@@ -6,8 +6,8 @@ use glam::DVec3;
 use proptest::prelude::*;
 use proptest::sample::select;
 use wgray::mesh::Normals;
-use wgray::pack::MOST_OUTSIDE;
 use wgray::scene::*;
+use wgray_render::pack::MOST_OUTSIDE;
 
 use super::files::MESHES;
 use super::values::*;

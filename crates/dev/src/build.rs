@@ -1,0 +1,161 @@
+//! Compiles the kernels of a scene on a separate thread: a driver's compiler cannot be interrupted, and viewers must
+//! not wait for it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::source::Constants;
+use super::times::Times;
+use wgray_render::error::{RenderError, ShaderErrors};
+use wgray_render::gpu::compose::Shaders;
+use wgray_render::gpu::marks::Layer;
+use wgray_render::gpu::{AdapterChoice, Device, Forms, Gpu, Live, Options, check_kernels, choose};
+use wgray_render::pack::Packed;
+
+/// A request to compile a kernel.
+pub struct Request {
+    /// Returned with the result, which identifies late ones.
+    pub id: u64,
+    /// The device; `None` opens a new one.
+    pub device: Option<Device>,
+    /// The scene.
+    pub packed: Packed,
+    /// The shaders.
+    pub shaders: Arc<Shaders>,
+    /// The layer that replaces color.
+    pub layer: Option<Layer>,
+    /// Known good shaders, for use if those have errors.
+    pub fallback: Option<Arc<Shaders>>,
+    /// The constants that the kernel is compiled for.
+    pub constants: Constants,
+    /// When the change was noticed that the kernel shows.
+    pub noticed: Instant,
+}
+
+/// A scene on a device, and its shaders.
+pub type Ready = (Box<Gpu>, Arc<Shaders>);
+
+/// The result of a request.
+pub struct Built {
+    /// The id of the request.
+    pub id: u64,
+    /// The constants of the request.
+    pub constants: Constants,
+    /// The time of the request.
+    pub noticed: Instant,
+    /// The scene on a device; `None` if the request's shaders have errors, and there is no fallback.
+    pub result: Option<Result<Ready, RenderError>>,
+    /// The errors in the request's shaders.
+    pub refused: Option<ShaderErrors>,
+    /// Time spent on checking and compiling.
+    pub took: Duration,
+}
+
+/// The compiler thread. It ends after its current work when this is dropped.
+pub struct Builder {
+    requests: Option<Sender<Request>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Builder {
+    /// Starts the thread. It passes its results to `done`. Requests that were overtaken by a newer one before they
+    /// began are dropped.
+    pub fn start(
+        choice: AdapterChoice,
+        times: Times,
+        done: impl Fn(Built) + Send + 'static,
+    ) -> std::io::Result<Builder> {
+        let (sender, receiver) = channel();
+        let thread = std::thread::Builder::new()
+            .name("build".to_string())
+            .spawn(move || run(&choice, &times, &receiver, done))?;
+        Ok(Builder {
+            requests: Some(sender),
+            thread: Some(thread),
+        })
+    }
+
+    /// Sends a request. Earlier requests that have not begun are dropped.
+    pub fn request(&self, request: Request) {
+        if let Some(requests) = &self.requests {
+            let _ = requests.send(request); // the thread lives as long as this
+        }
+    }
+}
+
+impl Drop for Builder {
+    fn drop(&mut self) {
+        self.requests = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn run(choice: &AdapterChoice, times: &Times, requests: &Receiver<Request>, done: impl Fn(Built)) {
+    while let Ok(mut request) = requests.recv() {
+        while let Ok(newer) = requests.try_recv() {
+            request = newer;
+        }
+        done(build(choice, times, request));
+    }
+}
+
+fn build(choice: &AdapterChoice, times: &Times, request: Request) -> Built {
+    let Request {
+        id,
+        device,
+        packed,
+        shaders,
+        layer,
+        fallback,
+        constants,
+        noticed,
+    } = request;
+    let start = Instant::now();
+    // Every kernel, including those of other views.
+    let refused = times.of("check shaders", || {
+        check_kernels(&packed, &shaders, Forms::Buffers).err()
+    });
+    let usable = if refused.is_some() { fallback } else { Some(shaders) };
+    let result = usable.map(|shaders| {
+        guarded(|| {
+            let device = device.map_or_else(|| choose(choice), Ok)?;
+            // In buffers, so that a change of the scene needs no compiler.
+            let options = Options {
+                baked: false,
+                ..Options::best(&device)
+            };
+            let gpu = times.of("compile", || {
+                let live = Live::of(&shaders, packed.adaptive, packed.integrator, layer);
+                let mut gpu = Gpu::with_live(&device, &packed, &shaders, options, live)?;
+                gpu.time_calls()?;
+                Ok::<_, RenderError>(gpu)
+            })?;
+            Ok((Box::new(gpu), shaders))
+        })
+    });
+    Built {
+        id,
+        constants,
+        noticed,
+        result,
+        refused,
+        took: start.elapsed(),
+    }
+}
+
+/// Runs code that calls a driver. wgpu panics if a device is lost while it waits, which becomes an error.
+pub fn guarded<T>(work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let message = panic.downcast_ref::<String>().map(String::as_str);
+        let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
+        Err(RenderError::Device {
+            device: "device".to_string(),
+            message: message.unwrap_or("lost").to_string(),
+        })
+    })
+}

@@ -1,0 +1,579 @@
+//! Interactive moves of a camera, and its text in a scene file.
+
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+
+use wgray_scene::CameraDescription;
+
+/// A move of a camera.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Move {
+    /// Orbits around the point looked at: angles to the right and upwards, in radians, by which the scene seems to
+    /// turn.
+    Orbit(f64, f64),
+    /// Pans sideways: how far the scene moves to the right and upwards, in image heights.
+    Pan(f64, f64),
+    /// Approaches the point looked at: the logarithm of the factor by which the scene grows.
+    Dolly(f64),
+    /// Moves without turning: to the right, upwards and forwards, in multiples of the distance to the point looked
+    /// at.
+    Fly(f64, f64, f64),
+    /// Turns on the spot: angles to the right and upwards, in radians.
+    #[serde(rename = "look")]
+    Turn(f64, f64),
+}
+
+/// The viewpoint of a camera, as a viewer keeps it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Viewpoint {
+    /// The position.
+    pub position: DVec3,
+    /// The point that the camera looks at.
+    pub look_at: DVec3,
+    /// The up direction.
+    pub up: DVec3,
+    /// The vertical angle of view in degrees, or the height of an orthographic camera; none for a panorama.
+    pub extent: Option<f64>,
+}
+
+impl Viewpoint {
+    /// Returns the viewpoint of a camera.
+    pub fn of(camera: &CameraDescription) -> Viewpoint {
+        let View {
+            position, look_at, up, ..
+        } = view(camera);
+        let extent = match camera {
+            CameraDescription::Perspective(c) => Some(c.fov),
+            CameraDescription::Orthographic(c) => Some(c.height),
+            CameraDescription::Panorama(_) => None,
+        };
+        Viewpoint {
+            position,
+            look_at,
+            up,
+            extent,
+        }
+    }
+}
+
+/// Returns a camera of the same kind at another viewpoint.
+///
+/// # Errors
+///
+/// The rule that such a camera breaks.
+pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<CameraDescription, String> {
+    let Viewpoint {
+        position,
+        look_at,
+        up,
+        extent,
+    } = viewpoint;
+    let mut new = camera.clone();
+    match &mut new {
+        CameraDescription::Perspective(c) => {
+            (c.position, c.look_at, c.up, c.fov) = (position, look_at, up, extent.unwrap_or(c.fov));
+        }
+        CameraDescription::Orthographic(c) => {
+            (c.position, c.look_at, c.up, c.height) = (position, look_at, up, extent.unwrap_or(c.height));
+        }
+        CameraDescription::Panorama(c) => (c.position, c.look_at, c.up) = (position, look_at, up),
+    }
+    match new.validate() {
+        Ok(_) => Ok(new),
+        Err(problem) => Err(format!("camera: {problem}")),
+    }
+}
+
+/// Returns a camera that sees a whole sphere from the current direction, and orbits around its center.
+pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraDescription {
+    let View { position, look_at, .. } = view(camera);
+    let back = (position - look_at).normalize_or_zero();
+    let radius = radius.max(f64::MIN_POSITIVE);
+    let mut viewpoint = Viewpoint::of(camera);
+    let distance = match camera {
+        // The sphere touches the cone of view; a margin of a quarter of its size remains.
+        CameraDescription::Perspective(c) => 1.25 * radius / (c.fov.to_radians() / 2.0).sin(),
+        CameraDescription::Orthographic(_) => {
+            viewpoint.extent = Some(2.5 * radius);
+            (position - look_at).length().max(2.0 * radius)
+        }
+        CameraDescription::Panorama(_) => 2.0 * radius,
+    };
+    (viewpoint.look_at, viewpoint.position) = (rounded(center, distance), rounded(center + back * distance, distance));
+    placed(camera, viewpoint).unwrap_or_else(|_| camera.clone())
+}
+
+/// Minimum angle between the view and the vertical, in radians.
+const STEEPEST: f64 = 0.02;
+/// Number of significant digits of a camera, relative to its distance: more are invisible, and hard to read in a
+/// file.
+const DIGITS: i32 = 5;
+
+/// The position, the point looked at, and the height of the image at that point.
+struct View {
+    position: DVec3,
+    look_at: DVec3,
+    up: DVec3,
+    span: f64,
+}
+
+fn view(camera: &CameraDescription) -> View {
+    match camera {
+        CameraDescription::Perspective(c) => View {
+            position: c.position,
+            look_at: c.look_at,
+            up: c.up,
+            span: 2.0 * (c.fov.to_radians() / 2.0).tan() * c.position.distance(c.look_at),
+        },
+        CameraDescription::Orthographic(c) => View {
+            position: c.position,
+            look_at: c.look_at,
+            up: c.up,
+            span: c.height,
+        },
+        CameraDescription::Panorama(c) => View {
+            position: c.position,
+            look_at: c.look_at,
+            up: c.up,
+            span: std::f64::consts::PI * c.position.distance(c.look_at),
+        },
+    }
+}
+
+/// Returns a camera after a move, or the same camera if the move would make it invalid.
+pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
+    let mut new = camera.clone();
+    let View {
+        mut position,
+        mut look_at,
+        up,
+        span,
+    } = view(camera);
+    let up = up.normalize();
+    let offset = position - look_at;
+    let right = (-offset).cross(up).normalize();
+    match by {
+        Move::Orbit(x, y) => {
+            let turned = DQuat::from_axis_angle(up, -x) * offset;
+            let right = DQuat::from_axis_angle(up, -x) * right;
+            let angle = turned.angle_between(up);
+            // Looking from higher up means a smaller angle to the vertical.
+            let new_angle = (angle - y).clamp(STEEPEST, std::f64::consts::PI - STEEPEST);
+            position = look_at + DQuat::from_axis_angle(right, new_angle - angle) * turned;
+        }
+        Move::Pan(x, y) => {
+            let upwards = right.cross(-offset).normalize();
+            let shift = (right * -x + upwards * -y) * span;
+            position += shift;
+            look_at += shift;
+        }
+        Move::Dolly(by) => position = look_at + offset * (-by).exp(),
+        Move::Fly(x, y, z) => {
+            let forwards = -offset.normalize();
+            let shift = (right * x + right.cross(forwards) * y + forwards * z) * offset.length();
+            position += shift;
+            look_at += shift;
+        }
+        Move::Turn(x, y) => {
+            let forwards = DQuat::from_axis_angle(up, -x) * -offset;
+            let right = DQuat::from_axis_angle(up, -x) * right;
+            let angle = forwards.angle_between(up);
+            let new_angle = (angle - y).clamp(STEEPEST, std::f64::consts::PI - STEEPEST);
+            look_at = position + DQuat::from_axis_angle(right, angle - new_angle) * forwards;
+        }
+    }
+    let scale = position.distance(look_at);
+    match &mut new {
+        CameraDescription::Perspective(c) => {
+            (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
+        }
+        CameraDescription::Panorama(c) => {
+            (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
+        }
+        CameraDescription::Orthographic(c) => {
+            if let Move::Dolly(by) = by {
+                c.height = round(c.height * (-by).exp(), c.height); // going nearer would change nothing
+            } else {
+                (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
+            }
+        }
+    }
+    if new.validate().is_ok() { new } else { camera.clone() }
+}
+
+/// Nearest and farthest distance to the look-at point that a dolly reaches, relative to that of the file's camera.
+const DOLLY_RANGE: [f64; 2] = [0.01, 1000.0];
+
+/// Dollies like [`moved`], but within bounds. At the near bound the look-at point moves along, so that the camera never gets stuck
+/// in front of it; at the far bound the camera stops.
+pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) -> CameraDescription {
+    let size = |camera: &CameraDescription| match camera {
+        CameraDescription::Orthographic(c) => c.height,
+        other => {
+            let View { position, look_at, .. } = view(other);
+            position.distance(look_at)
+        }
+    };
+    let [near, far] = DOLLY_RANGE.map(|factor| factor * size(file));
+    let now = size(camera);
+    let wanted = now * (-by).exp();
+    let reached = wanted.max(near.min(now)).min(far.max(now));
+    let near_end = moved(camera, Move::Dolly((now / reached).ln()));
+    if wanted < reached && !matches!(camera, CameraDescription::Orthographic(_)) {
+        return moved(&near_end, Move::Fly(0.0, 0.0, 1.0 - wanted / reached));
+    }
+    near_end
+}
+
+/// Returns a moved camera after an edit of the file's camera: edited values come from the file, the others stay.
+/// `None` if the result is the file's camera.
+pub fn merged(
+    moved: &CameraDescription,
+    old: &CameraDescription,
+    new: &CameraDescription,
+) -> Option<CameraDescription> {
+    let mut merged = moved.clone();
+    match (&mut merged, old, new) {
+        (
+            CameraDescription::Perspective(c),
+            CameraDescription::Perspective(old),
+            CameraDescription::Perspective(new),
+        ) => {
+            take(&mut c.position, &old.position, &new.position);
+            take(&mut c.look_at, &old.look_at, &new.look_at);
+            take(&mut c.up, &old.up, &new.up);
+            take(&mut c.fov, &old.fov, &new.fov);
+            // A move does not change the lens.
+            (c.focal_length, c.aperture, c.f_number) = (new.focal_length, new.aperture, new.f_number);
+            (c.focus_distance, c.blades, c.blade_rotation) = (new.focus_distance, new.blades, new.blade_rotation);
+            c.path.clone_from(&new.path);
+        }
+        (
+            CameraDescription::Orthographic(c),
+            CameraDescription::Orthographic(old),
+            CameraDescription::Orthographic(new),
+        ) => {
+            take(&mut c.position, &old.position, &new.position);
+            take(&mut c.look_at, &old.look_at, &new.look_at);
+            take(&mut c.up, &old.up, &new.up);
+            take(&mut c.height, &old.height, &new.height);
+            c.path.clone_from(&new.path);
+        }
+        (CameraDescription::Panorama(c), CameraDescription::Panorama(old), CameraDescription::Panorama(new)) => {
+            take(&mut c.position, &old.position, &new.position);
+            take(&mut c.look_at, &old.look_at, &new.look_at);
+            take(&mut c.up, &old.up, &new.up);
+            c.path.clone_from(&new.path);
+        }
+        _ => return None, // another kind of camera
+    }
+    (merged != *new && merged.validate().is_ok()).then_some(merged)
+}
+
+fn take<T: Copy + PartialEq>(value: &mut T, old: &T, new: &T) {
+    if old != new {
+        *value = *new;
+    }
+}
+
+fn rounded(point: DVec3, scale: f64) -> DVec3 {
+    DVec3::from(point.to_array().map(|x| round(x, scale)))
+}
+
+/// Rounds a number to few decimals, relative to lengths like `scale`.
+fn round(x: f64, scale: f64) -> f64 {
+    let decimals = (DIGITS - scale.log10().floor() as i32).clamp(0, 15) as usize;
+    let x = format!("{x:.decimals$}").parse().unwrap_or(x);
+    if x == 0.0 { 0.0 } else { x } // no -0
+}
+
+/// Returns the keys and values of a camera that a move can change, as in a scene file.
+pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
+    match camera {
+        CameraDescription::Perspective(c) => vec![
+            ("position", Entry::Point(c.position)),
+            ("look_at", Entry::Point(c.look_at)),
+            ("up", Entry::Point(c.up)),
+            ("fov", Entry::Number(c.fov)),
+        ],
+        CameraDescription::Orthographic(c) => vec![
+            ("position", Entry::Point(c.position)),
+            ("look_at", Entry::Point(c.look_at)),
+            ("up", Entry::Point(c.up)),
+            ("height", Entry::Number(c.height)),
+        ],
+        CameraDescription::Panorama(c) => vec![
+            ("position", Entry::Point(c.position)),
+            ("look_at", Entry::Point(c.look_at)),
+            ("up", Entry::Point(c.up)),
+        ],
+    }
+}
+
+/// Returns the settings of a camera that no move changes, such as those of its lens.
+fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
+    let CameraDescription::Perspective(c) = camera else {
+        return Vec::new();
+    };
+    let written = [
+        ("focal_length", (c.focal_length != 1.0).then_some(c.focal_length)),
+        ("aperture", c.aperture),
+        ("f_number", c.f_number),
+        ("focus_distance", c.focus_distance),
+        ("blades", (c.blades != 0).then_some(c.blades.into())),
+        ("blade_rotation", (c.blade_rotation != 0.0).then_some(c.blade_rotation)),
+    ];
+    written
+        .into_iter()
+        .filter_map(|(key, value)| Some((key, value?)))
+        .collect()
+}
+
+/// The value of a key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Entry {
+    /// One number.
+    Number(f64),
+    /// A list of three.
+    Point(DVec3),
+}
+
+/// Returns a camera as the section of a scene file.
+pub fn text(camera: &CameraDescription) -> String {
+    let kind = match camera {
+        CameraDescription::Perspective(_) => "",
+        CameraDescription::Orthographic(_) => "type = \"orthographic\"\n",
+        CameraDescription::Panorama(_) => "type = \"panorama\"\n",
+    };
+    let entries = entries(camera).into_iter().map(|(key, entry)| match entry {
+        Entry::Number(x) => format!("{key} = {x}\n"),
+        Entry::Point(p) => format!("{key} = [{}, {}, {}]\n", p.x, p.y, p.z),
+    });
+    let settings = settings(camera).into_iter().map(|(key, x)| format!("{key} = {x}\n"));
+    format!("[camera]\n{kind}{}", entries.chain(settings).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgray_scene::Description;
+
+    fn camera(text: &str) -> CameraDescription {
+        let text = format!("image = {{ width = 4, height = 4 }}\n[camera]\n{text}");
+        Description::parse(&text, "camera").unwrap().camera
+    }
+
+    fn perspective() -> CameraDescription {
+        camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45")
+    }
+
+    /// Cameras with a lens, described in both ways, and a panorama.
+    fn others() -> [CameraDescription; 3] {
+        let view = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\n";
+        [
+            camera(&format!(
+                "{view}fov = 45\naperture = 0.1\nfocus_distance = 3\nblades = 5\nblade_rotation = 12.5"
+            )),
+            camera(&format!("{view}fov = 45\nfocal_length = 0.05\nf_number = 1.4")),
+            camera(&format!("type = 'panorama'\n{view}")),
+        ]
+    }
+
+    fn orthographic() -> CameraDescription {
+        camera("type = 'orthographic'\nposition = [3, -4, 1]\nlook_at = [0, 0, 1]\nheight = 2")
+    }
+
+    #[test]
+    fn an_orbit_keeps_distance_and_target() {
+        for (x, y) in [(0.3, 0.0), (0.0, 0.5), (-1.0, -0.7), (0.0, 9.0), (0.0, -9.0)] {
+            for camera in [perspective(), orthographic()] {
+                let (old, new) = (view(&camera), view(&moved(&camera, Move::Orbit(x, y))));
+                assert_eq!(old.look_at, new.look_at);
+                let (a, b) = (old.position.distance(old.look_at), new.position.distance(new.look_at));
+                assert!((a - b).abs() < 1e-4 * a, "{x} {y}: {a} {b}");
+                assert_ne!(old.position, new.position);
+            }
+        }
+    }
+
+    #[test]
+    fn the_scene_follows_the_hand() {
+        // Dragged to the right, the camera goes to the left; dragged down, it rises.
+        let right = view(&moved(&perspective(), Move::Orbit(0.1, 0.0))).position;
+        assert!(right.x < -0.3, "{right}");
+        let above = view(&moved(&perspective(), Move::Orbit(0.0, 0.1))).position;
+        assert!(above.z > 1.3, "{above}");
+        let panned = view(&moved(&perspective(), Move::Pan(0.5, 0.25)));
+        let height = 8.0 * 22.5f64.to_radians().tan();
+        assert!(
+            panned
+                .look_at
+                .abs_diff_eq(DVec3::new(-0.5 * height, 0.0, 1.0 - 0.25 * height), 1e-4)
+        );
+        let near = view(&moved(&perspective(), Move::Dolly(2f64.ln()))).position;
+        assert!(near.abs_diff_eq(DVec3::new(0.0, -2.0, 1.0), 1e-4), "{near}");
+        let CameraDescription::Orthographic(near) = moved(&orthographic(), Move::Dolly(2f64.ln())) else {
+            panic!()
+        };
+        assert_eq!(near.height, 1.0);
+    }
+
+    #[test]
+    fn a_dolly_never_sticks_nor_leaves_the_scene() {
+        let file = perspective();
+        let distance = |camera: &CameraDescription| view(camera).position.distance(view(camera).look_at);
+        let (mut near, mut far) = (file.clone(), file.clone());
+        for _ in 0..80 {
+            near = dollied(&near, 0.1, &file);
+            far = dollied(&far, -0.1, &file);
+        }
+        assert!((distance(&near) - 0.04).abs() < 1e-3, "{}", distance(&near));
+        let further = dollied(&near, 0.1, &file);
+        let step = view(&further).position.y - view(&near).position.y;
+        assert!((step - 0.04 * 0.095).abs() < 1e-3, "it moves on: {step}");
+        assert!((distance(&further) - distance(&near)).abs() < 1e-4);
+        assert!(distance(&dollied(&near, -0.1, &file)) > distance(&near));
+        assert!(distance(&far) < 4001.0, "{}", distance(&far));
+        assert_eq!(distance(&dollied(&far, -0.1, &file)), distance(&far));
+        assert!(distance(&dollied(&far, 0.1, &file)) < distance(&far));
+        for by in [1e9, -1e9, f64::NAN] {
+            dollied(&file, by, &file).validate().unwrap();
+            dollied(&orthographic(), by, &orthographic()).validate().unwrap();
+        }
+    }
+
+    #[test]
+    fn flying_turns_nothing_and_looking_moves_nothing() {
+        for file in [perspective(), orthographic()] {
+            let old = view(&file);
+            let far = old.position.distance(old.look_at);
+            for (x, y, z) in [(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5), (-0.1, 0.2, -0.3)] {
+                let new = view(&moved(&file, Move::Fly(x, y, z)));
+                let shift = new.position - old.position;
+                assert!(shift.abs_diff_eq(new.look_at - old.look_at, 1e-3), "{shift}");
+                assert!((shift.length() - far * DVec3::new(x, y, z).length()).abs() < 1e-3 * far);
+                let forwards = (old.look_at - old.position) / far;
+                assert!((shift.dot(forwards) - far * z).abs() < 1e-3 * far);
+                assert!((shift.dot(forwards.cross(old.up).normalize()) - far * x).abs() < 1e-3 * far);
+            }
+            for (x, y) in [(0.3, 0.0), (0.0, 0.2), (0.0, 9.0), (0.0, -9.0), (-0.4, 0.1)] {
+                let new = view(&moved(&file, Move::Turn(x, y)));
+                assert_eq!(new.position, old.position);
+                assert!((new.position.distance(new.look_at) - far).abs() < 1e-4 * far);
+            }
+            // To the right is to the right, upwards is upwards.
+            let right = (old.look_at - old.position).cross(old.up).normalize();
+            let new = view(&moved(&file, Move::Turn(0.2, 0.1)));
+            assert!((new.look_at - old.look_at).dot(right) > 0.1 * far);
+            assert!((new.look_at - old.look_at).dot(old.up) > 0.05 * far);
+        }
+    }
+
+    #[test]
+    fn what_is_framed_is_seen_whole_in_the_middle() {
+        let center = DVec3::new(10.0, -3.0, 2.0);
+        for radius in [1e-6, 0.5, 1e6] {
+            for file in [perspective(), orthographic()] {
+                let new = framed(&file, center, radius);
+                let (old, seen) = (view(&file), view(&new));
+                assert!(
+                    seen.look_at.abs_diff_eq(center, 1e-3 * radius.max(1e-3)),
+                    "{radius}: {}",
+                    seen.look_at
+                );
+                let (a, b) = (old.look_at - old.position, seen.look_at - seen.position);
+                assert!(a.angle_between(b) < 1e-2, "{radius}: it looks another way");
+                match new {
+                    CameraDescription::Perspective(c) => {
+                        let half = (radius / b.length()).asin().to_degrees();
+                        assert!(2.0 * half < c.fov && 2.0 * half > 0.6 * c.fov, "{radius}: {half}");
+                    }
+                    CameraDescription::Orthographic(c) => assert_eq!(c.height, 2.5 * radius),
+                    CameraDescription::Panorama(_) => unreachable!(),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_viewpoint_is_kept_and_taken_again() {
+        for file in others().into_iter().chain([perspective(), orthographic()]) {
+            let away = moved(&moved(&file, Move::Orbit(0.3, 0.2)), Move::Dolly(0.4));
+            let kept = Viewpoint::of(&away);
+            let json = serde_json::to_string(&kept).unwrap();
+            assert_eq!(placed(&file, serde_json::from_str(&json).unwrap()).unwrap(), away);
+        }
+        let wrong = Viewpoint {
+            look_at: DVec3::new(0.0, -4.0, 1.0),
+            ..Viewpoint::of(&perspective())
+        };
+        assert!(placed(&perspective(), wrong).is_err(), "it looks at itself");
+    }
+
+    #[test]
+    fn a_lens_and_a_panorama_move_and_stay_what_they_are() {
+        for file in others() {
+            for by in [Move::Orbit(0.3, 0.2), Move::Pan(0.1, 0.2), Move::Dolly(0.5)] {
+                let new = moved(&file, by);
+                assert_ne!(view(&new).position, view(&file).position, "{by:?}");
+                assert_eq!(std::mem::discriminant(&new), std::mem::discriminant(&file));
+                assert_eq!(settings(&new), settings(&file));
+                assert_eq!(merged(&new, &file, &file), Some(new));
+            }
+        }
+        let [wide, by_number, _] = others();
+        let turned = moved(&wide, Move::Orbit(0.3, 0.2));
+        let both = merged(&turned, &wide, &by_number).unwrap();
+        assert_eq!(settings(&both), settings(&by_number), "an edit changes the lens");
+        assert_eq!(view(&both).position, view(&turned).position);
+    }
+
+    #[test]
+    fn a_camera_stays_valid_and_short() {
+        let mut camera = perspective();
+        for i in 0..1000 {
+            camera = moved(&camera, Move::Orbit(0.37, if i % 5 < 3 { 0.11 } else { -0.09 }));
+            camera = moved(&camera, Move::Dolly(0.5));
+            camera.validate().unwrap();
+        }
+        for by in [Move::Dolly(1e9), Move::Dolly(-1e9), Move::Pan(1e300, 0.0)] {
+            moved(&camera, by).validate().unwrap();
+        }
+        let text = text(&moved(&perspective(), Move::Orbit(0.3, 0.2)));
+        assert_eq!(
+            text,
+            "[camera]\nposition = [-1.15852, -3.74517, 1.79468]\nlook_at = [0, 0, 1]\nup = [0, 0, 1]\nfov = 45\n"
+        );
+    }
+
+    #[test]
+    fn an_edit_changes_what_it_changes_and_a_move_the_rest() {
+        let file = perspective();
+        let turned = moved(&file, Move::Orbit(0.3, 0.2));
+        let wide = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 60");
+        let both = merged(&turned, &file, &wide).unwrap();
+        assert_eq!(view(&both).position, view(&turned).position);
+        assert!(matches!(&both, CameraDescription::Perspective(c) if c.fov == 60.0));
+        let path = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45\npath.keys = [{ frame = 1, fov = 40 }]";
+        let both = merged(&turned, &file, &camera(path)).unwrap();
+        assert_eq!(view(&both).position, view(&turned).position);
+        assert_eq!(both.path(), camera(path).path(), "a path of the file is the camera's");
+        let elsewhere = camera("position = [0, -5, 1]\nlook_at = [0, 0, 1]\nfov = 45");
+        assert_eq!(merged(&turned, &file, &elsewhere), None, "the look_at has not moved");
+        assert_eq!(merged(&turned, &file, &turned), None, "it was saved");
+        assert_eq!(merged(&turned, &file, &orthographic()), None);
+        let through = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nup = [1, 0, 0]\nfov = 45");
+        let side = camera("position = [4, 0, 1]\nlook_at = [0, 0, 1]\nfov = 45");
+        assert_eq!(merged(&side, &file, &through), None, "it would look along its up");
+    }
+
+    #[test]
+    fn its_text_reads_back_as_the_same_camera() {
+        for camera in [perspective(), orthographic()].into_iter().chain(others()) {
+            let camera = moved(&camera, Move::Orbit(0.1, 0.2));
+            let text = format!("image = {{ width = 4, height = 4 }}\n{}", text(&camera));
+            assert_eq!(Description::parse(&text, "camera").unwrap().camera, camera);
+        }
+    }
+}

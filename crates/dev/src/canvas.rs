@@ -1,0 +1,474 @@
+//! Progressive rendering of an image: coarse at first, then all pixels with few samples, then more. An interruption
+//! waits for one dispatch at most.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use wgray_image::Region;
+use wgray_render::backend::Backend;
+use wgray_render::cpu::Cpu;
+use wgray_render::error::RenderError;
+use wgray_render::film::Film;
+use wgray_render::gpu::{Call, Gpu, Live};
+use wgray_render::job::{Cut, Order, Steps};
+use wgray_render::output::Aov;
+use wgray_render::pack::{Camera, FirstHit, Packed};
+
+use super::film_layer::FilmLayer;
+use super::picture::{Content, View, means};
+
+/// Target duration of a dispatch: a save or a move of the camera waits this long.
+const CALL: Duration = Duration::from_millis(30);
+/// Target duration of a coarse image: with the time to show it, 20 per second.
+const COARSE: Duration = Duration::from_millis(30);
+/// Pixels of a coarse image while the speed is unknown.
+const COARSE_PIXELS: f64 = 10_000.0;
+/// The scale of the coarsest image.
+const COARSEST: u32 = 32;
+/// Maximum number of displayed pixels, and maximum length of a side: browsers show no larger images.
+const MAX_PIXELS: u64 = 1 << 24;
+const MAX_SIDE: u32 = 1 << 14;
+/// Number of first hits per dispatch.
+const HITS_PER_CALL: u32 = 1 << 17;
+
+/// A progressively rendered scene on a device.
+pub struct Canvas {
+    gpu: Gpu,
+    /// The scene, with the camera of the current stage.
+    scene: Packed,
+    /// The camera of the full-size image.
+    camera: Camera,
+    /// The scale of the finished film: more than 1 if the image is too large.
+    finest: u32,
+    /// True if the CPU renders the same.
+    compare: bool,
+    stage: Stage,
+    steps: Steps,
+    /// The last coarser films, of the GPU and of the CPU.
+    under: Option<(Film, Option<Film>)>,
+    /// The film of the CPU in this stage.
+    cpu: Film,
+    /// The hits of the first rows.
+    hits: Vec<FirstHit>,
+    shown: bool,
+    limits: Limits,
+}
+
+/// Limits on what is rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Maximum number of samples per pixel, at least 1.
+    pub samples: u32,
+    /// The scale of the preview, at least 1: each displayed pixel covers this many pixels of the image along each
+    /// side.
+    pub scale: u32,
+}
+
+impl Default for Limits {
+    fn default() -> Limits {
+        Limits {
+            samples: u32::MAX,
+            scale: 1,
+        }
+    }
+}
+
+/// The resolution that the film has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stage {
+    /// The scale of the film: each of its pixels covers this many pixels of the image along each side.
+    scale: u32,
+    width: u32,
+    height: u32,
+    /// True if anything of it is rendered.
+    begun: bool,
+}
+
+impl Canvas {
+    /// Starts to render a scene that is on the device.
+    pub fn new(gpu: Gpu, scene: Packed, view: View, limits: Limits) -> Result<Canvas, RenderError> {
+        let camera = scene.camera;
+        let stage = Stage {
+            scale: 1,
+            width: camera.width,
+            height: camera.height,
+            begun: false,
+        };
+        let mut canvas = Canvas {
+            gpu,
+            scene,
+            camera,
+            finest: 1,
+            compare: false,
+            stage,
+            steps: Steps::new(&Cut::default(), CALL, Order::Pixels),
+            under: None,
+            cpu: Film::new(Region::whole(0, 0)),
+            hits: Vec::new(),
+            shown: false,
+            limits,
+        };
+        canvas.restart(camera, view)?;
+        Ok(canvas)
+    }
+
+    /// Returns whether this scene is being rendered.
+    pub fn shows(&self, scene: &Packed) -> bool {
+        scene.camera == self.camera && scene.same_but_camera(&self.scene)
+    }
+
+    /// Starts to render a changed scene. Returns false, and does nothing, if the scene needs another kernel.
+    pub fn update(&mut self, scene: &Packed, view: View) -> Result<bool, RenderError> {
+        let same_kernel = self.gpu.update(scene)?;
+        if same_kernel {
+            self.scene = scene.clone();
+            self.restart(scene.camera, view)?;
+        }
+        Ok(same_kernel)
+    }
+
+    /// Returns the parts of the kernel that differ from the files.
+    pub fn live(&self) -> &Live {
+        self.gpu.live()
+    }
+
+    /// Sets the values of the kernel's sliders. The image must be started again.
+    pub fn set_sliders(&mut self, values: &[[u32; 4]]) -> Result<(), RenderError> {
+        self.gpu.set_sliders(values)
+    }
+
+    /// Returns the dispatches that have ended since the last call.
+    pub fn calls(&mut self) -> Vec<Call> {
+        self.gpu.calls()
+    }
+
+    /// Starts the image again, with a camera.
+    pub fn restart(&mut self, camera: Camera, view: View) -> Result<(), RenderError> {
+        self.camera = camera;
+        if self.compare != view.is_by_both() {
+            self.steps.forget_pace();
+        }
+        self.compare = view.is_by_both();
+        self.under = None;
+        self.hits.clear();
+        self.shown = false;
+        let largest = self.gpu.largest_film();
+        self.finest = finest(camera.width, camera.height, largest, self.limits.scale);
+        let scale = if self.hits_of(view).is_some() {
+            self.finest
+        } else {
+            self.first_scale()
+        };
+        self.begin(scale)
+    }
+
+    /// Switches to another view of the same image.
+    pub fn change_view(&mut self, view: View) -> Result<(), RenderError> {
+        let film = self.hits_of(view).is_none();
+        let nothing_there = self.stage.scale == self.finest && self.steps.samples() == 0;
+        let other_film = self.compare != view.is_by_both();
+        self.shown = film && self.stage.scale == self.finest && !nothing_there; // the film has it already
+        if film && (other_film || nothing_there) {
+            self.restart(self.camera, view)
+        } else if !film && self.stage.scale > self.finest {
+            self.begin(self.finest)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Returns the layer of the first hits that a view shows.
+    fn hits_of(&self, view: View) -> Option<Aov> {
+        view.of_hits(self.scene.integrator)
+    }
+
+    fn first_scale(&self) -> u32 {
+        let pixels = f64::from(self.camera.width) * f64::from(self.camera.height);
+        let affordable = self
+            .steps
+            .speed()
+            .map_or(COARSE_PIXELS, |speed| speed * COARSE.as_secs_f64());
+        ((pixels / affordable.max(1.0)).sqrt().ceil() as u32)
+            .next_power_of_two()
+            .min(COARSEST)
+            .max(self.finest)
+    }
+
+    fn begin(&mut self, scale: u32) -> Result<(), RenderError> {
+        let [width, height] = self.size_at(scale);
+        let region = Region::whole(width, height);
+        self.stage = Stage {
+            scale,
+            width,
+            height,
+            begun: false,
+        };
+        self.scene.camera = Camera {
+            width,
+            height,
+            ..self.camera
+        };
+        self.gpu.set_camera(&self.scene.camera)?;
+        self.gpu.begin(region)?;
+        if self.compare {
+            self.cpu = Film::of(region, self.scene.form());
+        }
+        let samples = if scale > self.finest {
+            1
+        } else {
+            self.scene.pixel_samples
+        };
+        self.steps.start(&self.gpu, region, samples);
+        self.steps.stop_at(self.limits.samples);
+        Ok(())
+    }
+
+    /// Changes the limits.
+    pub fn set_limits(&mut self, limits: Limits, view: View) -> Result<(), RenderError> {
+        let (old, fewer) = (self.limits, limits.samples < self.steps.samples());
+        self.limits = limits;
+        if limits.scale != old.scale || (fewer && self.stage.scale == self.finest) {
+            self.restart(self.camera, view) // samples that a pixel has are not taken from it
+        } else {
+            self.steps.stop_at(limits.samples);
+            Ok(())
+        }
+    }
+
+    fn size_at(&self, scale: u32) -> [u32; 2] {
+        [self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale)]
+    }
+
+    /// Returns whether nothing of the image has been worth showing yet.
+    pub fn is_new(&self) -> bool {
+        !self.shown
+    }
+
+    /// Returns whether a view is finished.
+    pub fn is_done(&self, view: View) -> bool {
+        match self.hits_of(view) {
+            Some(_) => {
+                let [width, height] = self.finest_size();
+                self.hits.len() as u64 == Region::whole(width, height).pixels()
+            }
+            None => self.stage.scale == self.finest && self.steps.is_done(),
+        }
+    }
+
+    /// Makes one dispatch. Returns whether its result must be shown without delay.
+    pub fn step(&mut self, view: View) -> Result<bool, RenderError> {
+        let show = match self.hits_of(view) {
+            Some(_) => self.step_hits(view)?,
+            None => self.step_film()?,
+        };
+        self.shown |= show;
+        Ok(show)
+    }
+
+    fn step_hits(&mut self, view: View) -> Result<bool, RenderError> {
+        let [width, height] = self.finest_size();
+        let first = (self.hits.len() / width as usize) as u32;
+        let rows = (HITS_PER_CALL / width).max(1).min(height - first);
+        let strip = Region {
+            y0: first,
+            y1: first + rows,
+            ..Region::whole(width, height)
+        };
+        self.hits.extend(self.gpu.first_hits(strip)?);
+        Ok(self.is_done(view))
+    }
+
+    fn step_film(&mut self) -> Result<bool, RenderError> {
+        let passes = self.steps.samples();
+        if self.compare {
+            let film = std::mem::replace(&mut self.cpu, Film::new(Region::whole(0, 0)));
+            let mut cpu = Cpu::new(&self.scene);
+            cpu.resume(film)?;
+            let mut both = Both {
+                gpu: &mut self.gpu,
+                cpu,
+            };
+            let result = self.steps.step(&mut both);
+            self.cpu = both.cpu.into_film().unwrap_or(Film::new(Region::whole(0, 0)));
+            result?;
+        } else {
+            self.steps.step(&mut self.gpu)?;
+        }
+        self.stage.begun = true;
+        if self.stage.scale > self.finest && self.steps.is_done() {
+            let gpu = self.gpu.film()?;
+            self.under = Some((gpu, self.compare.then(|| self.cpu.clone())));
+            self.begin((self.stage.scale / 4).max(self.finest))?;
+            return Ok(true);
+        }
+        let first_pass = passes == 0 && self.steps.samples() > 0;
+        Ok(first_pass || self.steps.is_done())
+    }
+
+    /// Returns the current image, and its width and height.
+    pub fn content(&mut self, view: View) -> Result<(Content, [u32; 2]), RenderError> {
+        if let Some(aov) = self.hits_of(view) {
+            return Ok((self.hits_so_far(aov), self.finest_size()));
+        }
+        let size = [self.stage.width, self.stage.height];
+        if view == View::Samples {
+            let film = self.gpu.film()?;
+            let counts = match self.scene.adaptive {
+                true => film.sample_counts().collect(),
+                false => (0..self.stage.height)
+                    .flat_map(|y| std::iter::repeat_n(self.steps.samples_of_row(y), self.stage.width as usize))
+                    .collect(),
+            };
+            return Ok((Content::Samples(counts, self.scene.pixel_samples), size));
+        }
+        let film;
+        let under = self.under.as_ref();
+        // Until the next stage has any result the previous, smaller one is sent.
+        let (gpu, cpu, under) = match under.filter(|_| !self.stage.begun) {
+            Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
+            None => {
+                film = self.gpu.film()?;
+                (&film, self.compare.then_some(&self.cpu), under)
+            }
+        };
+        let size = [gpu.region.width(), gpu.region.height()];
+        let has_samples = |y| self.steps.samples_of_row(y) > 0;
+        let under_gpu = under.map(|(gpu, _)| gpu);
+        if let Some(aov) = view.of_film(self.scene.integrator) {
+            return Ok((Content::Film(FilmLayer::of(aov, gpu, under_gpu, &has_samples)), size));
+        }
+        let colors = means(gpu, under_gpu, &has_samples);
+        Ok(match cpu.filter(|_| view.is_by_both()) {
+            Some(cpu) => {
+                let under = under.and_then(|(_, cpu)| cpu.as_ref());
+                (Content::Compare(colors, means(cpu, under, &has_samples)), size)
+            }
+            None => match self.gpu.live().layer() {
+                Some(layer) => (Content::Layer(colors, layer.numbers), size),
+                None => (Content::Color(colors), size),
+            },
+        })
+    }
+
+    fn hits_so_far(&self, aov: Aov) -> Content {
+        let nothing = FirstHit {
+            shape: wgray_render::pack::NOTHING,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let mut hits = self.hits.clone();
+        let [width, height] = self.finest_size();
+        hits.resize(Region::whole(width, height).pixels() as usize, nothing);
+        Content::Hits(aov, hits)
+    }
+
+    /// Returns width and height of the full-size image.
+    pub fn size(&self) -> [u32; 2] {
+        [self.camera.width, self.camera.height]
+    }
+
+    /// Returns width and height of the image that is shown in the end.
+    pub fn finest_size(&self) -> [u32; 2] {
+        self.size_at(self.finest)
+    }
+
+    /// Returns the samples per pixel so far, and in the end.
+    pub fn samples(&self) -> (u32, u32) {
+        let so_far = if self.stage.scale == self.finest {
+            self.steps.samples()
+        } else {
+            0
+        };
+        (so_far, self.scene.pixel_samples.min(self.limits.samples))
+    }
+
+    /// Returns the samples per second.
+    pub fn speed(&self) -> Option<f64> {
+        self.steps.speed()
+    }
+}
+
+/// Returns the smallest scale from `least` on at which an image can be shown.
+fn finest(width: u32, height: u32, largest_film: u64, least: u32) -> u32 {
+    let most = largest_film.min(MAX_PIXELS);
+    let fits = |scale: &u32| {
+        let (width, height) = (width.div_ceil(*scale), height.div_ceil(*scale));
+        Region::whole(width, height).pixels() <= most && width.max(height) <= MAX_SIDE
+    };
+    (least..).find(fits).unwrap_or(1) // an image of one pixel fits
+}
+
+/// The same work by both backends.
+struct Both<'a> {
+    gpu: &'a mut Gpu,
+    cpu: Cpu<'a>,
+}
+
+impl Backend for Both<'_> {
+    fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+        self.gpu.begin(region)?;
+        self.cpu.begin(region)
+    }
+
+    fn resume(&mut self, film: Film) -> Result<(), RenderError> {
+        self.gpu.resume(film.clone())?;
+        self.cpu.resume(film)
+    }
+
+    fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        self.gpu.submit(tile, samples.clone())?;
+        self.cpu.submit(tile, samples)
+    }
+
+    fn poll(&mut self) -> Result<bool, RenderError> {
+        Ok(self.cpu.poll()? & self.gpu.poll()?)
+    }
+
+    fn wait(&mut self) -> Result<(), RenderError> {
+        self.cpu.wait()?;
+        self.gpu.wait()
+    }
+
+    fn film(&mut self) -> Result<Film, RenderError> {
+        self.gpu.film()
+    }
+
+    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        self.gpu.first_hits(region)
+    }
+
+    fn largest_film(&self) -> u64 {
+        self.gpu.largest_film()
+    }
+
+    fn samples_of_all(&self) -> u32 {
+        self.gpu.samples_of_all()
+    }
+
+    fn around(&self, region: Region) -> Region {
+        self.gpu.around(region)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_that_is_too_large_gets_smaller_as_little_as_it_can() {
+        for (width, height, film, scale) in [
+            (2048, 2048, 1 << 22, 1),
+            (2049, 2048, 1 << 22, 2),
+            (3000, 3000, 1 << 22, 2),
+            (3000, 3000, 1 << 30, 1),
+            (4097, 4096, u64::MAX, 2),
+            (1, 16_384, 1 << 22, 1),
+            (16_385, 1, 1 << 22, 2),
+            (65_536, 1, 1 << 22, 4),
+            (65_536, 65_536, 1 << 22, 32),
+            (1, 1, 1, 1),
+        ] {
+            assert_eq!(finest(width, height, film, 1), scale, "{width} x {height}");
+            assert_eq!(finest(width, height, film, 4), scale.max(4), "{width} x {height}");
+        }
+    }
+}

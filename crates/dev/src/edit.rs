@@ -1,0 +1,409 @@
+//! Edits of single values in the text of a scene file. Only the bytes of the value change: comments, layout, line
+//! ends and a byte-order mark stay. An absent key is added to its table, in the style of that table.
+
+use std::ops::Range;
+
+use toml::Value;
+use toml_edit::{Document, InlineTable, Item, Table, Value as Written};
+
+use wgray_scene::{KeyPath, Pieces, Segment};
+
+/// A replacement of a part of a text.
+type Edit = (Range<usize>, String);
+
+/// Returns a text in which a key has a value, or is absent; the same text if nothing changes.
+///
+/// # Errors
+///
+/// Why the value cannot be placed.
+pub fn edited(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
+    edited_in(&Pieces::of(text), path, value)
+}
+
+/// Like [`edited`], for a text whose pieces are known.
+///
+/// # Errors
+///
+/// Why the value cannot be placed.
+pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
+    let piece = pieces.find(path);
+    let edits = edits(&piece.text, &piece.path, value).map_err(|why| format!("{path}: {why}"))?;
+    let mut whole: Vec<Edit> = Vec::with_capacity(edits.len());
+    for (range, new) in edits {
+        // The replaced part lies in one piece of the text: its end may be the start of another one.
+        let start = piece.place(range.start);
+        whole.push((start..start + range.len(), new));
+    }
+    // From the end: what comes before a change stays where it is.
+    whole.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
+    let mut text = pieces.whole().to_owned();
+    for (range, new) in whole {
+        text.replace_range(range, &new);
+    }
+    Ok(text)
+}
+
+/// A text in which keys and values can be located.
+pub struct Layout<'a>(Document<&'a str>);
+
+impl<'a> Layout<'a> {
+    /// Parses a text, if it is TOML.
+    pub fn of(text: &'a str) -> Option<Layout<'a>> {
+        Document::parse(text).ok().map(Layout)
+    }
+
+    /// Returns the range of everything at a path, from the first to the last byte of its keys and values.
+    pub fn extent(&self, path: &KeyPath) -> Option<Range<usize>> {
+        let way = Way::along(self.0.as_table(), &path.0);
+        way.rest.is_empty().then_some(())?;
+        let mut found = None;
+        // A key stands before its value; the header of a table belongs to the table.
+        if let Some(Node::Table(parent)) = way.nodes.iter().rev().nth(1)
+            && let Some(Segment::Key(key)) = path.0.last()
+            && !matches!(way.nodes.last()?, Node::Table(table) if !table.is_dotted())
+        {
+            found = parent.key(key).and_then(toml_edit::Key::span);
+        }
+        cover(&mut found, *way.nodes.last()?);
+        found
+    }
+
+    /// Returns the range of the value at a path.
+    pub fn value(&self, path: &KeyPath) -> Option<Range<usize>> {
+        let way = Way::along(self.0.as_table(), &path.0);
+        match way.nodes.last()? {
+            Node::Value(value) if way.rest.is_empty() => value.span(),
+            _ => None,
+        }
+    }
+}
+
+/// A node of a document.
+#[derive(Clone, Copy)]
+enum Node<'a> {
+    Table(&'a Table),
+    Tables(&'a toml_edit::ArrayOfTables),
+    Value(&'a Written),
+}
+
+impl<'a> Node<'a> {
+    fn of(item: &'a Item) -> Option<Node<'a>> {
+        match item {
+            Item::Table(table) => Some(Node::Table(table)),
+            Item::ArrayOfTables(tables) => Some(Node::Tables(tables)),
+            Item::Value(value) => Some(Node::Value(value)),
+            Item::None => None,
+        }
+    }
+
+    fn step(self, segment: &Segment) -> Option<Node<'a>> {
+        match (self, segment) {
+            (Node::Table(table), Segment::Key(key)) => Node::of(table.get(key)?),
+            (Node::Value(Written::InlineTable(table)), Segment::Key(key)) => table.get(key).map(Node::Value),
+            (Node::Tables(tables), Segment::Index(i)) => tables.get(*i).map(Node::Table),
+            (Node::Value(Written::Array(list)), Segment::Index(i)) => list.get(*i).map(Node::Value),
+            _ => None,
+        }
+    }
+
+    fn inline(self) -> Option<&'a InlineTable> {
+        match self {
+            Node::Value(value) => value.as_inline_table(),
+            _ => None,
+        }
+    }
+
+    /// Returns whether a table is defined by dotted keys.
+    fn is_dotted(self) -> bool {
+        match self {
+            Node::Table(table) => table.is_dotted(),
+            Node::Value(value) => value.as_inline_table().is_some_and(InlineTable::is_dotted),
+            Node::Tables(_) => false,
+        }
+    }
+}
+
+/// The nodes from the root of a document along a path, as far as they exist.
+struct Way<'a, 'p> {
+    /// The nodes, starting with the root table.
+    nodes: Vec<Node<'a>>,
+    /// The segments of the path that do not exist.
+    rest: &'p [Segment],
+}
+
+impl<'a, 'p> Way<'a, 'p> {
+    fn along(root: &'a Table, path: &'p [Segment]) -> Way<'a, 'p> {
+        let mut nodes = vec![Node::Table(root)];
+        for (i, segment) in path.iter().enumerate() {
+            match nodes.last().and_then(|node| node.step(segment)) {
+                Some(node) => nodes.push(node),
+                None => {
+                    return Way {
+                        nodes,
+                        rest: &path[i..],
+                    };
+                }
+            }
+        }
+        Way { nodes, rest: &[] }
+    }
+}
+
+fn edits(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<Vec<Edit>, String> {
+    let document = Document::parse(text).map_err(|error| error.message().to_owned())?;
+    let way = Way::along(document.as_table(), &path.0);
+    let here = *way.nodes.last().ok_or("has no place")?;
+    match (value, way.rest) {
+        (None, []) => Ok(vec![removal(text, &way, &path.0)?]),
+        (None, _) => Ok(Vec::new()),
+        (Some(new), []) => {
+            let Node::Value(old) = here else {
+                return Err("is a table with a header of its own".to_owned());
+            };
+            let mut edits = Vec::new();
+            replacement(old, new, &mut edits).ok_or("has no place")?;
+            Ok(edits)
+        }
+        (Some(new), [Segment::Key(key), below @ ..]) => {
+            let mut inner = literal(new);
+            for segment in below.iter().rev() {
+                let Segment::Key(key) = segment else {
+                    return Err("is not in the scene".to_owned());
+                };
+                inner = format!("{{ {key} = {inner} }}");
+            }
+            let known = path.0.len() - way.rest.len();
+            addition(text, &way, &path.0[..known], key, &inner).map(|edit| vec![edit])
+        }
+        (Some(_), [Segment::Index(_), ..]) => Err("is not in the scene".to_owned()),
+    }
+}
+
+/// Adds the edits that replace one value by another; none if they are equal.
+fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> {
+    let is_same = match (old, new) {
+        (Written::Array(before), Value::Array(after)) if before.len() == after.len() => {
+            let mut pairs = before.iter().zip(after);
+            return pairs.try_for_each(|(old, new)| replacement(old, new, edits));
+        }
+        (Written::String(before), Value::String(after)) => before.value() == after,
+        (Written::Boolean(before), Value::Boolean(after)) => before.value() == after,
+        _ => {
+            let known = old.as_float().or(old.as_integer().map(|i| i as f64));
+            let wanted = new.as_float().or(new.as_integer().map(|i| i as f64));
+            known.is_some() && known == wanted
+        }
+    };
+    if !is_same {
+        edits.push((old.span()?, literal(new)));
+    }
+    Some(())
+}
+
+/// Returns the edits that add an absent key to the table at the end of a path, after its last key.
+fn addition(text: &str, way: &Way, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
+    let here = *way.nodes.last().ok_or("has no place")?;
+    // A table of dotted keys repeats the same prefix before each key.
+    let dots = way.nodes.iter().rev().take_while(|node| node.is_dotted()).count();
+    let prefix = KeyPath(path[path.len() - dots..].to_vec()).exact();
+    let dot = if dots > 0 { "." } else { "" };
+    let statement = format!("{prefix}{dot}{key} = {value}");
+    let is_root = way.nodes.len() == 1;
+    match here {
+        Node::Value(Written::InlineTable(table)) => {
+            let mut last = None;
+            cover(&mut last, here);
+            let values = table.iter().filter_map(|(_, value)| value.span());
+            Ok(match (values.map(|span| span.end).max(), dots) {
+                (Some(end), 0) => (end..end, format!(", {statement}")),
+                (Some(_), _) => {
+                    let end = last.ok_or("has no place")?.end;
+                    (end..end, format!(", {statement}"))
+                }
+                (None, _) => {
+                    let start = table.span().ok_or("has no place")?.start + 1;
+                    (start..start, format!(" {statement} "))
+                }
+            })
+        }
+        Node::Table(table) => match own(table) {
+            Some(body) => {
+                let line = line_start(text, body.start);
+                let indent: String = text[line..].chars().take_while(|c| " \t".contains(*c)).collect();
+                Ok(behind_line(text, body.end, &format!("{indent}{statement}")))
+            }
+            None if is_root => Ok(new_section(text, table, key, value)),
+            None if !table.is_implicit() => {
+                let header = table.span().ok_or("has no place")?;
+                Ok(behind_line(text, header.end, &statement))
+            }
+            None => {
+                let mut all = None;
+                cover(&mut all, here);
+                let at = line_start(text, all.ok_or("has no place")?.start);
+                let ends = line_break(text, at);
+                let header = KeyPath(path.to_vec()).exact();
+                Ok((at..at, format!("[{header}]{ends}{statement}{ends}{ends}")))
+            }
+        },
+        _ => Err("is in no table".to_owned()),
+    }
+}
+
+/// Returns the edit that adds an absent section: after that of the camera or the image.
+fn new_section(text: &str, root: &Table, name: &str, value: &str) -> Edit {
+    let mut place = None;
+    if let Some(item) = root.get("camera").or(root.get("image")) {
+        Node::of(item).into_iter().for_each(|node| cover(&mut place, node));
+    }
+    let at = place.map_or(text.len(), |place| place.end);
+    let ends = line_break(text, at);
+    // `{ a = 1 }` becomes one line under a header.
+    let inner = value
+        .strip_prefix("{ ")
+        .and_then(|inner| inner.strip_suffix(" }"))
+        .unwrap_or(value);
+    behind_line(text, at, &format!("{ends}[{name}]{ends}{inner}"))
+}
+
+/// Returns the edit that adds a line after the one that contains a byte.
+fn behind_line(text: &str, at: usize, line: &str) -> Edit {
+    let end = line_end(text, at);
+    (end..end, format!("{}{line}", line_break(text, at)))
+}
+
+/// Returns the start of the line that contains a byte.
+pub fn line_start(text: &str, at: usize) -> usize {
+    let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
+    let mark = '\u{feff}'.len_utf8();
+    if start == 0 && text.starts_with('\u{feff}') {
+        mark.min(at)
+    } else {
+        start
+    }
+}
+
+/// Returns the end of that line, without its line break.
+pub fn line_end(text: &str, at: usize) -> usize {
+    let end = text[at..].find('\n').map_or(text.len(), |newline| at + newline);
+    if text[at..end].ends_with('\r') { end - 1 } else { end }
+}
+
+/// Returns the line break of a line; the last line gets that of the first.
+fn line_break(text: &str, at: usize) -> &'static str {
+    let own = text[at..].find('\n').map(|newline| at + newline);
+    match own.or(text.find('\n')) {
+        Some(end) if text[..end].ends_with('\r') => "\r\n",
+        _ => "\n",
+    }
+}
+
+/// Returns the edits that remove the key at the end of a path, and the table if it becomes empty.
+fn removal(text: &str, way: &Way, path: &[Segment]) -> Result<Edit, String> {
+    let refused = || Err("can only be removed in the scene file".to_owned());
+    let mut depth = path.len();
+    loop {
+        let ([.., parent, here], Some(Segment::Key(key))) = (&way.nodes[..=depth], path.get(depth - 1)) else {
+            return refused();
+        };
+        let Node::Value(value) = here else { return refused() };
+        let end = value.span().ok_or("has no place")?.end;
+        match (parent, parent.inline()) {
+            (_, Some(table)) if table.is_dotted() => return refused(),
+            (_, Some(table)) if table.len() == 1 && depth > 1 => depth -= 1,
+            (_, Some(table)) => {
+                let start = table
+                    .key(key)
+                    .and_then(toml_edit::Key::span)
+                    .ok_or("has no place")?
+                    .start;
+                let behind = text[end..].trim_start_matches([' ', '\t', '\r', '\n']);
+                let before = text[..start].trim_end_matches([' ', '\t', '\r', '\n']);
+                return match (behind.strip_prefix(','), before.strip_suffix(',')) {
+                    (Some(rest), _) => Ok((
+                        start..text.len() - rest.trim_start_matches([' ', '\t']).len(),
+                        String::new(),
+                    )),
+                    (None, Some(rest)) => Ok((rest.len()..end, String::new())),
+                    _ => refused(),
+                };
+            }
+            (Node::Table(table), None) => {
+                let start = table
+                    .key(key)
+                    .and_then(toml_edit::Key::span)
+                    .ok_or("has no place")?
+                    .start;
+                let (start, stop) = (line_start(text, start), line_end(text, end));
+                let comment = text[end..stop].trim_start();
+                if !comment.is_empty() {
+                    return Ok((start..stop - comment.len(), String::new()));
+                }
+                let next = text[stop..].find('\n').map_or(text.len(), |newline| stop + newline + 1);
+                return Ok((start..next, String::new()));
+            }
+            _ => return refused(),
+        }
+    }
+}
+
+/// Returns the range of the keys in a table's own body, if it has any, without those under headers of their own.
+fn own(table: &Table) -> Option<Range<usize>> {
+    let mut found = None;
+    for (key, item) in table.iter() {
+        let span = match item {
+            Item::Value(value) => value.span(),
+            Item::Table(inner) if inner.is_dotted() => own(inner),
+            _ => continue,
+        };
+        let key = table.key(key).and_then(toml_edit::Key::span);
+        for span in [key, span].into_iter().flatten() {
+            widen(&mut found, span);
+        }
+    }
+    found
+}
+
+/// Extends a range by everything that belongs to a node.
+fn cover(found: &mut Option<Range<usize>>, node: Node) {
+    match node {
+        Node::Value(value) => match value.as_inline_table().filter(|table| table.is_dotted()) {
+            Some(table) => table.iter().for_each(|(_, value)| cover(found, Node::Value(value))),
+            None => value.span().into_iter().for_each(|span| widen(found, span)),
+        },
+        Node::Tables(tables) => tables.iter().for_each(|table| cover(found, Node::Table(table))),
+        Node::Table(table) => {
+            if !table.is_implicit() && !table.is_dotted() {
+                table.span().into_iter().for_each(|span| widen(found, span));
+            }
+            for (key, item) in table.iter() {
+                let is_header = matches!(item, Item::Table(inner) if !inner.is_dotted()) || item.is_array_of_tables();
+                let key = table.key(key).and_then(toml_edit::Key::span).filter(|_| !is_header);
+                key.into_iter().for_each(|span| widen(found, span));
+                Node::of(item).into_iter().for_each(|node| cover(found, node));
+            }
+        }
+    }
+}
+
+fn widen(found: &mut Option<Range<usize>>, span: Range<usize>) {
+    if span.is_empty() {
+        return; // the document's own table has no header
+    }
+    *found = Some(match found.take() {
+        Some(known) => known.start.min(span.start)..known.end.max(span.end),
+        None => span,
+    });
+}
+
+/// Formats a value for a scene file: whole numbers without a decimal point.
+fn literal(value: &Value) -> String {
+    match value {
+        Value::Float(x) if x.fract() == 0.0 && x.abs() < 1e15 => format!("{x:.0}"),
+        Value::Array(list) => format!("[{}]", list.iter().map(literal).collect::<Vec<_>>().join(", ")),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

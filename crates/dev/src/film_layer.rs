@@ -1,0 +1,178 @@
+//! Layers of the film as images: means over the samples of a pixel, and the variance from adaptive sampling.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::look::DisplaySettings;
+use super::picture::{bits, bytes, numbers, of_film};
+use wgray_image::{Pixels, to_8_bits};
+use wgray_render::film::{Film, Layer, variance_of_mean};
+use wgray_render::output::Aov;
+
+/// A layer of a film, as written by `wgray render --aov`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmLayer {
+    /// The layer.
+    pub aov: Aov,
+    /// Three values per pixel. The variance is 0 below two samples.
+    pub values: Pixels,
+    /// For normals: the fraction of each pixel's samples that hit anything. Empty for other layers.
+    pub covered: Vec<f32>,
+}
+
+impl FilmLayer {
+    /// Returns a layer of a film. Rows without samples show `under`, a smaller film of the same image.
+    pub fn of(aov: Aov, film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> FilmLayer {
+        let covered = match aov {
+            Aov::ShadingNormal => of_film(film, under, has_samples, &Film::alpha),
+            _ => Vec::new(),
+        };
+        FilmLayer {
+            aov,
+            values: Pixels {
+                width: film.region.width(),
+                height: film.region.height(),
+                colors: of_film(film, under, has_samples, &|film, i| value(aov, film, i)),
+            },
+            covered,
+        }
+    }
+
+    /// Returns whether the layer is a part of the image's radiance.
+    pub fn is_light(&self) -> bool {
+        matches!(self.aov, Aov::Direct | Aov::Indirect | Aov::Emission)
+    }
+
+    /// Returns whether the values may be negative.
+    pub fn may_be_negative(&self) -> bool {
+        self.aov == Aov::ShadingNormal
+    }
+
+    /// Returns the displayed bytes: radiance like the image, albedo by the display's curve alone, and variance as its
+    /// standard error in false colors.
+    pub fn bytes(&self, look: &DisplaySettings) -> Vec<u8> {
+        let values = &self.values.colors;
+        match self.aov {
+            Aov::ShadingNormal => {
+                let pairs: Vec<_> = values.iter().zip(&self.covered).collect();
+                bytes(&pairs, |(normal, covered)| Vec3::from(**normal) * 0.5 + **covered * 0.5)
+            }
+            _ if self.is_light() => look.bytes(&self.values),
+            _ => {
+                let values = values.par_iter().with_min_len(1024);
+                values.flat_map_iter(|value| self.shown(*value, look)).collect()
+            }
+        }
+    }
+
+    fn shown(&self, value: [f32; 3], look: &DisplaySettings) -> [u8; 3] {
+        match self.aov {
+            Aov::Variance => look.error_color(standard_error(value)),
+            Aov::Albedo => look.view.display_share(value).map(to_8_bits),
+            _ => look.shown(value),
+        }
+    }
+
+    /// Returns the values of pixel `i` by name.
+    pub fn pixel(&self, i: usize, look: &DisplaySettings) -> Option<Vec<(&'static str, String)>> {
+        let value = *self.values.colors.get(i)?;
+        let name = match self.aov {
+            Aov::ShadingNormal => "shading normal",
+            aov => aov.name(),
+        };
+        let numbers_and_bits = [(name, numbers(value)), ("bits", bits(value))];
+        let more = match self.aov {
+            Aov::ShadingNormal => None,
+            Aov::Variance => Some(("standard error", numbers(standard_error(value)))),
+            _ => Some(("shown", self.shown(value, look).map(|byte| byte.to_string()).join(" "))),
+        };
+        Some(numbers_and_bits.into_iter().chain(more).collect())
+    }
+}
+
+fn standard_error(variance: [f32; 3]) -> [f32; 3] {
+    variance.map(f32::sqrt)
+}
+
+/// Returns the values of a pixel; 0 if the film does not have them.
+fn value(aov: Aov, film: &Film, i: usize) -> [f32; 3] {
+    match aov {
+        Aov::Variance => match film.moments.get(i).filter(|moments| moments.w >= 2.0) {
+            Some(moments) => variance_of_mean(film.sums[i], *moments).to_array(),
+            None => [0.0; 3], // nothing is known of it
+        },
+        Aov::ShadingNormal => film.layer(Layer::Normal, i),
+        aov => aov.light().map_or([0.0; 3], |layer| film.layer(layer, i)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec4;
+
+    use super::*;
+    use wgray_image::Region;
+    use wgray_render::film::Form;
+
+    fn film() -> Film {
+        let form = Form {
+            adaptive: true,
+            layers: true,
+        };
+        let mut film = Film::of(Region::whole(1, 2), form);
+        film.sums.fill(Vec4::new(4.0, 8.0, 12.0, 4.0));
+        film.moments = vec![Vec4::new(3.0, 12.0, 0.0, 4.0), Vec4::new(0.0, 0.0, 0.0, 1.0)];
+        for (number, list) in (1u8..).zip(&mut film.layers) {
+            list.fill(Vec4::new(f32::from(number), 0.0, -4.0, 2.0));
+        }
+        film
+    }
+
+    #[test]
+    fn each_layer_is_its_own_and_variances_need_two_samples() {
+        let all = |_| true;
+        for (aov, number) in [
+            (Aov::Emission, 1.0),
+            (Aov::Direct, 2.0),
+            (Aov::Indirect, 3.0),
+            (Aov::Albedo, 4.0),
+            (Aov::ShadingNormal, 5.0),
+        ] {
+            let layer = FilmLayer::of(aov, &film(), None, &all);
+            assert_eq!(layer.values.colors, [[number / 4.0, 0.0, -1.0]; 2], "{aov:?}");
+        }
+        let normal = FilmLayer::of(Aov::ShadingNormal, &film(), None, &all);
+        assert_eq!(normal.covered, [0.5; 2]);
+        // 1.25 / 2 + 0.5 / 2, 0.25, and what is below.
+        assert_eq!(normal.bytes(&DisplaySettings::default())[..3], [223, 64, 0]);
+        let variance = FilmLayer::of(Aov::Variance, &film(), None, &all);
+        assert_eq!(variance.values.colors, [[0.25, 1.0, 0.0], [0.0; 3]]);
+        let told = variance.pixel(0, &DisplaySettings::default()).unwrap();
+        assert_eq!(told[2], ("standard error", "0.5  1  0".to_string()));
+        assert_eq!(variance.pixel(2, &DisplaySettings::default()), None);
+        // A film that lacks them has none.
+        let plain = Film::new(Region::whole(1, 2));
+        for aov in [Aov::Variance, Aov::Direct] {
+            assert_eq!(
+                FilmLayer::of(aov, &plain, None, &all).values.colors,
+                [[0.0; 3]; 2],
+                "{aov:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn light_follows_the_exposure_and_albedo_does_not() {
+        let bytes = |aov, exposure: f64| {
+            let mut look = DisplaySettings::default();
+            look.view.exposure = exposure;
+            FilmLayer::of(aov, &film(), None, &|_| true).bytes(&look)
+        };
+        for aov in [Aov::Emission, Aov::Direct, Aov::Indirect, Aov::Variance] {
+            assert_ne!(bytes(aov, 0.0), bytes(aov, -3.0), "{aov:?}");
+        }
+        for aov in [Aov::Albedo, Aov::ShadingNormal] {
+            assert_eq!(bytes(aov, 0.0), bytes(aov, -3.0), "{aov:?}");
+        }
+    }
+}

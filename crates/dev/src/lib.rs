@@ -1,0 +1,53 @@
+//! The development mode: a scene and its shaders are watched, rendered again whenever they are saved, and shown on a page.
+//!
+//! ```text
+//! files ── watch ──> Snapshot ──> painter ──> builder (compiles)
+//!                                    │  ^─────────┘
+//!                       Canvas (renders, call by call)
+//!                                    └──> State, Frame, SceneView ──> server ──> page
+//! ```
+
+mod build;
+mod camera;
+mod canvas;
+mod diagnostic;
+mod download;
+mod edit;
+mod faults;
+mod film_layer;
+mod guard;
+mod histogram;
+mod history;
+mod look;
+mod measure;
+mod messages;
+mod object;
+mod painter;
+mod picture;
+mod reference;
+mod save;
+mod server;
+mod session;
+mod sliders;
+mod source;
+mod times;
+mod viewer;
+mod watch;
+
+pub use camera::{Move, Viewpoint};
+pub use diagnostic::Diagnostic;
+pub use faults::BadPixels;
+pub use film_layer::FilmLayer;
+pub use histogram::Histogram;
+pub use look::{DisplayOverrides, DisplaySettings, Legend};
+pub use measure::{Measured, measure};
+pub use messages::{Command, Notice, Preview, Report, Set, State};
+pub use object::{Group, Listed, Object, SceneView};
+pub use picture::{Against, Content, Frame, Header, LayerName, View};
+pub use reference::{Apart, Reference};
+pub use server::Listener;
+pub use session::{Session, Settings, StartError, Viewer, Viewers};
+pub use sliders::SliderState;
+pub use source::Sources;
+pub use times::{Time, Times};
+pub use wgray_render::gpu::marks::{Kind, Value};

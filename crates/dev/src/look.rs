@@ -1,0 +1,186 @@
+//! Display settings: the view transform and the exposure of the scene or those chosen on the page, false colors, and
+//! marks.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use wgray_image::Pixels;
+use wgray_image::compare::color;
+use wgray_scene::{ViewSettings, ViewTransform};
+
+/// Display settings that override those of the scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DisplayOverrides {
+    /// The exposure in stops, -100 to 100.
+    pub exposure: Option<f64>,
+    /// The view transform.
+    pub transform: Option<ViewTransform>,
+    /// True for false colors by luminance.
+    pub false_color: bool,
+}
+
+impl DisplayOverrides {
+    /// Returns the overrides, if they are within their ranges.
+    pub fn checked(self) -> Result<DisplayOverrides, String> {
+        if let Some(stops) = self.exposure {
+            ViewSettings::check_exposure(stops).map_err(|rule| format!("exposure: {stops} {rule}"))?;
+        }
+        Ok(self)
+    }
+
+    /// Returns the settings of the scene with the overrides.
+    pub fn over(self, scene: ViewSettings) -> ViewSettings {
+        ViewSettings {
+            transform: self.transform.unwrap_or(scene.transform),
+            exposure: self.exposure.unwrap_or(scene.exposure),
+        }
+    }
+}
+
+/// The settings by which a frame is displayed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DisplaySettings {
+    /// The gain of the difference in [`View::Compare`](super::View::Compare).
+    pub gain: f32,
+    /// True if invalid pixels are marked.
+    pub marks: bool,
+    /// True if negative values are valid, as under filters with negative lobes.
+    pub negative: bool,
+    /// The view transform and the exposure.
+    pub view: ViewSettings,
+    /// True for false colors by luminance.
+    pub false_color: bool,
+}
+
+/// The range of false colors in stops of luminance, after exposure: of radiance, and of standard errors.
+const FALSE_COLORS: [f32; 2] = [-10.0, 6.0];
+const ERRORS: [f32; 2] = [-12.0, 0.0];
+
+impl DisplaySettings {
+    /// Returns the displayed bytes of a linear color.
+    pub fn shown(&self, light: [f32; 3]) -> [u8; 3] {
+        match self.false_color {
+            true => self.false_color(light, FALSE_COLORS),
+            false => self.view.rgb8(light),
+        }
+    }
+
+    /// Returns the displayed bytes of an image.
+    pub fn bytes(&self, pixels: &Pixels) -> Vec<u8> {
+        let colors = pixels.colors.par_iter().with_min_len(1024);
+        colors.flat_map_iter(|color| self.shown(*color)).collect()
+    }
+
+    /// Returns the false color of a standard error.
+    pub fn error_color(&self, error: [f32; 3]) -> [u8; 3] {
+        self.false_color(error, ERRORS)
+    }
+
+    /// Uses the luminance of Rec. 709; zero gets the first color.
+    fn false_color(&self, [r, g, b]: [f32; 3], [first, last]: [f32; 2]) -> [u8; 3] {
+        let stops = (0.2126 * r + 0.7152 * g + 0.0722 * b).log2() + self.view.exposure as f32;
+        color(((stops - first) / (last - first) * 255.0 + 0.5) as u8) // saturates; NaN is 0
+    }
+}
+
+/// The scale of false colors.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Legend {
+    /// The luminance of the first and the last color, in stops.
+    pub stops: [f64; 2],
+    /// Evenly spaced colors.
+    pub colors: Vec<[u8; 3]>,
+}
+
+impl Legend {
+    /// Returns the scale of radiance under an exposure.
+    pub fn of(exposure: f64) -> Legend {
+        Legend::over(FALSE_COLORS, exposure)
+    }
+
+    /// Returns the scale of standard errors under an exposure.
+    pub fn of_errors(exposure: f64) -> Legend {
+        Legend::over(ERRORS, exposure)
+    }
+
+    fn over(stops: [f32; 2], exposure: f64) -> Legend {
+        Legend {
+            stops: stops.map(|stops| f64::from(stops) - exposure),
+            colors: (0..=16).map(|i| color((i * 255 / 16) as u8)).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn false_colours_follow_the_stops() {
+        let look = |exposure| DisplaySettings {
+            view: ViewSettings {
+                exposure,
+                ..ViewSettings::default()
+            },
+            false_color: true,
+            ..DisplaySettings::default()
+        };
+        let grey = |stops: f32| [stops.exp2(); 3];
+        let [first, last] = FALSE_COLORS;
+        let Legend { stops, colors: legend } = Legend::of(3.0);
+        assert_eq!(stops, [-13.0, 3.0]);
+        for (i, wanted) in legend.iter().enumerate() {
+            let stops = first + (last - first) * i as f32 / 16.0;
+            let shown = look(0.0).shown(grey(stops));
+            assert!(
+                shown.iter().zip(wanted).all(|(a, b)| a.abs_diff(*b) <= 2),
+                "{stops}: {shown:?} {wanted:?}"
+            );
+            assert_eq!(look(3.0).shown(grey(stops - 3.0)), look(0.0).shown(grey(stops)));
+        }
+        for (light, wanted) in [
+            (0.0, legend[0]),
+            (-1.0, legend[0]),
+            (f32::NAN, legend[0]),
+            (f32::INFINITY, legend[16]),
+        ] {
+            assert_eq!(look(0.0).shown([light; 3]), wanted, "{light}");
+        }
+        assert_ne!(look(0.0).shown(grey(0.0)), look(0.0).shown(grey(-3.0)));
+        // Standard errors have their own scale.
+        let Legend { stops, colors: legend } = Legend::of_errors(3.0);
+        assert_eq!(stops, [-15.0, -3.0]);
+        for (stops, wanted) in [(-15.0, legend[0]), (-9.0, legend[8]), (-3.0, legend[16])] {
+            let shown = look(3.0).error_color(grey(stops));
+            assert!(
+                shown.iter().zip(wanted).all(|(a, b)| a.abs_diff(b) <= 2),
+                "{stops}: {shown:?} {wanted:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_chosen_stands_for_the_scenes() {
+        let scene = ViewSettings {
+            transform: ViewTransform::Agx,
+            exposure: 2.0,
+        };
+        assert_eq!(DisplayOverrides::default().over(scene), scene);
+        let chosen = DisplayOverrides {
+            exposure: Some(-1.0),
+            ..DisplayOverrides::default()
+        };
+        assert_eq!(
+            chosen.over(scene),
+            ViewSettings {
+                exposure: -1.0,
+                ..scene
+            }
+        );
+        for stops in [100.5, -101.0, f64::NAN, f64::INFINITY] {
+            let exposure = Some(stops);
+            assert!(DisplayOverrides { exposure, ..chosen }.checked().is_err(), "{stops}");
+        }
+    }
+}

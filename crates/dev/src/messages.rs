@@ -1,0 +1,269 @@
+//! The events that reach the painter, and the messages for viewers and the terminal.
+
+use std::num::NonZeroU32;
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::build::Built;
+use super::camera::{Move, Viewpoint};
+use super::diagnostic::Diagnostic;
+use super::look::DisplayOverrides;
+use super::picture::{LayerName, View};
+use super::reference::{Apart, Reference};
+use super::sliders::SliderState;
+use super::source::Snapshot;
+use wgray_render::gpu::marks::Value;
+use wgray_scene::ViewTransform;
+
+/// A report for the terminal.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Report {
+    /// An error.
+    Problem(Diagnostic),
+    /// All errors are fixed.
+    Mended,
+    /// The first image after a save was shown.
+    Reloaded {
+        /// Seconds from the change to the image; the time to compile is part of it.
+        seconds: f64,
+        /// Seconds spent on compiling.
+        compiled: Option<f64>,
+    },
+    /// The image has all its samples.
+    Finished {
+        /// Seconds since the first image.
+        seconds: f64,
+    },
+    /// A note about the scene.
+    Note(String),
+    /// The image is too large to display: its size, and the size that is shown.
+    Smaller([u32; 2], [u32; 2]),
+    /// The sliders were saved to the shaders, or that was undone; or the error.
+    Written(&'static str, Result<(), String>),
+    /// The camera or a value was saved to the scene file; or the error.
+    Wrote(String, Result<(), String>),
+    /// A change of the scene file was undone or redone; or the error.
+    Turned(String, Result<(), String>),
+}
+
+/// A value for a key of the scene file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Set {
+    /// The path of the key: `materials.red.color`.
+    pub path: String,
+    /// The value; null removes the key from the file.
+    pub value: serde_json::Value,
+    /// Changes of the same key with the same number are one step of undo.
+    #[serde(default)]
+    pub gesture: Option<u64>,
+}
+
+/// A command of a viewer.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Command {
+    /// Starts a drag of the camera: the moves that follow are one step of its history.
+    Grab,
+    /// Moves the camera.
+    Move(Move),
+    /// Sets the viewpoint.
+    Viewpoint(Viewpoint),
+    /// Frames the object at a pixel of the full-size image, or the whole scene.
+    Frame(Option<[u32; 2]>),
+    /// Returns to the previous viewpoint.
+    Back,
+    /// Returns to the next viewpoint.
+    Forth,
+    /// Resets the camera to that of the scene file.
+    ResetCamera,
+    /// Saves the camera to the scene file.
+    SaveCamera,
+    /// Sets a value in the scene file.
+    Set(Set),
+    /// Undoes the last change of the scene file.
+    UndoWrite,
+    /// Redoes the last undone change of the scene file.
+    RedoWrite,
+    /// Selects a view.
+    View(View),
+    /// Sets the gain of the difference in [`View::Compare`].
+    Gain(f32),
+    /// Marks invalid pixels.
+    Marks(bool),
+    /// Moves a slider of the shaders.
+    Slide {
+        /// The file of the constant.
+        file: String,
+        /// The name of the constant.
+        name: String,
+        /// The value.
+        value: Value,
+    },
+    /// Resets a slider, given by file and name, to the value of its file.
+    ResetSlider(String, String),
+    /// Resets all sliders.
+    ResetSliders,
+    /// Saves the values of the sliders to the shaders.
+    WriteSliders,
+    /// Undoes that.
+    UndoSliders,
+    /// Overrides exposure, transform and false colors.
+    #[serde(rename = "look")]
+    DisplaySettings(DisplayOverrides),
+    /// Pauses after the first image of a change.
+    Pause(bool),
+    /// Renders the image again.
+    Restart,
+    /// Sets the maximum number of samples per pixel; absent for that of the scene.
+    Samples(Option<NonZeroU32>),
+    /// Sets the scale of the preview.
+    Preview(Preview),
+    /// Sets the image as the reference.
+    Keep,
+}
+
+/// The scale of the preview: each pixel that is shown covers this many pixels of the image along each side.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub struct Preview(u32);
+
+impl Preview {
+    /// Returns the scale, at least 1.
+    pub fn scale(self) -> u32 {
+        self.0.max(1)
+    }
+}
+
+impl From<Preview> for u32 {
+    fn from(preview: Preview) -> u32 {
+        preview.scale()
+    }
+}
+
+impl TryFrom<u32> for Preview {
+    type Error = String;
+
+    fn try_from(scale: u32) -> Result<Preview, String> {
+        match (1..=64).contains(&scale) {
+            true => Ok(Preview(scale)),
+            false => Err(format!("preview: {scale} must be from 1 to 64")),
+        }
+    }
+}
+
+/// Everything that the page shows beside the images, sent as JSON.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct State {
+    /// The scene file.
+    pub scene: String,
+    /// The folder of the shaders; absent for the built-in ones.
+    pub shaders: Option<String>,
+    /// The device and its driver.
+    pub device: String,
+    /// The selected view.
+    pub view: View,
+    /// The gain of the difference in [`View::Compare`].
+    pub gain: f32,
+    /// True if invalid pixels are marked.
+    pub marks: bool,
+    /// The camera, as a section of a scene file.
+    pub camera: String,
+    /// The viewpoint of the camera, for bookmarks.
+    pub viewpoint: Option<Viewpoint>,
+    /// True if the camera differs from the file's.
+    pub camera_moved: bool,
+    /// Number of valid scenes so far.
+    pub scenes: u64,
+    /// The last change of the scene file, which can be undone: `camera`, `materials.red.color`.
+    pub undo: Option<String>,
+    /// Why nothing can be undone, if another program's change of the file dropped the history.
+    pub undo_blocked: Option<String>,
+    /// Why the scene file cannot be edited here, if that is so: it is glTF or JSON.
+    pub read_only: Option<String>,
+    /// The last change that was undone, which can be redone.
+    pub redo: Option<String>,
+    /// True if there is a previous and a next viewpoint.
+    pub steps: [bool; 2],
+    /// The display settings that the viewer overrides.
+    pub look: DisplayOverrides,
+    /// The exposure in stops and the transform of the scene.
+    pub scene_look: (f64, ViewTransform),
+    /// True if rendering pauses after the first image of a change.
+    pub paused: bool,
+    /// The maximum number of samples per pixel, and the number of the scene.
+    pub samples: (Option<NonZeroU32>, u32),
+    /// The scale of the preview.
+    pub preview: Preview,
+    /// The images to compare with, beside the CPU: the image before the last change, and the reference by
+    /// its name.
+    pub comparable: (bool, Option<String>),
+    /// Why the selected comparison cannot be shown.
+    pub no_comparison: Option<String>,
+    /// The difference of the two images of a comparison.
+    pub apart: Option<Apart>,
+    /// The current errors.
+    pub problems: Vec<Diagnostic>,
+    /// The sliders of the shaders.
+    pub sliders: Vec<SliderState>,
+    /// True if saving the sliders can be undone.
+    pub sliders_undo: bool,
+    /// The layers of the shaders.
+    pub layers: Vec<LayerName>,
+    /// The views that the scene does not provide, and why.
+    pub missing_views: Vec<(View, &'static str)>,
+    /// The template of links to an editor, with `{file}`, `{line}` and `{column}`; absent if there are no links.
+    pub editor: Option<String>,
+    /// True while a kernel is compiled.
+    pub compiling: bool,
+    /// True while changed files of the scene are read.
+    pub reading: bool,
+    /// Seconds spent on the last compilation.
+    pub compile_seconds: Option<f64>,
+    /// Number of executed commands.
+    pub heard: u64,
+    /// The number of the last frame.
+    pub frame: u64,
+    /// True if more frames follow without any event.
+    pub busy: bool,
+    /// The last notice.
+    pub notice: Option<Notice>,
+}
+
+/// A notice for the viewers.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Notice {
+    /// The number of the notice.
+    pub number: u64,
+    /// The command that it answers, as a count like [`State::heard`].
+    pub command: u64,
+    /// The text; empty if the previous notice no longer applies.
+    pub text: String,
+    /// True for an error.
+    pub bad: bool,
+}
+
+/// An event for the painter.
+pub enum Event {
+    /// The files changed: the new state, the time at which that was noticed, and the number of writes of this session
+    /// before.
+    Files(Box<Snapshot>, Instant, u64),
+    /// Changed files of the scene are being read, or turned out to be unchanged.
+    Reading(bool),
+    /// A kernel has been compiled.
+    Built(Box<Built>),
+    /// A command of a viewer.
+    Command(Command),
+    /// A viewer gave an image to compare with.
+    Reference(Reference),
+    /// The difference of two images was measured.
+    Measured(Apart),
+    /// A viewer arrived.
+    Viewers,
+    /// The driver loses the device.
+    #[cfg(test)]
+    Lose,
+    /// The session ends.
+    Stop,
+}

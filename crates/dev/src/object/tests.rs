@@ -1,0 +1,405 @@
+use std::path::Path;
+
+use serde_json::{Value as Json, json};
+
+use super::*;
+use crate::edit::edited;
+use wgray_render::pack::pack;
+use wgray_scene::{Draft, Overrides, Scene};
+
+/// A scene as it is looked at.
+fn seen(text: &str, name: &Path, overrides: Overrides) -> SceneView {
+    let origin = name.display().to_string();
+    let draft = Draft::read(text, &origin, wgray_scene::folder_of(name), &overrides).unwrap();
+    let (scene, description) = draft.check(&mut Default::default()).unwrap();
+    let loaded = Loaded::new(text.to_owned(), scene, description);
+    SceneView {
+        camera: loaded.packed.camera,
+        loaded: Arc::new(loaded),
+        sources: Sources {
+            scene: name.to_owned(),
+            overrides,
+            shaders: None,
+        },
+    }
+}
+
+/// A scene file's text as a table.
+fn table(text: &str) -> Value {
+    Value::Table(toml::from_str(text.trim_start_matches('\u{feff}')).unwrap())
+}
+
+/// A table in which whole numbers are numbers.
+fn plain(value: &Value) -> Value {
+    match value {
+        Value::Integer(x) => Value::Float(*x as f64),
+        Value::Array(list) => list.iter().map(plain).collect::<Vec<_>>().into(),
+        Value::Table(all) => Value::Table(all.iter().map(|(key, value)| (key.clone(), plain(value))).collect()),
+        other => other.clone(),
+    }
+}
+
+/// The same table with another value at a path, made where there was none.
+fn with(whole: &Value, path: &KeyPath, new: &Value) -> Value {
+    let mut whole = whole.clone();
+    let mut place = &mut whole;
+    for segment in &path.0 {
+        place = match segment {
+            Segment::Index(i) => place.get_mut(*i).unwrap(),
+            Segment::Key(key) => {
+                let table = place.as_table_mut().unwrap();
+                table.entry(key.clone()).or_insert(Value::Table(Table::new()))
+            }
+        };
+    }
+    *place = new.clone();
+    whole
+}
+
+/// Another value that a field may have.
+fn another(field: &Field) -> Json {
+    let now = field.value.as_ref().or(field.default.as_ref());
+    let moved = |now: Option<f64>| {
+        let (low, high) = field.range.unwrap();
+        let slider = field.slider;
+        let middle = slider.map_or((low + high) / 2.0, |slider| (slider.from + slider.to) / 2.0);
+        let candidates = [now.unwrap_or(0.0) * 0.75 + 0.01, middle, low, high];
+        let fits = |x: &f64| *x >= low && *x <= high && Some(*x) != now && *x != 0.0;
+        candidates.into_iter().find(fits).unwrap()
+    };
+    match field.kind {
+        wgray_scene::FieldKind::Number => json!(moved(now.and_then(Json::as_f64))),
+        wgray_scene::FieldKind::Whole => {
+            let now = now.and_then(Json::as_f64);
+            let x = moved(now).round();
+            json!(if Some(x) == now { x as i64 + 1 } else { x as i64 })
+        }
+        wgray_scene::FieldKind::Color | wgray_scene::FieldKind::Vector => {
+            let list: Vec<Option<f64>> = match now.and_then(Json::as_array) {
+                Some(list) => list.iter().map(Json::as_f64).collect(),
+                None => vec![None; field.length],
+            };
+            json!(list.into_iter().map(moved).collect::<Vec<_>>())
+        }
+        wgray_scene::FieldKind::Choice => {
+            let other = field
+                .choices
+                .iter()
+                .find(|choice| now.and_then(Json::as_str) != Some(choice.as_str()));
+            json!(other.or(field.choices.first()))
+        }
+        wgray_scene::FieldKind::Switch => json!(now != Some(&json!(true))),
+        wgray_scene::FieldKind::Text => panic!("{field:?}"),
+    }
+}
+
+/// Sets every field of every object to its own value and to another one; gives how many.
+fn set_all(seen: &SceneView) -> usize {
+    let text = seen.loaded.text.clone();
+    let whole = table(&text);
+    let names = seen.names();
+    let mut count = 0;
+    for (name, _) in seen.objects("").objects {
+        let object = seen.object(&name, None);
+        assert_eq!(object.gone, None);
+        let group = &object.groups[0];
+        assert_eq!(group.name, name);
+        assert!(
+            group.line == 0
+                || text.contains(
+                    &group
+                        .text
+                        .replace('\n', if text.contains('\r') { "\r\n" } else { "\n" })
+                )
+        );
+        for field in &group.fields {
+            let case = format!("{}: {}", seen.sources.scene.display(), field.path);
+            let path: KeyPath = field.path.parse().unwrap();
+            assert_eq!(seen.field(&path).as_ref(), Some(field), "{case}");
+            if let Some(own) = field.value.as_ref().filter(|_| field.fixed.is_none()) {
+                let value = field.value_of(own, &names).unwrap();
+                assert_eq!(edited(&text, &path, Some(&value)).unwrap(), text, "{case}");
+            }
+            if field.fixed.is_some() {
+                continue;
+            }
+            let value = field.value_of(&another(field), &names).unwrap();
+            let after = edited(&text, &path, Some(&value)).unwrap_or_else(|error| panic!("{case}: {error}"));
+            let wanted = with(&plain(&whole), &path, &plain(&value));
+            assert_eq!(plain(&table(&after)), wanted, "{case}");
+            Description::parse(&after, "s.toml").unwrap_or_else(|error| panic!("{error}"));
+            // An absent key goes out again, and with it every byte.
+            if field.value.is_none()
+                && !after.contains(&format!(
+                    "[{}]\n",
+                    path.0[0..1].iter().map(|_| "render").collect::<String>()
+                ))
+            {
+                assert_eq!(edited(&after, &path, None).as_deref(), Ok(text.as_str()), "{case}");
+            }
+            count += 1;
+        }
+    }
+    count
+}
+
+#[test]
+fn every_field_of_every_scene_can_be_set() {
+    let mut count = 0;
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes"));
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|end| end != "toml") {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap();
+        count += set_all(&seen(&text, &path, Overrides::default()));
+        let dos = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+        set_all(&seen(&dos, &path, Overrides::default()));
+    }
+    assert!(count > 1000, "{count}");
+}
+
+const SCENE: &str = "\
+image = { width = 40, height = 30 }
+camera = { position = [0, -4, 0.5], look_at = [0, 0, 0.5], fov = 40 }
+render.pixel_samples = { count = 4 }
+
+[materials]
+red = { type = 'phong', color = [0.8, 0.1, 0.1] }
+\"dark red\" = { type = 'phong', color = { texture = 'squares' } }
+[textures.squares]
+type = 'checker'
+even = [1, 1, 1]
+odd = [0, 0, 0]
+
+# the ball
+[[shapes]]
+type = 'sphere'
+material = 'dark red'
+center = [0, 0, 0.5]
+radius = 0.5 # wide
+
+[[shapes]]
+type = 'plane'
+material = 'red'
+point = [0, 0, 0]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+
+[[lights]]
+type = 'rectangle'
+center = [0.9, 0, 1]
+size = [0.2, 0.2]
+normal = [0, -1, 0]
+tangent = [1, 0, 0]
+color = [4, 4, 4]
+";
+
+fn small() -> SceneView {
+    seen(SCENE, Path::new("s.toml"), Overrides::default())
+}
+
+#[test]
+fn counts_of_cells_are_squares() {
+    let squares = |more: &str| {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\n[camera]\nposition = [0, 1, 0]\nlook_at = [0, 0, 0]\nfov = 40\n{more}"
+        );
+        let object = seen(&text, Path::new("s.toml"), Overrides::default()).object("render", None);
+        let fields = object.groups[0].fields.iter();
+        fields
+            .filter(|field| field.squares)
+            .map(|field| field.name.clone())
+            .collect::<Vec<_>>()
+    };
+    let (pixel, light) = ("pixel_samples.count", "light_samples.count");
+    assert_eq!(
+        squares("[render]\npixel_samples = { count = 4 }\nlight_samples = { count = 4 }"),
+        [pixel, light]
+    );
+    assert_eq!(
+        squares(
+            "[render]\npixel_samples = { pattern = 'halton', count = 5 }\nlight_samples = { pattern = 'jittered', count = 4 }"
+        ),
+        [light]
+    );
+    let path = "[render]\nintegrator = 'path'\n";
+    assert!(squares(&format!("{path}pixel_samples = {{ count = 5 }}")).is_empty());
+    assert_eq!(
+        squares(&format!("{path}pixel_samples = {{ pattern = 'grid', count = 4 }}")),
+        [pixel]
+    );
+}
+
+#[test]
+fn other_layouts_can_be_set_too() {
+    assert!(set_all(&small()) > 60);
+    // The control of the comparisons: another value and another place differ.
+    let whole = plain(&table(SCENE));
+    let path: KeyPath = "shapes[0].radius".parse().unwrap();
+    assert_ne!(with(&whole, &path, &Value::from(0.25)), whole);
+    assert_eq!(with(&whole, &path, &Value::from(0.5)), whole);
+}
+
+#[test]
+fn what_is_hit_is_named_with_its_lines_and_what_it_names() {
+    let seen = small();
+    let ball = seen.at([20, 15]);
+    assert_eq!(
+        (ball.name.as_str(), ball.at, &ball.gone),
+        ("shapes[0]", Some([20, 15]), &None)
+    );
+    let groups: Vec<&str> = ball.groups.iter().map(|group| group.name.as_str()).collect();
+    assert_eq!(groups, ["shapes[0]", "materials.\"dark red\"", "textures.squares"]);
+    let own = &ball.groups[0];
+    assert_eq!((own.kind.as_str(), own.line, own.more), ("sphere", 13, 0));
+    assert_eq!(
+        own.text,
+        "# the ball\n[[shapes]]\ntype = 'sphere'\nmaterial = 'dark red'\ncenter = [0, 0, 0.5]\nradius = 0.5 # wide"
+    );
+    assert_eq!(ball.groups[1].line, 7);
+    let radius = own.fields.iter().find(|field| field.name == "radius").unwrap();
+    assert_eq!(radius.path, "shapes[0].radius");
+    assert_eq!(
+        (radius.value.clone(), radius.unit, radius.range),
+        (Some(json!(0.5)), Some("units"), Some((1e-9, 1e9)))
+    );
+    assert!(
+        radius
+            .slider
+            .is_some_and(|slider| slider.logarithmic && slider.from < 0.5 && slider.to > 0.5)
+    );
+    let fields = |seen: &SceneView, name: &str| seen.object(name, None).groups[0].fields.clone();
+    let shininess = fields(&seen, "materials.red")
+        .into_iter()
+        .find(|field| field.name == "shininess")
+        .unwrap();
+    assert_eq!((shininess.value, shininess.default), (None, Some(json!(16.0))));
+    assert_eq!(seen.at([20, 29]).name, "shapes[1]");
+    assert_eq!(seen.at([29, 10]).name, "lights[0]");
+    let sky = seen.at([0, 0]);
+    assert_eq!((sky.name.as_str(), sky.note.is_some()), ("render", true));
+    for (object, case) in [
+        (seen.at([40, 0]), "is outside the image"),
+        (seen.object("shapes[2]", None), "shapes[2] is not in the scene"),
+        (seen.object("environment", None), "environment is not in the scene"),
+        (seen.object("shapes", None), "shapes is not in the scene"),
+        (seen.object("] [", None), "is not in the scene"),
+        (seen.object("", None), "is not in the scene"),
+    ] {
+        assert!(
+            object.groups.is_empty() && object.gone.as_ref().is_some_and(|why| why.contains(case)),
+            "{object:?}"
+        );
+    }
+}
+
+#[test]
+fn what_is_hit_is_what_the_first_hits_say() {
+    let seen = small();
+    let moved = Scene::parse(&SCENE.replace("[0, -4, 0.5]", "[1, -4, 2]"), "s.toml").unwrap();
+    let looked = SceneView {
+        camera: pack(&moved).camera,
+        ..seen.clone()
+    };
+    let mut others = 0;
+    for y in (0..30).step_by(3) {
+        for x in (0..40).step_by(3) {
+            let hit = pixel_first_hit(&pack(&moved), UVec2::new(x, y));
+            let wanted = match hit.shape {
+                NOTHING => "render".to_owned(),
+                2 => "lights[0]".to_owned(),
+                shape => format!("shapes[{shape}]"),
+            };
+            assert_eq!(looked.at([x, y]).name, wanted);
+            others += usize::from(seen.at([x, y]).name != wanted);
+        }
+    }
+    assert!(others > 5, "the camera makes a difference");
+}
+
+#[test]
+fn names_and_files_are_shown_and_stay() {
+    let seen = seen(
+        &std::fs::read_to_string("../../scenes/twisted-tube.toml").unwrap(),
+        Path::new("../../scenes/twisted-tube.toml"),
+        Overrides::default(),
+    );
+    let names = seen.names();
+    let mut files = 0;
+    for (name, _) in seen.objects("").objects {
+        for field in seen.object(&name, None).groups.iter().flat_map(|group| &group.fields) {
+            if field.name.ends_with("file") {
+                files += 1;
+                assert!(field.fixed.is_some(), "{field:?}");
+                assert!(field.value_of(&json!("other.obj"), &names).is_err());
+            }
+            if field.kind == wgray_scene::FieldKind::Choice && field.fixed.is_none() {
+                assert!(field.value_of(&json!("/etc/passwd"), &names).is_err());
+            }
+        }
+    }
+    assert!(files > 0);
+}
+
+#[test]
+fn what_stands_in_for_values_makes_them_fixed() {
+    let overrides = Overrides {
+        size: Some((20, 20)),
+        define: vec![
+            "camera.position[1]=-3".parse().unwrap(),
+            "shapes.0.radius=0.4".parse().unwrap(),
+        ],
+        ..Overrides::default()
+    };
+    let seen = seen(SCENE, Path::new("s.toml"), overrides);
+    let fixed = |path: &str| seen.field(&path.parse().unwrap()).unwrap().fixed;
+    assert!(fixed("image.width").unwrap().contains("--size"));
+    assert!(
+        fixed("camera.position")
+            .unwrap()
+            .contains("--define camera.position[1]=-3")
+    );
+    assert!(fixed("shapes[0].radius").unwrap().contains("--define"));
+    assert_eq!(fixed("shapes[0].center"), None);
+    assert_eq!(fixed("image.exposure"), None);
+    assert!(seen.field(&"shapes[0].nothing".parse().unwrap()).is_none());
+    assert!(seen.field(&"shapes[9].radius".parse().unwrap()).is_none());
+}
+
+#[test]
+fn objects_are_found_by_a_part_of_their_names() {
+    let seen = small();
+    let listed = seen.objects("RED");
+    let names: Vec<&str> = listed.objects.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        ["materials.\"dark red\"", "materials.red", "shapes[0]", "shapes[1]"]
+    );
+    assert_eq!(seen.objects("").objects.len(), 9);
+    let many = SCENE.to_owned() + &"[[shapes]]\ntype='sphere'\nmaterial='red'\ncenter=[9,9,9]\nradius=1\n".repeat(200);
+    let listed = self::seen(&many, Path::new("s.toml"), Overrides::default()).objects("sphere");
+    assert_eq!((listed.objects.len(), listed.more), (MAX_LISTED, 201 - MAX_LISTED));
+}
+
+#[test]
+fn a_camera_must_keep_the_keys_that_its_path_does_not_replace() {
+    let required = |camera: &str| {
+        let text = format!("image = {{ width = 4, height = 4 }}\n[camera]\n{camera}");
+        let object = seen(&text, Path::new("a.toml"), Overrides::default()).object("camera", None);
+        let fields = object.groups[0].fields.clone().into_iter();
+        fields
+            .filter(|field| field.required)
+            .map(|field| field.name)
+            .collect::<Vec<_>>()
+    };
+    let view = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45\n";
+    assert_eq!(required(view), ["position", "look_at", "fov"]);
+    let keys = "path.keys = [{ frame = 1, position = [0, -4, 1], look_at = [0, 0, 1], fov = 45 }]";
+    assert!(
+        required(&format!("{view}{keys}"))
+            .iter()
+            .all(|name| name.starts_with("path"))
+    );
+}

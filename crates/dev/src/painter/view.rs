@@ -1,0 +1,82 @@
+//! The view: which one is selected, what the scene provides, and what the running kernel can show.
+
+use std::time::Instant;
+
+use super::Painter;
+use crate::build::guarded;
+use crate::picture::{LayerName, View};
+use crate::source::shown;
+
+impl Painter {
+    pub(super) fn choose_view(&mut self, view: View) {
+        let kernel = |painter: &Painter| painter.loaded.as_ref().map(|loaded| painter.constants(loaded));
+        let before = kernel(self);
+        self.view = view;
+        self.keep_view();
+        let view = self.seen();
+        if let Some(running) = &mut self.running {
+            running.halted = false;
+            match guarded(|| running.canvas.change_view(view)) {
+                Ok(()) => self.changed((Instant::now(), false)), // the camera may have moved meanwhile
+                Err(error) => return self.fail(&error),
+            }
+            self.show_what_is_there();
+        }
+        if kernel(self) != before {
+            self.settle((Instant::now(), false)); // needs another kernel
+        }
+    }
+
+    /// Shows what is already rendered of a view.
+    pub(super) fn show_what_is_there(&mut self) {
+        if self.is_done() || self.running.as_ref().is_some_and(|running| !running.canvas.is_new()) {
+            self.show();
+        }
+    }
+
+    /// Falls back to color if the scene or the shaders do not provide the selected view.
+    pub(super) fn keep_view(&mut self) {
+        if self.loaded.is_none() {
+            return;
+        }
+        let told = match self.view {
+            View::Layer(name) if self.layer().is_none() => {
+                let there = self.layers();
+                let there = match there.is_empty() {
+                    true => "no layer is defined".to_string(),
+                    false => {
+                        let names: Vec<&str> = there.iter().map(LayerName::as_str).collect();
+                        format!("the layers are {}", names.join(", "))
+                    }
+                };
+                format!("the shaders have no layer `{}`; {there}", name.as_str())
+            }
+            view => match (view.aov(), self.missing(view)) {
+                (Some(aov), Some(rule)) => format!("view `{}`: {rule}", aov.name()),
+                _ => return,
+            },
+        };
+        self.view = View::Color;
+        self.notice(&Err(told), String::new());
+    }
+
+    /// Returns why the scene does not provide a view; `None` if it does.
+    fn missing(&self, view: View) -> Option<&'static str> {
+        let packed = &self.loaded.as_ref()?.packed;
+        view.aov()?.missing(packed.integrator, packed.adaptive)
+    }
+
+    /// Returns the views that the scene does not provide, and why.
+    pub(super) fn missing_views(&self) -> Vec<(View, &'static str)> {
+        let rules = View::LAYERS.iter().map(|view| (*view, self.missing(*view)));
+        rules.filter_map(|(view, rule)| Some((view, rule?))).collect()
+    }
+
+    /// Returns the view that the running kernel shows: the selected one, unless it needs another kernel.
+    pub(super) fn seen(&self) -> View {
+        match &self.running {
+            Some(running) => shown(&running.constants, self.view),
+            None => View::Color,
+        }
+    }
+}

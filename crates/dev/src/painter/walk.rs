@@ -1,0 +1,170 @@
+//! Moves of the camera, and the history of viewpoints.
+
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::Painter;
+use crate::camera::{Move, Viewpoint, dollied, framed, moved, placed};
+use wgray_image::Region;
+use wgray_render::backend::Backend as _;
+use wgray_render::cpu::Cpu;
+use wgray_render::pack::NOTHING;
+use wgray_scene::{Bounds, CameraDescription, Geometry, Light, Scene};
+
+/// Maximum number of viewpoints that are kept.
+const STEPS: usize = 256;
+
+/// The history of viewpoints.
+#[derive(Default)]
+pub struct CameraHistory {
+    /// The cameras before each step.
+    back: Vec<CameraDescription>,
+    /// The cameras that can be returned to.
+    forth: Vec<CameraDescription>,
+    /// True if the next move belongs to the last step.
+    in_step: bool,
+}
+
+impl CameraHistory {
+    /// Returns whether there is a previous and a next viewpoint.
+    pub fn steps(&self) -> [bool; 2] {
+        [!self.back.is_empty(), !self.forth.is_empty()]
+    }
+
+    /// Ends the step: the next move starts another one.
+    pub fn end_step(&mut self) {
+        self.in_step = false;
+    }
+
+    /// Adds the current camera before a move.
+    fn leave(&mut self, camera: &CameraDescription) {
+        if !std::mem::replace(&mut self.in_step, true) {
+            self.forth.clear();
+            if self.back.len() == STEPS {
+                self.back.remove(0);
+            }
+            self.back.push(camera.clone());
+        }
+    }
+}
+
+impl Painter {
+    /// Returns the current camera.
+    fn seen_by(&self) -> Option<&CameraDescription> {
+        self.camera
+            .as_ref()
+            .or(self.loaded.as_ref().map(|loaded| &loaded.camera))
+    }
+
+    pub(super) fn move_camera(&mut self, by: Move) {
+        let (Some(old), Some(loaded)) = (self.seen_by().cloned(), &self.loaded) else {
+            return;
+        };
+        let new = match by {
+            Move::Dolly(by) => dollied(&old, by, &loaded.camera),
+            other => moved(&old, other),
+        };
+        self.go(&old, new);
+    }
+
+    pub(super) fn place_camera(&mut self, viewpoint: Viewpoint) {
+        let Some(old) = self.seen_by().cloned() else { return };
+        match placed(&old, viewpoint) {
+            Ok(new) => self.step(&old, new),
+            Err(error) => self.notice(&Err(error), String::new()),
+        }
+    }
+
+    pub(super) fn reset_camera(&mut self) {
+        let (Some(old), Some(loaded)) = (self.camera.clone(), &self.loaded) else {
+            return;
+        };
+        let new = loaded.camera.clone();
+        self.step(&old, new);
+    }
+
+    /// Frames the object at a pixel, or the whole scene if there is no finite object.
+    pub(super) fn frame(&mut self, pixel: Option<[u32; 2]>) {
+        let (Some(loaded), Some(old)) = (self.loaded.clone(), self.seen_by().cloned()) else {
+            return;
+        };
+        let object = pixel.and_then(|pixel| self.bounds_at(pixel, &loaded.scene));
+        match object.or_else(|| loaded.scene.bounds()) {
+            Some((low, high)) => {
+                let (center, radius) = (0.5 * low + 0.5 * high, 0.5 * (high - low).length());
+                self.step(&old, framed(&old, center, radius));
+            }
+            None => self.notice(&Err("Nothing here has a finite extent".to_string()), String::new()),
+        }
+    }
+
+    fn bounds_at(&self, [x, y]: [u32; 2], scene: &Scene) -> Option<Bounds> {
+        let packed = self.packed(self.loaded.as_ref()?);
+        let pixel = Region {
+            x0: x,
+            y0: y,
+            x1: x.checked_add(1)?,
+            y1: y.checked_add(1)?,
+        };
+        let hit = *Cpu::new(&packed).first_hits(pixel).ok()?.first()?;
+        if hit.shape == NOTHING {
+            return None;
+        }
+        let number = hit.shape as usize;
+        match scene.shapes.get(number) {
+            Some(shape) => shape.geometry.bounds(),
+            None => match scene.lights.get(number - scene.shapes.len())? {
+                Light::Rectangle { rectangle, .. } => Geometry::Rectangle(*rectangle).bounds(),
+                Light::Point { position, .. } | Light::Spot { position, .. } => {
+                    Some((*position - DVec3::ONE, *position + DVec3::ONE))
+                }
+                Light::Directional { .. } => None,
+            },
+        }
+    }
+
+    /// Returns to the previous or the next viewpoint.
+    pub(super) fn retrace(&mut self, forth: bool) {
+        let Some(now) = self.seen_by().cloned() else { return };
+        let walk = &mut self.walk;
+        let (from, to) = match forth {
+            true => (&mut walk.forth, &mut walk.back),
+            false => (&mut walk.back, &mut walk.forth),
+        };
+        let Some(camera) = from.pop() else { return };
+        walk.in_step = false;
+        // The camera of the file may be of another kind by now.
+        if std::mem::discriminant(&camera) == std::mem::discriminant(&now) {
+            to.push(now);
+            self.look_through(camera);
+        } else {
+            *walk = CameraHistory::default();
+        }
+    }
+
+    /// Moves the camera in a step of its own.
+    fn step(&mut self, old: &CameraDescription, new: CameraDescription) {
+        self.walk.in_step = false;
+        self.go(old, new);
+        self.walk.in_step = false;
+    }
+
+    fn go(&mut self, old: &CameraDescription, new: CameraDescription) {
+        if new != *old {
+            self.walk.leave(old);
+            self.look_through(new);
+        }
+    }
+
+    fn look_through(&mut self, camera: CameraDescription) {
+        let files = self.loaded.as_ref().map(|loaded| &loaded.camera);
+        self.camera = Some(camera).filter(|camera| Some(camera) != files);
+        self.camera_waits = true;
+        self.comparison.before = None; // seen from another viewpoint
+        if let Some(running) = &mut self.running {
+            running.halted = false;
+        }
+        self.since.get_or_insert((Instant::now(), false));
+    }
+}

@@ -1,0 +1,573 @@
+//! Frames: the images of a view for the page and for `--out`, and the values of each pixel.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::faults::{BadPixels, Fault, faults, mark};
+use super::film_layer::FilmLayer;
+use super::histogram::Histogram;
+use super::look::{DisplaySettings, Legend};
+use wgray_image::{Pixels, difference};
+use wgray_render::film::{Film, mean};
+use wgray_render::gpu::marks::MAX_NAME_LEN;
+use wgray_render::output::{self as image, Aov, AovSource};
+use wgray_render::pack::{FirstHit, NOTHING};
+use wgray_scene::Integrator;
+
+/// The view of the scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum View {
+    /// Radiance.
+    #[default]
+    Color,
+    /// The normal of the first hit.
+    Normal,
+    /// The shading normal of the first hit; with the integrator `path` the mean over the samples.
+    ShadingNormal,
+    /// The distance of the first hit.
+    Depth,
+    /// The texture coordinates of the first hit.
+    Uv,
+    /// The shape or triangle.
+    Primitive,
+    /// The shape.
+    Instance,
+    /// The barycentric coordinates in the triangle.
+    Barycentric,
+    /// The fraction of light that surfaces reflect.
+    Albedo,
+    /// Light after one reflection.
+    Direct,
+    /// Light after more reflections.
+    Indirect,
+    /// Light without reflections.
+    Emission,
+    /// The variance of a pixel.
+    Variance,
+    /// The number of samples.
+    Samples,
+    /// Radiance, another image of it, and their difference.
+    Compare(Against),
+    /// A variable of the shaders with the annotation `layer`.
+    Layer(LayerName),
+}
+
+/// The name of a layer of the shaders.
+#[derive(Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct LayerName {
+    bytes: [u8; MAX_NAME_LEN],
+    length: u8,
+}
+
+impl LayerName {
+    /// Returns a name; `None` if it is longer than any layer's.
+    pub fn new(name: &str) -> Option<LayerName> {
+        let mut bytes = [0; MAX_NAME_LEN];
+        bytes.get_mut(..name.len())?.copy_from_slice(name.as_bytes());
+        let length = u8::try_from(name.len()).ok()?;
+        Some(LayerName { bytes, length })
+    }
+
+    /// Returns the name as text.
+    pub fn as_str(&self) -> &str {
+        let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or_default();
+        std::str::from_utf8(bytes).unwrap_or_default()
+    }
+}
+
+impl std::fmt::Debug for LayerName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.as_str().fmt(f)
+    }
+}
+
+impl TryFrom<String> for LayerName {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<LayerName, String> {
+        LayerName::new(&name).ok_or_else(|| format!("a layer's name must have {MAX_NAME_LEN} bytes at most"))
+    }
+}
+
+impl From<LayerName> for String {
+    fn from(name: LayerName) -> String {
+        name.as_str().to_string()
+    }
+}
+
+/// The image that radiance is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Against {
+    /// The image of the CPU.
+    Cpu,
+    /// The image before the last saved change of the scene or the shaders.
+    Before,
+    /// An image that was set as the reference, or a file of a viewer.
+    Reference,
+}
+
+impl View {
+    /// Returns the layer of the shaders.
+    pub fn layer(self) -> Option<LayerName> {
+        match self {
+            View::Layer(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// The views that are layers of `wgray render --aov`.
+    pub const LAYERS: [View; 12] = [
+        View::Normal,
+        View::ShadingNormal,
+        View::Depth,
+        View::Uv,
+        View::Primitive,
+        View::Instance,
+        View::Barycentric,
+        View::Albedo,
+        View::Direct,
+        View::Indirect,
+        View::Emission,
+        View::Variance,
+    ];
+
+    /// Returns the layer of the first hits that it shows, if any.
+    pub fn of_hits(self, integrator: Integrator) -> Option<Aov> {
+        self.aov().filter(|aov| aov.source(integrator) == AovSource::FirstHit)
+    }
+
+    /// Returns the layer of the film that it shows, other than color.
+    pub fn of_film(self, integrator: Integrator) -> Option<Aov> {
+        self.aov().filter(|aov| aov.source(integrator) != AovSource::FirstHit)
+    }
+
+    /// Returns the layer of `wgray render --aov`.
+    pub fn aov(self) -> Option<Aov> {
+        match self {
+            View::Normal => Some(Aov::Normal),
+            View::ShadingNormal => Some(Aov::ShadingNormal),
+            View::Depth => Some(Aov::Depth),
+            View::Uv => Some(Aov::Uv),
+            View::Primitive => Some(Aov::Primitive),
+            View::Instance => Some(Aov::Instance),
+            View::Barycentric => Some(Aov::Barycentric),
+            View::Albedo => Some(Aov::Albedo),
+            View::Direct => Some(Aov::Direct),
+            View::Indirect => Some(Aov::Indirect),
+            View::Emission => Some(Aov::Emission),
+            View::Variance => Some(Aov::Variance),
+            View::Color | View::Samples | View::Compare(_) | View::Layer(_) => None,
+        }
+    }
+
+    /// Returns whether the CPU also renders it.
+    pub fn is_by_both(self) -> bool {
+        self == View::Compare(Against::Cpu)
+    }
+}
+
+/// Returns the means of a film's sums. Rows without samples show `under`, a smaller film of the same image.
+pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
+    Pixels {
+        width: film.region.width(),
+        height: film.region.height(),
+        colors: of_film(film, under, has_samples, &|film, i| mean(film.sums[i])),
+    }
+}
+
+/// Returns a value of each pixel of a film, or, in rows without samples, of a smaller film of the same image.
+pub(super) fn of_film<T: Default + Send>(
+    film: &Film,
+    under: Option<&Film>,
+    has_samples: &(dyn Fn(u32) -> bool + Sync),
+    value: &(dyn Fn(&Film, usize) -> T + Sync),
+) -> Vec<T> {
+    let size = |film: &Film| [film.region.width(), film.region.height()];
+    let from = size(film);
+    let pixels = (0..film.sums.len()).into_par_iter().with_min_len(1024);
+    let of_pixel = |i: usize| match under {
+        Some(under) if !has_samples(i as u32 / from[0]) => {
+            let at = Scaled { from, to: size(under) };
+            at.index(i as u32 % from[0], i as u32 / from[0])
+                .map_or_else(T::default, |i| value(under, i))
+        }
+        _ => value(film, i),
+    };
+    pixels.map(of_pixel).collect()
+}
+
+/// A mapping from an image to the same image in another size.
+pub(super) struct Scaled {
+    pub from: [u32; 2],
+    pub to: [u32; 2],
+}
+
+impl Scaled {
+    /// Returns the index of the pixel that covers pixel (x, y); `None` outside the image.
+    pub fn index(&self, x: u32, y: u32) -> Option<usize> {
+        let scaled = |at: u32, i: usize| {
+            (at < self.from[i]).then(|| u64::from(at) * u64::from(self.to[i]) / u64::from(self.from[i]))
+        };
+        Some((scaled(y, 1)? * u64::from(self.to[0]) + scaled(x, 0)?) as usize)
+    }
+}
+
+/// The values of a frame.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// [`View::Color`]
+    Color(Pixels),
+    /// [`View::Samples`], and the number in the end.
+    Samples(Vec<u32>, u32),
+    /// The views of first hits.
+    Hits(Aov, Vec<FirstHit>),
+    /// [`View::Compare`]: the image, and the other one of the same size.
+    Compare(Pixels, Pixels),
+    /// [`View::Layer`], and the number of components.
+    Layer(Pixels, usize),
+    /// The views of film layers.
+    Film(FilmLayer),
+}
+
+impl Content {
+    /// Returns the displayed bytes of first hits and sample counts for an image of this size; empty for other
+    /// content.
+    pub(super) fn plain_bytes(&self, [width, height]: [u32; 2]) -> Vec<u8> {
+        match self {
+            Content::Samples(counts, total) => bytes(counts, |n| Vec3::splat(*n as f32 / (*total).max(1) as f32)),
+            Content::Hits(aov, hits) => {
+                let middle = hits.get((height / 2 * width + width / 2) as usize);
+                let middle_depth = middle.filter(|hit| hit.shape != NOTHING).map_or(1.0, |hit| hit.depth);
+                bytes(hits, |hit| aov.color_of_hit(hit, middle_depth))
+            }
+            Content::Layer(values, _) => bytes(&values.colors, |color| Vec3::from(*color)),
+            Content::Color(_) | Content::Compare(..) | Content::Film(_) => Vec::new(),
+        }
+    }
+}
+
+/// The description of a frame that is sent before its images.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Header {
+    /// The number of the frame.
+    pub number: u64,
+    /// The number of changes of scene, shaders and camera that the frame shows.
+    pub revision: u64,
+    /// The view.
+    pub view: View,
+    /// Width of the full-size image; a coarse frame has fewer pixels.
+    pub width: u32,
+    /// Height of the full-size image.
+    pub height: u32,
+    /// Width and height of the images that are sent.
+    pub sent: [u32; 2],
+    /// Width and height of the finished image: less than the full size if that is too large to display.
+    pub finest: [u32; 2],
+    /// Samples per pixel so far.
+    pub samples: u32,
+    /// Samples per pixel in the end.
+    pub total: u32,
+    /// True if the image is finished.
+    pub done: bool,
+    /// True if it shows first hits, with 1 ray per pixel.
+    pub first_hits: bool,
+    /// Samples per second.
+    pub speed: Option<f64>,
+    /// Seconds from the last change to its first frame.
+    pub latency: Option<f64>,
+    /// The result of [`View::Compare`]: the number of pixels that differ in any bit, and the largest difference.
+    pub differing: Option<(usize, f32)>,
+    /// The names of the two images of [`View::Compare`].
+    pub sides: Option<[String; 2]>,
+    /// The histogram of a color image.
+    pub histogram: Option<Histogram>,
+    /// The scale of false colors, if they are shown.
+    pub legend: Option<Legend>,
+    /// The invalid pixels of each image that can have them.
+    pub faults: Vec<(&'static str, BadPixels)>,
+    /// Names and sizes in bytes of the images that follow.
+    pub parts: Vec<(&'static str, usize)>,
+}
+
+/// The images of a view, as PNG files and as values.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The description.
+    pub header: Header,
+    /// PNG files, one for each part of the header.
+    pub pictures: Vec<Vec<u8>>,
+    /// The values.
+    pub content: Content,
+    /// The names behind the numbers in the values.
+    pub names: Names,
+    /// The display settings.
+    pub look: DisplaySettings,
+}
+
+/// The names of shapes and materials in the scene file.
+#[derive(Clone, Debug, Default)]
+pub struct Names {
+    /// Number of shapes; instances of meshes follow them.
+    pub shapes: u32,
+    /// Number of instances; lights follow them.
+    pub instances: u32,
+    /// The names of the materials.
+    pub materials: Vec<String>,
+}
+
+impl Frame {
+    /// Encodes the images of `content`, and completes the header.
+    pub fn new(mut header: Header, content: Content, names: Names, look: DisplaySettings) -> Frame {
+        let [width, height] = header.sent;
+        let mut found = Vec::new();
+        let mut marked = |name, mut rgb: Vec<u8>, faults: Vec<Option<Fault>>| {
+            if look.marks {
+                mark(&mut rgb, &faults);
+            }
+            found.push((name, BadPixels::count(&faults, width)));
+            (name, rgb)
+        };
+        let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
+        let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
+            Content::Color(colors) => vec![marked("picture", look.bytes(colors), light(colors))],
+            // Raw values, which may be negative.
+            Content::Layer(values, _) => {
+                let found = faults(&values.colors, true, |color| *color);
+                vec![marked("picture", content.plain_bytes(header.sent), found)]
+            }
+            Content::Film(layer) => {
+                let negative = look.negative || layer.may_be_negative();
+                let found = faults(&layer.values.colors, negative, |color| *color);
+                vec![marked("picture", layer.bytes(&look), found)]
+            }
+            Content::Samples(..) => vec![("picture", content.plain_bytes(header.sent))],
+            Content::Hits(aov, hits) => {
+                // Normals and texture coordinates may be negative.
+                let values = |hit: &FirstHit| match aov {
+                    Aov::Normal => hit.normal.into(),
+                    Aov::ShadingNormal => hit.shading_normal.into(),
+                    Aov::Depth => [hit.depth, 0.0, 0.0],
+                    Aov::Uv => [hit.uv.x, hit.uv.y, 0.0],
+                    Aov::Barycentric => [hit.barycentric.x, hit.barycentric.y, 0.0],
+                    _ => [0.0; 3],
+                };
+                vec![marked(
+                    "picture",
+                    content.plain_bytes(header.sent),
+                    faults(hits, true, values),
+                )]
+            }
+            Content::Compare(first, second) => {
+                header.differing = difference(first, second, 0.0).map(|found| (found.unequal, found.largest));
+                vec![
+                    marked("first", look.bytes(first), light(first)),
+                    marked("second", look.bytes(second), light(second)),
+                    ("difference", amplified(first, second, look.gain)),
+                ]
+            }
+        };
+        header.faults = found;
+        header.first_hits = matches!(content, Content::Hits(..));
+        let exposure = look.view.exposure;
+        header.histogram = match &content {
+            Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors, exposure)),
+            Content::Film(layer) if layer.is_light() => Some(Histogram::of(&layer.values.colors, exposure)),
+            Content::Samples(..) | Content::Hits(..) | Content::Layer(..) | Content::Film(_) => None,
+        };
+        header.legend = match &content {
+            Content::Film(layer) if layer.aov == Aov::Variance => Some(Legend::of_errors(exposure)),
+            _ if look.false_color && header.histogram.is_some() => Some(Legend::of(exposure)),
+            _ => None,
+        };
+        let (parts, pictures): (Vec<_>, Vec<_>) = pictures
+            .into_par_iter()
+            .map(|(name, rgb)| {
+                let file = png(width, height, &rgb);
+                ((name, file.len()), file)
+            })
+            .unzip();
+        header.parts = parts;
+        Frame {
+            header,
+            pictures,
+            content,
+            names,
+            look,
+        }
+    }
+
+    /// Returns the values of a pixel of the full-size image by name; `None` outside it.
+    pub fn pixel(&self, x: u32, y: u32) -> Option<Vec<(&'static str, String)>> {
+        let Header {
+            width, height, sent, ..
+        } = self.header;
+        let i = Scaled {
+            from: [width, height],
+            to: sent,
+        }
+        .index(x, y)?;
+        Some(match &self.content {
+            Content::Color(pixels) => {
+                let color = *pixels.colors.get(i)?;
+                let shown = self.look.shown(color).map(|byte| byte.to_string()).join(" ");
+                vec![("linear RGB", numbers(color)), ("bits", bits(color)), ("shown", shown)]
+            }
+            Content::Layer(values, count) => {
+                let values = values.colors.get(i)?.iter().take(*count);
+                let joined = |told: fn(&f32) -> String| values.clone().map(told).collect::<Vec<_>>().join("  ");
+                let bits = joined(|v| format!("{:08x}", v.to_bits()));
+                vec![("layer", joined(|v| format!("{v}"))), ("bits", bits)]
+            }
+            Content::Film(layer) => layer.pixel(i, &self.look)?,
+            Content::Samples(counts, total) => vec![("samples", format!("{} of {total}", counts.get(i)?))],
+            Content::Hits(aov, hits) => self.hit(*aov, hits.get(i)?),
+            Content::Compare(first, second) => {
+                let (first, second) = (*first.colors.get(i)?, *second.colors.get(i)?);
+                let apart = Vec3::from(first) - Vec3::from(second);
+                vec![
+                    ("first", numbers(first)),
+                    ("bits", bits(first)),
+                    ("second", numbers(second)),
+                    ("bits", bits(second)),
+                    ("difference", numbers(apart.into())),
+                ]
+            }
+        })
+    }
+
+    fn hit(&self, aov: Aov, hit: &FirstHit) -> Vec<(&'static str, String)> {
+        if hit.shape == NOTHING {
+            return vec![("hit", "nothing".to_string())];
+        }
+        let Names { shapes, instances, .. } = self.names;
+        let shape = match (hit.shape.checked_sub(shapes), hit.shape.checked_sub(shapes + instances)) {
+            (None, _) => format!("shapes[{}]", hit.shape),
+            (Some(instance), None) => format!("instances[{instance}]"),
+            (_, Some(light)) => format!("lights[{light}]"),
+        };
+        let mut known = match aov {
+            Aov::Normal => values("normal", hit.normal.into()),
+            Aov::ShadingNormal => values("shading normal", hit.shading_normal.into()),
+            Aov::Depth => values("depth", [hit.depth]),
+            Aov::Barycentric => values("barycentric", hit.barycentric.into()),
+            Aov::Primitive if hit.primitive != hit.shape => vec![("triangle", hit.primitive.to_string())],
+            Aov::Uv => values("uv", hit.uv.into()),
+            _ => Vec::new(),
+        };
+        known.push(("on", shape));
+        known.extend(
+            self.names
+                .materials
+                .get(hit.material as usize)
+                .map(|name| ("material", name.clone())),
+        );
+        known
+    }
+}
+
+pub(super) fn numbers<const N: usize>(values: [f32; N]) -> String {
+    values.map(|v| format!("{v}")).join("  ")
+}
+
+/// Formats the bits of floats in hexadecimal.
+pub(super) fn bits<const N: usize>(values: [f32; N]) -> String {
+    values.map(|v| format!("{:08x}", v.to_bits())).join("  ")
+}
+
+fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static str, String)> {
+    vec![(name, numbers(values)), ("bits", bits(values))]
+}
+
+/// Returns the bytes of values that are displayed without a transform.
+pub(super) fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
+    let byte = |v: f32| (v * 255.0 + 0.5) as u8; // saturates
+    pixels
+        .par_iter()
+        .with_min_len(1024)
+        .flat_map_iter(|pixel| color(pixel).to_array().map(byte))
+        .collect()
+}
+
+/// Returns an image of the differences: `gain` times as large, with a minimum that stays visible.
+fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
+    const LEAST: f32 = 0.2;
+    let pairs: Vec<_> = gpu.colors.iter().copied().zip(cpu.colors.iter().copied()).collect();
+    bytes(&pairs, |(gpu, cpu)| {
+        if gpu.map(f32::to_bits) == cpu.map(f32::to_bits) {
+            return Vec3::ZERO;
+        }
+        let apart = (Vec3::from(*gpu) - Vec3::from(*cpu)).abs() * gain;
+        // NaN counts as the largest difference.
+        let apart = Vec3::select(apart.is_nan_mask(), Vec3::ONE, apart);
+        if apart.max_element() < LEAST {
+            Vec3::splat(LEAST)
+        } else {
+            apart
+        }
+    })
+}
+
+/// Encodes radiance as PNG.
+pub(super) fn png_of(pixels: &Pixels, look: DisplaySettings) -> Vec<u8> {
+    png(pixels.width, pixels.height, &look.bytes(pixels))
+}
+
+/// Encodes 8-bit RGB as PNG with fast compression.
+pub(super) fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
+    // Encoding to memory fails only if the sizes do not match; the page then shows no image, which the tests would
+    // notice.
+    image::in_memory(width, height, rgb).unwrap_or_else(|error| {
+        tracing::error!("cannot encode an image of {width} x {height} pixels: {error}");
+        Vec::new()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec4;
+
+    use super::*;
+    use wgray_image::Region;
+
+    fn pixels(colors: &[[f32; 3]]) -> Pixels {
+        Pixels {
+            width: colors.len() as u32,
+            height: 1,
+            colors: colors.to_vec(),
+        }
+    }
+
+    #[test]
+    fn every_difference_is_seen() {
+        let a = pixels(&[[0.5; 3], [0.0; 3], [1.0; 3], [1.0; 3], [0.0; 3]]);
+        let b = pixels(&[
+            [0.5; 3],
+            [-0.0; 3],
+            [1.0, 1.0 + f32::EPSILON, 1.0],
+            [f32::NAN; 3],
+            [0.001, 0.0, 1.0],
+        ]);
+        assert_eq!(
+            amplified(&a, &b, 256.0),
+            [0, 0, 0, 51, 51, 51, 51, 51, 51, 255, 255, 255, 65, 0, 255]
+        );
+        assert_eq!(amplified(&a, &a, 256.0), [0; 15]);
+    }
+
+    #[test]
+    fn a_coarse_picture_shows_where_the_film_is_empty() {
+        let mut under = Film::new(Region::whole(1, 1));
+        under.sums[0] = Vec4::new(1.0, 0.0, 0.0, 1.0);
+        let mut film = Film::new(Region::whole(1, 2));
+        film.sums[0] = Vec4::new(0.0, 2.0, 4.0, 2.0);
+        assert_eq!(
+            means(&film, Some(&under), &|y| y < 1).colors,
+            [[0.0, 1.0, 2.0], [1.0, 0.0, 0.0]]
+        );
+        assert_eq!(means(&film, None, &|y| y < 1).colors[1], [0.0; 3]);
+    }
+}

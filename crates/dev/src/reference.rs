@@ -1,0 +1,197 @@
+//! Images to compare with, given by viewers or kept, and the difference of two images.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::picture::Scaled;
+use wgray_image::Pixels;
+use wgray_image::color::srgb_to_linear;
+use wgray_image::compare::{self, Channel, Kind, PIXELS_PER_DEGREE, Picture, Plane};
+use wgray_scene::{ViewSettings, ViewTransform};
+
+/// Maximum number of pixels of a viewer's file, a little more than 7680 x 4320: a small file may have many pixels.
+const MAX_PIXELS: u64 = 1 << 25;
+
+/// An image to compare with.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// The name: that of a file, or a description.
+    pub name: String,
+    /// Linear colors.
+    pub pixels: Arc<Pixels>,
+}
+
+impl Reference {
+    /// Decodes an image file: OpenEXR or Radiance as linear values; for PNG, JPEG and WebP the display's curve is
+    /// inverted.
+    ///
+    /// # Errors
+    ///
+    /// The message for the sender.
+    pub fn decode(name: String, bytes: Vec<u8>, view: ViewSettings) -> Result<Reference, String> {
+        let picture = Picture::decode(bytes, MAX_PIXELS).map_err(|error| format!("{name}: {error}"))?;
+        let colors = picture
+            .colors()
+            .ok_or_else(|| format!("{name}: has no color: channels R, G and B, or Y, are required"))?;
+        let count = picture.pixels();
+        let mut pixels = vec![[0.0; 3]; count];
+        let mut values = vec![0.0; count];
+        for (i, plane) in colors.into_iter().enumerate() {
+            plane.values(0..count, &mut values);
+            for (pixel, value) in pixels.iter_mut().zip(&values) {
+                pixel[i] = match picture.kind {
+                    Kind::Linear => *value,
+                    Kind::Display { .. } => light_of(*value, view.transform),
+                } as f32;
+            }
+        }
+        Ok(Reference {
+            name,
+            pixels: Arc::new(Pixels {
+                width: picture.width,
+                height: picture.height,
+                colors: pixels,
+            }),
+        })
+    }
+
+    /// Returns the pixels in another size, each in its place; `None` if the image does not have this full size.
+    pub fn at(&self, whole: [u32; 2], sent: [u32; 2]) -> Option<Pixels> {
+        let Pixels { width, height, .. } = *self.pixels;
+        if [width, height] != whole {
+            return None;
+        }
+        if sent == whole {
+            return Some((*self.pixels).clone());
+        }
+        let scaled = Scaled { from: sent, to: whole };
+        let color = |i: u32| {
+            let place = scaled.index(i % sent[0], i / sent[0])?;
+            self.pixels.colors.get(place).copied()
+        };
+        Some(Pixels {
+            width: sent[0],
+            height: sent[1],
+            colors: (0..sent[0] * sent[1]).map(|i| color(i).unwrap_or_default()).collect(),
+        })
+    }
+}
+
+/// Returns the linear value of a displayed one. For AgX and PBR Neutral only the curve of sRGB can be inverted.
+fn light_of(value: f64, transform: ViewTransform) -> f64 {
+    match transform {
+        ViewTransform::Gamma22 => value.powf(2.2),
+        _ => srgb_to_linear(value),
+    }
+}
+
+/// The difference of two images.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Apart {
+    /// The frame that was measured.
+    pub frame: u64,
+    /// The root mean square error of the linear values; `None` if it is not finite.
+    pub rmse: Option<f64>,
+    /// HDR-FLIP, as `wgray diff` measures it.
+    pub flip: Option<f64>,
+}
+
+impl Apart {
+    /// Measures two images of one size.
+    pub fn of(frame: u64, first: &Pixels, second: &Pixels) -> Apart {
+        let squares = first.colors.iter().flatten().zip(second.colors.iter().flatten());
+        let sum: f64 = squares.map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
+        let rmse = (sum / (3.0 * first.colors.len().max(1) as f64)).sqrt();
+        let flip = match first == second {
+            true => Some(0.0),
+            false => compare::flip(&picture(first), &picture(second), PIXELS_PER_DEGREE, None).map(|flip| flip.mean),
+        };
+        Apart {
+            frame,
+            rmse: Some(rmse).filter(|rmse| rmse.is_finite()),
+            flip: flip.filter(|flip| flip.is_finite()),
+        }
+    }
+}
+
+fn picture(pixels: &Pixels) -> Picture {
+    let channel = |(name, i): (&str, usize)| Channel {
+        name: name.to_owned(),
+        plane: Arc::new(Plane::Floats(pixels.colors.iter().map(|color| color[i]).collect())),
+    };
+    Picture {
+        width: pixels.width,
+        height: pixels.height,
+        position: (0, 0),
+        kind: Kind::Linear,
+        channels: [("R", 0), ("G", 1), ("B", 2)].map(channel).into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgray_render::output as image;
+
+    fn pixels(colors: Vec<[f32; 3]>, width: u32) -> Pixels {
+        Pixels {
+            width,
+            height: colors.len() as u32 / width,
+            colors,
+        }
+    }
+
+    #[test]
+    fn a_png_is_read_as_the_light_that_is_shown_so() {
+        for transform in [ViewTransform::Gamma22, ViewTransform::Srgb] {
+            let view = ViewSettings {
+                transform,
+                ..ViewSettings::default()
+            };
+            let light = [[0.0, 0.001, 0.18], [0.5, 0.75, 1.0]];
+            let bytes: Vec<u8> = light.iter().flat_map(|color| view.rgb8(*color)).collect();
+            let file = image::in_memory(2, 1, &bytes).unwrap();
+            let read = Reference::decode("a.png".to_owned(), file, view).unwrap();
+            let again: Vec<u8> = read.pixels.colors.iter().flat_map(|color| view.rgb8(*color)).collect();
+            assert_eq!(again, bytes, "{transform:?}");
+        }
+        let error = Reference::decode("a.png".to_owned(), b"not an image".to_vec(), ViewSettings::default());
+        assert!(error.unwrap_err().starts_with("a.png: "));
+        let blank = image::in_memory(8193, 4096, &vec![0; 3 * 8193 * 4096]).unwrap();
+        let error = Reference::decode("b.png".to_owned(), blank, ViewSettings::default());
+        assert_eq!(
+            error.unwrap_err(),
+            "b.png: has 8193 x 4096 pixels; the limit is 33554432 pixels"
+        );
+    }
+
+    #[test]
+    fn a_reference_fits_its_size_alone() {
+        let colors = (0..16).map(|i| [i as f32; 3]).collect();
+        let reference = Reference {
+            name: "r".to_owned(),
+            pixels: Arc::new(pixels(colors, 4)),
+        };
+        assert_eq!(reference.at([4, 4], [4, 4]).unwrap(), *reference.pixels);
+        let half = reference.at([4, 4], [2, 2]).unwrap();
+        assert_eq!(
+            half.colors.iter().map(|color| color[0]).collect::<Vec<_>>(),
+            [0.0, 2.0, 8.0, 10.0]
+        );
+        assert!(reference.at([4, 5], [4, 5]).is_none());
+    }
+
+    #[test]
+    fn how_far_apart_is_measured() {
+        let a = pixels(vec![[0.5; 3]; 64 * 64], 64);
+        let b = pixels(vec![[0.75; 3]; 64 * 64], 64);
+        let same = Apart::of(3, &a, &a);
+        assert_eq!((same.frame, same.rmse, same.flip), (3, Some(0.0), Some(0.0)));
+        let apart = Apart::of(4, &a, &b);
+        assert_eq!(apart.rmse, Some(0.25));
+        assert!(apart.flip.is_some_and(|flip| flip > 0.05), "{apart:?}");
+        let odd = pixels(vec![[f32::NAN; 3]; 64 * 64], 64);
+        assert_eq!(Apart::of(5, &a, &odd).rmse, None);
+    }
+}

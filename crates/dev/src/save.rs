@@ -1,0 +1,263 @@
+//! Atomic writes, and the text of the camera in a scene file.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use toml::Value;
+
+use super::camera::{Entry, entries};
+use super::edit::edited;
+use wgray_scene::{CameraDescription, Description, KeyPath, Segment};
+
+/// Maximum time that a program needs from the first byte of a file to the last.
+const SAVING: Duration = Duration::from_millis(100);
+/// Maximum time to wait for a save of another program.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Replaces a file atomically: a reader sees the old or the new content.
+pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
+    written(path, content)?.persist(path)?;
+    Ok(())
+}
+
+/// Like [`replace`], for a file that another program may change: fails unless the file has the known content.
+pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Result<()> {
+    let file = written(path, content)?;
+    if fs::read(path)? != known {
+        return Err(std::io::Error::other(
+            "another program changed it at the same time; nothing was written",
+        ));
+    }
+    file.persist(path)?;
+    Ok(())
+}
+
+/// Waits while another program changed a file so recently that more may follow: that would go into the replaced file,
+/// and be lost.
+///
+/// # Errors
+///
+/// The file keeps changing.
+pub fn wait_settled(path: &Path) -> Result<(), String> {
+    let start = Instant::now();
+    loop {
+        let changed = fs::metadata(path).and_then(|data| data.modified()).ok();
+        let age = changed.and_then(|changed| changed.elapsed().ok());
+        match age.and_then(|age| SAVING.checked_sub(age)) {
+            Some(rest) if start.elapsed() < PATIENCE => sleep(rest.max(Duration::from_millis(1))),
+            Some(_) => {
+                return Err(format!(
+                    "{}: another program is writing this file; nothing was written",
+                    path.display()
+                ));
+            }
+            None => return Ok(()),
+        }
+    }
+}
+
+/// Writes a temporary file next to another one, with its permissions, to take its place.
+fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let permissions = fs::metadata(path).map(|data| data.permissions()).ok();
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".wgray-");
+    #[cfg(unix)]
+    if permissions.is_none() {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666)); // less the user's mask
+    }
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(content)?;
+    if let Some(permissions) = permissions {
+        file.as_file().set_permissions(permissions)?;
+    }
+    Ok(file)
+}
+
+/// Returns the text of a scene file with another camera. Unchanged values are not touched.
+///
+/// # Errors
+///
+/// The message for the user: the file is not a scene that this camera fits.
+pub fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Result<String, String> {
+    let mend = |error| format!("fix the file first: {error}");
+    let before = Description::parse_camera(text, origin).map_err(mend)?;
+    if std::mem::discriminant(&before) != std::mem::discriminant(camera) {
+        return Err(format!("{origin}: the type of the camera in the file has changed"));
+    }
+    let mut text = text.to_owned();
+    for ((key, old), (_, new)) in entries(&before).into_iter().zip(entries(camera)) {
+        if old != new {
+            let path = KeyPath(["camera", key].map(Segment::from).to_vec());
+            let value = match new {
+                Entry::Number(x) => Value::from(x),
+                Entry::Point(point) => Value::from(point.to_array().to_vec()),
+            };
+            text = edited(&text, &path, Some(&value)).map_err(|why| format!("{origin}: {why}"))?;
+        }
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+    use std::time::SystemTime;
+
+    use super::*;
+
+    const SCENE: &str = "# a scene\n[image]\nwidth = 4 # wide\nheight = 4\n\n[camera] # the view\nfov=45   # degrees\n\
+        position = [ 0,  -3.0, # back\n 1.3 ]\nlook_at = [0, 0, 1]\n\n# the end\n";
+
+    fn camera(text: &str) -> CameraDescription {
+        Description::parse(&format!("image = {{ width = 4, height = 4 }}\n[camera]\n{text}"), "c")
+            .unwrap()
+            .camera
+    }
+
+    #[test]
+    fn comments_and_layout_stay() {
+        let new = camera("position = [0, -2, 1.25]\nlook_at = [0.5, 0, 1]\nfov = 45");
+        let saved = with_camera(SCENE, "s.toml", &new).unwrap();
+        let wanted = SCENE
+            .replace(" 0,  -3.0, # back\n 1.3 ", " 0,  -2, # back\n 1.25 ")
+            .replace("look_at = [0, 0, 1]", "look_at = [0.5, 0, 1]");
+        assert_eq!(saved, wanted);
+        assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
+    }
+
+    #[test]
+    fn nothing_is_written_for_the_same_camera() {
+        let same = camera("position = [0, -3, 1.3]\nlook_at = [0, 0, 1]\nfov = 45");
+        assert_eq!(with_camera(SCENE, "s.toml", &same).unwrap(), SCENE);
+    }
+
+    #[test]
+    fn inline_tables_and_absent_keys_are_written_too() {
+        let text =
+            "image = { width = 4, height = 4 }\ncamera = { position = [0, 1, 0], look_at = [0, 0, 0], fov = 40 } # c\n";
+        let new = camera("position = [0, 1, 2]\nlook_at = [0, 0, 0]\nup = [0, 1, 0]\nfov = 40");
+        let saved = with_camera(text, "s.toml", &new).unwrap();
+        assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
+        assert!(saved.ends_with(" } # c\n"), "{saved}");
+    }
+
+    #[test]
+    fn a_broken_file_and_another_camera_are_refused() {
+        let new = camera("type = 'orthographic'\nposition = [0, 1, 2]\nlook_at = [0, 0, 0]\nheight = 2");
+        assert!(
+            with_camera(SCENE, "s.toml", &new)
+                .unwrap_err()
+                .contains("type of the camera")
+        );
+        assert!(
+            with_camera("[image", "s.toml", &new)
+                .unwrap_err()
+                .starts_with("fix the file first: s.toml:1:")
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_is_replaced_keeps_its_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("s.toml");
+        fs::write(&file, SCENE).unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).unwrap();
+        replace(&file, b"other").unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "other");
+        assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
+        assert_eq!(
+            fs::read_dir(folder.path()).unwrap().count(),
+            1,
+            "nothing is left behind"
+        );
+    }
+
+    #[test]
+    fn what_somebody_else_has_saved_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("s.toml");
+        fs::write(&file, "theirs").unwrap();
+        let error = replace_known(&file, b"before", b"ours").unwrap_err();
+        assert!(error.to_string().contains("another program"), "{error}");
+        assert_eq!(fs::read_to_string(&file).unwrap(), "theirs");
+        replace_known(&file, b"theirs", b"ours").unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "ours");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        // A file that changed just now may not be complete; the wait for one that keeps changing ends.
+        let changed = |ago: Duration| {
+            let file = fs::File::options().write(true).open(&file).unwrap();
+            file.set_modified(SystemTime::now() - ago).unwrap();
+        };
+        for (ago, waits) in [(2 * SAVING, false), (SAVING / 4, true)] {
+            changed(ago);
+            let start = Instant::now();
+            wait_settled(&file).unwrap();
+            assert_eq!(start.elapsed() > SAVING / 2, waits, "{ago:?}");
+        }
+        changed(Duration::ZERO);
+        let is_done = AtomicBool::new(false);
+        let error = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_done.load(Relaxed) {
+                    changed(Duration::ZERO);
+                    sleep(Duration::from_millis(1));
+                }
+            });
+            // On a busy machine the file may rest once.
+            let error = (0..10).find_map(|_| wait_settled(&file).err());
+            is_done.store(true, Relaxed);
+            error.unwrap()
+        });
+        assert!(error.contains("s.toml: another program is writing"), "{error}");
+    }
+
+    #[test]
+    fn line_ends_and_a_byte_order_mark_stay() {
+        let new = camera("position = [0, -2, 1.25]\nlook_at = [0.5, 0, 1]\nup = [0, 1, 0]\nfov = 45");
+        let unix = with_camera(SCENE, "s.toml", &new).unwrap();
+        let dos = |text: &str| format!("\u{feff}{}", text.replace('\n', "\r\n"));
+        assert_eq!(with_camera(&dos(SCENE), "s.toml", &new).unwrap(), dos(&unix));
+        // Also with both kinds in one file.
+        let mixed = |text: &str| text.replacen("# degrees\n", "# degrees\r\n", 1);
+        assert_eq!(with_camera(&mixed(SCENE), "s.toml", &new).unwrap(), mixed(&unix));
+    }
+
+    #[test]
+    fn a_camera_of_dotted_keys_stays_one() {
+        let text = "image = { width = 4, height = 4 }\ncamera.position = [0, 1, 0]\ncamera.look_at = [0, 0, 0]\n\
+            camera.fov = 40 # wide";
+        let new = camera("position = [0, 1.5, 0]\nlook_at = [0, 0, 0]\nup = [1, 0, 0]\nfov = 40");
+        let saved = with_camera(text, "s.toml", &new).unwrap();
+        assert_eq!(saved, text.replace("1, 0]\n", "1.5, 0]\n") + "\ncamera.up = [1, 0, 0]");
+        assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
+    }
+
+    #[test]
+    fn a_path_stays_and_the_camera_is_saved_beside_it() {
+        let path = "path.keys = [{ frame = 1, position = [0, 1, 0] }, { frame = 9, position = [0, 3, 1] }]\n";
+        let text = format!("image = {{ width = 4, height = 4 }}\n[camera]\nlook_at = [0, 0, 0]\nfov = 40\n{path}");
+        let mut new = Description::parse(&text, "s.toml").unwrap().camera;
+        assert_eq!(with_camera(&text, "s.toml", &new).unwrap(), text);
+        let CameraDescription::Perspective(moved) = &mut new else {
+            panic!("another type");
+        };
+        (moved.position, moved.fov) = ([0.0, 2.0, 0.5].into(), 50.0);
+        let saved = with_camera(&text, "s.toml", &new).unwrap();
+        assert!(
+            saved.contains("fov = 50\n") && saved.contains("position = [0, 2, 0.5]\n"),
+            "{saved}"
+        );
+        assert!(saved.contains(path.trim_end()), "{saved}");
+        assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
+    }
+}

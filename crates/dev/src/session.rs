@@ -1,0 +1,358 @@
+//! A session: watches the files of a scene, and renders them on its own thread.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use tokio::sync::watch;
+
+use super::build::Builder;
+use super::messages::{Command, Event, Report, State};
+use super::object::SceneView;
+use super::painter::{Painter, SessionChannels};
+use super::picture::Frame;
+use super::reference::Reference;
+use super::source::Sources;
+use super::times::Times;
+use super::watch::Watch;
+use wgray_render::error::RenderError;
+use wgray_render::gpu::{AdapterChoice, choose};
+
+/// The settings of a session.
+pub struct Settings {
+    /// The files.
+    pub sources: Sources,
+    /// The device to render on.
+    pub device: AdapterChoice,
+    /// A PNG file that is replaced after each reload.
+    pub out: Option<PathBuf>,
+    /// True to pause rendering while there are no viewers ([`Session::viewers`]) and no `out`.
+    pub only_for_viewers: bool,
+    /// The template of links to an editor; `None` for no links.
+    pub editor: Option<String>,
+    /// Receives reports for the terminal.
+    pub report: Box<dyn Fn(Report) + Send>,
+}
+
+/// Maximum number of events that wait for the end of a dispatch.
+const WAITING: usize = 256;
+
+/// A running session; it ends when this is dropped.
+pub struct Session {
+    events: SyncSender<Event>,
+    /// Number of accepted commands.
+    asked: Arc<Mutex<u64>>,
+    /// The newest state.
+    pub state: watch::Receiver<Arc<State>>,
+    /// The newest image, once there is one. A slow receiver misses some.
+    pub frames: watch::Receiver<Option<Arc<Frame>>>,
+    /// The timings.
+    pub times: Times,
+    /// The scene and the camera, once there are any.
+    pub seen: watch::Receiver<Option<Arc<SceneView>>>,
+    viewers: Viewers,
+    watch: Option<Watch>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Counts the viewers.
+#[derive(Clone)]
+pub struct Viewers {
+    looking: Arc<AtomicUsize>,
+    events: SyncSender<Event>,
+}
+
+/// A viewer, until this is dropped.
+pub struct Viewer(Viewers);
+
+impl Viewers {
+    /// Adds a viewer.
+    pub fn enter(&self) -> Viewer {
+        self.looking.fetch_add(1, Ordering::SeqCst);
+        let _ = self.events.try_send(Event::Viewers); // a full inbox wakes the painter as well
+        Viewer(self.clone())
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        self.0.looking.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// The reason why a session cannot start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The scene file does not exist.
+    #[error("{0}: cannot be read: {1}")]
+    NoScene(PathBuf, std::io::Error),
+    /// There is no device.
+    #[error(transparent)]
+    Device(#[from] RenderError),
+    /// The operating system does not allow watching files.
+    #[error("files cannot be watched: {0}")]
+    Watch(#[from] notify::Error),
+    /// The operating system does not start a thread.
+    #[error(transparent)]
+    System(#[from] std::io::Error),
+}
+
+impl Session {
+    /// Opens the device, reads the files and starts to render. Errors in the files are reported, and the session
+    /// waits for them to be fixed.
+    ///
+    /// # Errors
+    ///
+    /// No device, a scene file that does not exist, and errors of the operating system.
+    pub fn start(settings: Settings) -> Result<Session, StartError> {
+        let Settings {
+            sources,
+            device: choice,
+            out,
+            only_for_viewers,
+            editor,
+            report,
+        } = settings;
+        std::fs::metadata(&sources.scene).map_err(|error| StartError::NoScene(sources.scene.clone(), error))?;
+        let device = choose(&choice)?;
+        let snapshot = sources.read();
+        let (events, inbox) = sync_channel(WAITING);
+        let started = Instant::now();
+        let first = Event::Files(Box::new(snapshot.clone()), started, 0);
+        let _ = events.send(first); // the inbox is here
+        let writes = Arc::default();
+        let watch = Watch::start(sources.clone(), snapshot, Arc::clone(&writes), {
+            let events = events.clone();
+            move |event| events.send(event).is_ok()
+        })?;
+        let times = Times::default();
+        let builder = Builder::start(choice, times.clone(), {
+            let events = events.clone();
+            move |built| {
+                let _ = events.send(Event::Built(Box::new(built))); // fails only after the end of the session
+            }
+        })?;
+        let (state_sender, state) = watch::channel(Arc::default());
+        let (frame_sender, frames) = watch::channel(None);
+        let (scene_sender, seen) = watch::channel(None);
+        let looking = Arc::new(AtomicUsize::new(0));
+        let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
+        let told = SessionChannels {
+            report,
+            state: state_sender,
+            frames: frame_sender,
+            times: times.clone(),
+            editor,
+            seen: scene_sender,
+            events: events.clone(),
+        };
+        let painter = Painter::new(sources, device, builder, (out, wanted_by), writes, told);
+        let thread = std::thread::Builder::new()
+            .name("render".to_string())
+            .spawn(move || run(painter, inbox))?;
+        Ok(Session {
+            viewers: Viewers {
+                looking,
+                events: events.clone(),
+            },
+            events,
+            asked: Arc::default(),
+            state,
+            frames,
+            times,
+            seen,
+            watch: Some(watch),
+            thread: Some(thread),
+        })
+    }
+
+    /// Sends a command.
+    pub fn send(&self, command: Command) {
+        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        *asked += 1;
+        let _ = self.events.send(Event::Command(command)); // the thread lives as long as the session
+    }
+
+    /// Returns a function that gives reference images from other threads without blocking; it returns false if the
+    /// session is busy.
+    pub fn references(&self) -> impl Fn(Reference) -> bool + Send + Sync + 'static {
+        let events = self.events.clone();
+        move |reference| events.try_send(Event::Reference(reference)).is_ok()
+    }
+
+    /// Returns the counter of viewers.
+    pub fn viewers(&self) -> Viewers {
+        self.viewers.clone()
+    }
+
+    /// Returns a function that sends commands from other threads without blocking. It returns the number that
+    /// [`State::heard`] reaches once the command is executed, or `None` if the session is busy.
+    pub fn commands(&self) -> impl Fn(Command) -> Option<u64> + Send + Sync + 'static {
+        let (events, asked) = (self.events.clone(), self.asked.clone());
+        move |command| {
+            let mut asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Err(TrySendError::Full(_)) = events.try_send(Event::Command(command)) {
+                return None;
+            }
+            *asked += 1;
+            Some(*asked)
+        }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.watch = None;
+        let _ = self.events.send(Event::Stop); // the thread may have ended already
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Handles all pending events before any work, so that an event waits for one dispatch at most.
+fn run(mut painter: Painter, inbox: Receiver<Event>) {
+    loop {
+        let event = if painter.has_work() {
+            inbox.try_recv().ok()
+        } else {
+            inbox.recv().ok().or(Some(Event::Stop))
+        };
+        match event {
+            Some(Event::Stop) => break,
+            Some(event) => painter.take(event),
+            None => painter.work(),
+        }
+    }
+    drop(inbox); // first, because other threads may wait for room in it, and the painter for them
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::time::Duration;
+
+    use super::*;
+    use crate::camera::Move;
+    use crate::picture::Content;
+    use wgray_image::Pixels;
+    use wgray_render::gpu::compose::{Shaders, built_in};
+    use wgray_scene::Overrides;
+
+    const SCENE: &str = "
+        image = { width = 8, height = 8 }
+        camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
+        render = { ambient = [1, 1, 1], pixel_samples = { count = 4 } }
+        materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }
+        shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
+    ";
+
+    fn wait<T>(what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(40) {
+            if let Some(value) = ready() {
+                return value;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        panic!("{what} does not come");
+    }
+
+    fn finished(session: &Session, after: u64) -> (u64, Pixels) {
+        wait("an image", || {
+            let frame = session.frames.borrow().clone()?;
+            let header = &frame.header;
+            match &frame.content {
+                Content::Color(pixels) if header.done && header.revision > after => {
+                    Some((header.revision, pixels.clone()))
+                }
+                _ => None,
+            }
+        })
+    }
+
+    #[test]
+    fn a_lost_device_is_opened_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        for (name, text) in built_in() {
+            let file = path("shaders").join(name);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, text).unwrap();
+        }
+        fs::write(path("scene.toml"), SCENE).unwrap();
+        let (told, reports) = std::sync::mpsc::channel();
+        let session = Session::start(Settings {
+            sources: Sources {
+                scene: path("scene.toml"),
+                overrides: Overrides::default(),
+                shaders: Some(path("shaders")),
+            },
+            device: AdapterChoice::Auto,
+            out: None,
+            only_for_viewers: false,
+            editor: None,
+            report: Box::new(move |report| drop(told.send(report))),
+        })
+        .unwrap();
+        let (first, wanted) = finished(&session, 0);
+
+        // Lost while idle: the next move notices it, and is shown nevertheless.
+        session.events.send(Event::Lose).unwrap();
+        session.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        let (second, _) = finished(&session, first);
+        session.send(Command::ResetCamera);
+        let (third, again) = finished(&session, second);
+        assert_eq!(again, wanted);
+        assert!(session.state.borrow().problems.is_empty());
+        let lost = reports.try_iter().find_map(|report| match report {
+            Report::Problem(problem) => Some(problem.kind),
+            _ => None,
+        });
+        assert_eq!(lost, Some("device"), "it was lost indeed");
+
+        // Lost while a kernel with wrong shaders is compiled: the last good ones are used.
+        let good = Shaders::built_in().text("kernels/render.wgsl").to_string();
+        session.events.send(Event::Lose).unwrap();
+        fs::write(path("shaders/kernels/render.wgsl"), good.replace("= sum;", "= sun;")).unwrap();
+        wait("the shader's error", || {
+            session
+                .state
+                .borrow()
+                .problems
+                .iter()
+                .any(|problem| problem.kind == "shader")
+                .then_some(())
+        });
+        session.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        session.send(Command::ResetCamera);
+        let (_, again) = wait("the image", || {
+            Some(finished(&session, third)).filter(|(_, pixels)| *pixels == wanted)
+        });
+        assert_eq!(again, wanted);
+        fs::write(path("shaders/kernels/render.wgsl"), good).unwrap();
+        wait("no error", || session.state.borrow().problems.is_empty().then_some(()));
+    }
+
+    #[test]
+    fn a_scene_that_does_not_exist_is_an_error_at_once() {
+        let sources = Sources {
+            scene: "/nowhere/scene.toml".into(),
+            overrides: Overrides::default(),
+            shaders: None,
+        };
+        let settings = Settings {
+            sources,
+            device: AdapterChoice::Auto,
+            out: None,
+            only_for_viewers: false,
+            editor: None,
+            report: Box::new(|_| ()),
+        };
+        let error = Session::start(settings).err().unwrap().to_string();
+        assert!(error.starts_with("/nowhere/scene.toml: cannot be read: "), "{error}");
+    }
+}

@@ -1,0 +1,293 @@
+//! The files of a session, read in their current state.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant, SystemTime};
+
+use super::diagnostic::Diagnostic;
+use super::picture::{LayerName, View};
+use wgray_render::gpu::compose::{self, Shaders};
+use wgray_render::output::AovSource;
+use wgray_render::pack::{Packed, Specialization, pack};
+use wgray_scene::{
+    CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_course, is_gltf,
+    is_mesh, is_model, read_bytes, read_text,
+};
+
+/// The locations of the files.
+#[derive(Clone, Debug)]
+pub struct Sources {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// Values that override those of the scene file.
+    pub overrides: Overrides,
+    /// The folder of the shaders; `None` for the built-in ones.
+    pub shaders: Option<PathBuf>,
+}
+
+/// A scene that has been loaded and packed.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The text of the scene file; empty for a binary file.
+    pub text: String,
+    /// The description, with the values of overriding options.
+    pub description: Description,
+    /// The camera of the file.
+    pub camera: CameraDescription,
+    /// The scene.
+    pub scene: Scene,
+    /// The packed scene, as the backends read it.
+    pub packed: Packed,
+    /// The locations of the parts of the text, once they are needed.
+    places: OnceLock<Places>,
+}
+
+impl Loaded {
+    /// Packs a scene that was read from a text.
+    pub fn new(text: String, scene: Scene, description: Description) -> Loaded {
+        let packed = pack(&scene).without_layers(); // views of layers have their own kernels
+        Loaded {
+            text,
+            camera: description.camera.clone(),
+            description,
+            scene,
+            packed,
+            places: OnceLock::new(),
+        }
+    }
+
+    /// Adds the known locations of the parts of the text.
+    #[must_use]
+    pub(crate) fn with_places(mut self, places: Option<Places>) -> Loaded {
+        self.places = places.map_or_else(OnceLock::new, OnceLock::from);
+        self
+    }
+
+    /// Returns the pieces of the text. A large text is scanned only once.
+    pub(crate) fn pieces(&self) -> Pieces<'_> {
+        Pieces::known(&self.text, self.places.get_or_init(|| Places::of(&self.text)))
+    }
+}
+
+/// The constants of a kernel: its constants, the integrator, whether sampling is adaptive, and the layer that
+/// replaces color.
+pub type Constants = (Specialization, Integrator, bool, Option<LayerName>);
+
+/// Returns what a scene's kernel is compiled for, to show a view, and a layer of the shaders instead of color. The
+/// samples of such a layer are not adaptive: its variance says nothing about that of color.
+pub fn constants(packed: &Packed, view: View, layer: Option<LayerName>) -> Constants {
+    let adaptive = packed.adaptive && layer.is_none();
+    let integrator = packed.integrator;
+    let of_samples = view
+        .aov()
+        .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
+    let specialization = Specialization {
+        layers: (of_samples && integrator == Integrator::Path).into(),
+        ..packed.specialization
+    };
+    (specialization, integrator, adaptive, layer)
+}
+
+/// Returns what a kernel shows when a view is selected: color, if the view needs another kernel. A kernel with a
+/// layer of the shaders shows nothing else.
+pub fn shown(constants: &Constants, view: View) -> View {
+    let (specialization, integrator, adaptive, layer) = constants;
+    match (layer, view) {
+        (Some(layer), _) => View::Layer(*layer),
+        (None, View::Layer(_)) => View::Color,
+        (None, view) => match view.aov().map(|aov| aov.source(*integrator)) {
+            Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
+            Some(AovSource::Adaptive) if !adaptive => View::Color,
+            _ => view,
+        },
+    }
+}
+
+/// Returns whether two kernels differ in their views only.
+pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
+    let of_scene = |(specialization, integrator, ..): &Constants| {
+        let layers = 0;
+        (
+            Specialization {
+                layers,
+                ..*specialization
+            },
+            *integrator,
+        )
+    };
+    of_scene(a) == of_scene(b)
+}
+
+/// The state of all files at one moment.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The scene or its errors.
+    pub scene: Result<Arc<Loaded>, Vec<Diagnostic>>,
+    /// The shaders or their errors.
+    pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
+    /// Time spent on reading the files, and on packing the scene.
+    pub took: [Duration; 2],
+    /// The scene file and all files that the scene uses, with their states, which decide whether to read again.
+    pub files: Vec<(PathBuf, FileStamp)>,
+}
+
+/// The state of a file for comparison: the content of a scene file; length and modification time of files that may be
+/// large, such as models.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FileStamp {
+    /// The file cannot be read.
+    Absent,
+    /// The content of a text file.
+    Content(Vec<u8>),
+    /// Length and modification time.
+    Changed(u64, Option<SystemTime>),
+}
+
+impl FileStamp {
+    /// Returns the size in bytes.
+    pub fn size(&self) -> u64 {
+        match self {
+            FileStamp::Absent => 0,
+            FileStamp::Content(bytes) => bytes.len() as u64,
+            FileStamp::Changed(size, _) => *size,
+        }
+    }
+}
+
+impl Sources {
+    /// Returns the states of models, meshes and textures, in a snapshot and now.
+    pub fn assets(&self, snapshot: &Snapshot) -> [Vec<FileStamp>; 2] {
+        let texts = usize::from(!is_model(&self.scene));
+        let files = || snapshot.files.iter().skip(texts);
+        let then = files().map(|(_, stamp)| stamp.clone()).collect();
+        [then, files().map(|(path, _)| self.stamp(path)).collect()]
+    }
+
+    /// Returns why the scene file cannot be edited here, if that is so.
+    pub fn read_only(&self) -> Option<String> {
+        let kind = match &self.scene {
+            scene if is_gltf(scene) => "glTF",
+            scene if is_mesh(scene) => "a mesh",
+            scene if is_course(scene) => "JSON",
+            _ => return None,
+        };
+        Some(format!(
+            "{kind} files are read-only here; run `wgray convert` for an editable scene"
+        ))
+    }
+
+    /// Reads all files.
+    pub fn read(&self) -> Snapshot {
+        self.read_scene(self.read_shaders())
+    }
+
+    /// Reads what has changed since a snapshot; `None` if nothing has. Calls `begin` before it reads a scene.
+    pub fn reread(&self, last: &Snapshot, begin: impl FnOnce()) -> Option<Snapshot> {
+        let start = Instant::now();
+        let shaders = match (self.read_shaders(), &last.shaders) {
+            (Ok(new), Ok(old)) if new == *old => Ok(old.clone()), // the same pointer, which later stages compare
+            (shaders, _) => shaders,
+        };
+        let same_shaders = match (&shaders, &last.shaders) {
+            (Ok(new), Ok(old)) => Arc::ptr_eq(new, old),
+            (Err(new), Err(old)) => new == old,
+            _ => false,
+        };
+        let same_scene = last.files.iter().all(|(path, stamp)| self.stamp(path) == *stamp);
+        match (same_scene, same_shaders) {
+            (true, true) => None,
+            (true, false) => Some(Snapshot {
+                shaders,
+                took: [start.elapsed(), Duration::ZERO],
+                ..last.clone()
+            }),
+            (false, _) => {
+                begin();
+                let mut new = self.read_scene(shaders);
+                if new.files.len() == 1 {
+                    // The scene may be half written: the files of the last complete one are still watched.
+                    new.files.extend(
+                        last.files
+                            .iter()
+                            .skip(1)
+                            .map(|(path, _)| (path.clone(), self.stamp(path))),
+                    );
+                }
+                Some(new)
+            }
+        }
+    }
+
+    fn read_shaders(&self) -> Result<Arc<Shaders>, Box<Diagnostic>> {
+        let shaders = match &self.shaders {
+            Some(folder) => {
+                Shaders::read(folder).map_err(|error| Box::new(Diagnostic::plain("file", error.to_string())))?
+            }
+            None => Shaders::built_in(),
+        };
+        Ok(Arc::new(shaders))
+    }
+
+    fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>) -> Snapshot {
+        let start = Instant::now();
+        // States are taken first: a file that changes while it is read is read again.
+        let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
+        let mut named = BTreeSet::new();
+        let (mut text, origin) = (String::new(), self.scene.display().to_string());
+        let scene = match is_model(&self.scene) {
+            true => Scene::load_and_list(&self.scene, &self.overrides, &mut named),
+            false => read_text(&self.scene).and_then(|read| {
+                text = read;
+                let draft = Draft::read(&text, &origin, folder_of(&self.scene), &self.overrides)?;
+                let assets = self.named_files(&draft.description);
+                files.extend(assets.map(|path| (path.clone(), self.stamp(&path))));
+                draft.check(&mut named)
+            }),
+        };
+        // The files that the files themselves name are known now.
+        for path in named {
+            if files.iter().all(|(known, _)| *known != path) {
+                let stamp = self.stamp(&path);
+                files.push((path, stamp));
+            }
+        }
+        let mut took = [start.elapsed(), Duration::ZERO];
+        let scene = match scene {
+            Ok((scene, description)) => {
+                let start = Instant::now();
+                let loaded = Loaded::new(text, scene, description);
+                took[1] = start.elapsed();
+                Ok(Arc::new(loaded))
+            }
+            Err(error) => Err(Diagnostic::scene(&error, &text)),
+        };
+        Snapshot {
+            scene,
+            shaders,
+            took,
+            files,
+        }
+    }
+
+    /// Returns the files that a scene names.
+    fn named_files(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
+        described.files(self.scene.parent().unwrap_or(Path::new("")))
+    }
+
+    fn stamp(&self, path: &Path) -> FileStamp {
+        if path == self.scene && !is_model(path) {
+            return read_bytes(path).map_or(FileStamp::Absent, FileStamp::Content);
+        }
+        fs::metadata(path).map_or(FileStamp::Absent, |data| {
+            FileStamp::Changed(data.len(), data.modified().ok())
+        })
+    }
+
+    /// Returns the paths of the shader files.
+    pub fn shader_files(&self) -> impl Iterator<Item = PathBuf> {
+        let folder = self.shaders.iter();
+        folder.flat_map(|folder| compose::built_in().map(move |(name, _)| folder.join(name)))
+    }
+}

@@ -1,0 +1,302 @@
+//! The WebSocket of one viewer: commands and questions come in, states, answers and frames go out.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use axum::extract::ws::{Message, WebSocket};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt as _, StreamExt as _};
+use serde::{Deserialize, Serialize};
+use serde_json::Value as Json;
+use tokio::sync::{mpsc, watch};
+use tokio::time::{MissedTickBehavior, sleep, timeout};
+
+use super::messages::{self, Command};
+use super::object::{Listed, Object, SceneView};
+use super::picture::Frame;
+use super::server::Shared;
+use super::times::Time;
+use wgray_image::visible::visible;
+use wgray_scene::cut;
+
+/// Maximum number of frames that are sent but not acknowledged: the page draws one while the next one arrives. More would
+/// queue up on a slow connection, and delay everything behind them.
+const MAX_FRAMES_IN_FLIGHT: usize = 2;
+/// Minimum time between two states while that many frames are in flight: states must not fill a slow connection either.
+const STATE_INTERVAL: Duration = Duration::from_millis(100);
+/// Maximum number of answers that wait to be sent.
+const MAX_ANSWERS: usize = 64;
+/// Timeout for sending one message.
+const SEND_TIMEOUT: Duration = Duration::from_secs(30);
+/// Interval between reports of timings, while they change.
+const TIMES_INTERVAL: Duration = Duration::from_millis(500);
+/// Interval between pings. A viewer that sends nothing for three intervals is gone.
+const PING_INTERVAL: Duration = Duration::from_secs(15);
+
+/// A message of a viewer.
+#[derive(Debug, PartialEq)]
+enum Request {
+    /// Acknowledges the frame of this number and all before it. There is no answer.
+    Shown(u64),
+    Question(Question),
+    Command(Command),
+}
+
+/// A message that changes nothing.
+#[derive(Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Question {
+    /// Asks for the values of a pixel.
+    Pixel([u32; 2]),
+    /// Asks for the object at a pixel.
+    Object([u32; 2]),
+    /// Asks for an object by name.
+    Inspect(Inspect),
+    /// Asks for the objects whose names contain a text.
+    Objects(String),
+}
+
+/// An acknowledgement of frames.
+#[derive(Deserialize)]
+struct Acknowledgement {
+    shown: u64,
+}
+
+/// The names of questions in messages.
+const QUESTIONS: [&str; 4] = ["pixel", "object", "inspect", "objects"];
+
+/// An object by its name.
+#[derive(Debug, PartialEq, Deserialize)]
+struct Inspect {
+    name: String,
+    #[serde(default)]
+    material: Option<String>,
+}
+
+impl Request {
+    /// Parses a message: the name of a command, or an object with that name as its only key.
+    fn parse(message: &str) -> Result<Request, String> {
+        let plain = |error: serde_json::Error| visible(&cut(&error.to_string())).into_owned();
+        let value: Json = serde_json::from_str(message).map_err(|error| format!("not JSON: {}", plain(error)))?;
+        let name = match &value {
+            Json::String(name) => Some(name),
+            Json::Object(object) if object.len() == 1 => object.keys().next(),
+            _ => None,
+        };
+        let name =
+            name.ok_or("a message must be the name of a command, or an object with that name as its only key")?;
+        // From the text again: a JSON value hides that a key occurs twice.
+        let parsed = match name.as_str() {
+            "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::Shown(shown)),
+            name if QUESTIONS.contains(&name) => serde_json::from_str(message).map(Request::Question),
+            _ => serde_json::from_str(message).map(Request::Command),
+        };
+        parsed.map_err(|error| {
+            let shown = visible(&cut(name)).into_owned();
+            match error.to_string().starts_with(&format!("unknown variant `{name}`")) {
+                true => format!("unknown command \"{shown}\""),
+                false => format!("invalid arguments of \"{shown}\": {}", plain(error)),
+            }
+        })
+    }
+}
+
+/// A message to a viewer, other than a frame.
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Reply<'a> {
+    State(&'a messages::State),
+    Pixel {
+        x: u32,
+        y: u32,
+        values: Vec<(&'static str, String)>,
+    },
+    Object(Box<Object>),
+    Objects(Listed),
+    /// The number of an accepted command; [`messages::State::heard`] reaches it once the command is executed.
+    Asked(u64),
+    #[serde(rename = "refused")]
+    Refusal(String),
+    /// Timings of the stages.
+    Times(&'a [Time]),
+}
+
+/// Serves a viewer until it leaves or fails. Sending never blocks receiving: a command takes effect while a frame is
+/// being sent.
+pub(super) async fn serve(socket: WebSocket, shared: &Shared) -> Option<()> {
+    let (sink, stream) = socket.split();
+    let (answer, answers) = mpsc::channel(MAX_ANSWERS);
+    let (acknowledge, shown) = watch::channel(0);
+    tokio::select! {
+        end = send(sink, answers, shown, shared) => end,
+        end = receive(stream, &answer, &acknowledge, shared) => end,
+    }
+}
+
+/// Receives messages, acts on them and passes their answers on.
+async fn receive(
+    mut stream: SplitStream<WebSocket>,
+    answers: &mpsc::Sender<Reply<'static>>,
+    shown: &watch::Sender<u64>,
+    shared: &Shared,
+) -> Option<()> {
+    loop {
+        let text = match timeout(3 * PING_INTERVAL, stream.next()).await.ok()??.ok()? {
+            Message::Text(text) => text,
+            Message::Binary(_) | Message::Close(_) => return None,
+            Message::Ping(_) | Message::Pong(_) => continue,
+        };
+        let reply = match Request::parse(&text) {
+            Ok(Request::Shown(number)) => {
+                shown.send_replace(number);
+                continue;
+            }
+            Ok(Request::Question(question)) => answer(question, shared).await,
+            Ok(Request::Command(command)) => {
+                let busy = || Reply::Refusal("busy: the command was dropped".to_string());
+                (shared.send)(command).map_or_else(busy, Reply::Asked)
+            }
+            Err(error) => Reply::Refusal(format!("not understood: {error}")),
+        };
+        answers.send(reply).await.ok()?;
+    }
+}
+
+/// Sends what changes: the newest state and the newest frame, not every one.
+async fn send(
+    mut sink: SplitSink<WebSocket, Message>,
+    mut answers: mpsc::Receiver<Reply<'static>>,
+    mut shown: watch::Receiver<u64>,
+    shared: &Shared,
+) -> Option<()> {
+    let (mut state, mut frames) = (shared.state.clone(), shared.frames.clone());
+    state.mark_changed();
+    frames.mark_changed();
+    let mut ping = tokio::time::interval(PING_INTERVAL);
+    let mut clock = tokio::time::interval(TIMES_INTERVAL);
+    clock.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut times = Vec::new();
+    let mut in_flight = VecDeque::new();
+    let mut last_state: Option<Instant> = None;
+    loop {
+        let has_room = in_flight.len() < MAX_FRAMES_IN_FLIGHT;
+        let pause = last_state.map_or(Duration::ZERO, |last| STATE_INTERVAL.saturating_sub(last.elapsed()));
+        let pauses = !has_room && !pause.is_zero();
+        let message = tokio::select! {
+            biased;
+            reply = answers.recv() => text(&reply?)?,
+            changed = shown.changed() => {
+                changed.ok()?;
+                let shown = *shown.borrow_and_update();
+                in_flight.retain(|number| *number > shown);
+                continue;
+            }
+            changed = state.changed(), if !pauses => {
+                changed.ok()?;
+                last_state = Some(Instant::now());
+                let state = state.borrow_and_update().clone();
+                text(&Reply::State(&state))?
+            }
+            () = sleep(pause), if pauses => continue,
+            _ = ping.tick() => Message::Ping(Vec::new().into()),
+            changed = frames.changed(), if has_room => {
+                changed.ok()?;
+                let Some(frame) = frames.borrow_and_update().clone() else { continue };
+                in_flight.push_back(frame.header.number);
+                let start = Instant::now();
+                timeout(SEND_TIMEOUT, sink.send(Message::Binary(bytes(&frame)?.into()))).await.ok()?.ok()?;
+                shared.times.part("send", start.elapsed());
+                continue;
+            }
+            _ = clock.tick() => {
+                let now = shared.times.told();
+                if now == times {
+                    continue;
+                }
+                times = now;
+                text(&Reply::Times(&times))?
+            }
+        };
+        timeout(SEND_TIMEOUT, sink.send(message)).await.ok()?.ok()?;
+    }
+}
+
+async fn answer(question: Question, shared: &Shared) -> Reply<'static> {
+    match question {
+        Question::Pixel([x, y]) => {
+            let frame = shared.frames.borrow().clone();
+            let values = frame.and_then(|frame| frame.pixel(x, y)).unwrap_or_default();
+            Reply::Pixel { x, y, values }
+        }
+        Question::Object(pixel) => {
+            let nothing = move || Object::none("", Some(pixel));
+            let found = of_scene(shared, nothing, move |seen| seen.at(pixel)).await;
+            Reply::Object(Box::new(found))
+        }
+        Question::Inspect(Inspect { name, material }) => {
+            let nothing = || Object::none(&name, None);
+            let wanted = name.clone();
+            let found = of_scene(shared, nothing, move |seen| seen.object(&wanted, material.as_deref())).await;
+            Reply::Object(Box::new(found))
+        }
+        Question::Objects(part) => {
+            Reply::Objects(of_scene(shared, Listed::default, move |seen| seen.objects(&part)).await)
+        }
+    }
+}
+
+/// Looks something up in the scene on another thread, because the scene may be large. Returns `nothing` without a scene.
+async fn of_scene<T: Send + 'static>(
+    shared: &Shared,
+    nothing: impl Fn() -> T,
+    find: impl FnOnce(&SceneView) -> T + Send + 'static,
+) -> T {
+    let seen = shared.seen.borrow().clone();
+    let Some(seen) = seen else { return nothing() };
+    let found = tokio::task::spawn_blocking(move || find(&seen)).await;
+    found.unwrap_or_else(|_| nothing())
+}
+
+fn text(reply: &Reply) -> Option<Message> {
+    Some(Message::Text(serde_json::to_string(reply).ok()?.into()))
+}
+
+/// Returns a frame as a message: the length of the header as four bytes, little-endian, the header as JSON, and the images.
+fn bytes(frame: &Frame) -> Option<Vec<u8>> {
+    let header = serde_json::to_vec(&frame.header).ok()?;
+    let mut bytes = u32::try_from(header.len()).ok()?.to_le_bytes().to_vec();
+    bytes.extend(header);
+    frame.pictures.iter().for_each(|picture| bytes.extend(picture));
+    Some(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_parsed_and_errors_name_the_command() {
+        assert_eq!(Request::parse("\"grab\""), Ok(Request::Command(Command::Grab)));
+        assert_eq!(Request::parse("{\"shown\":7}"), Ok(Request::Shown(7)));
+        let pixel = Request::Question(Question::Pixel([1, 2]));
+        assert_eq!(Request::parse("{\"pixel\":[1,2]}"), Ok(pixel));
+        for (message, error) in [
+            ("{\"fly\":1}", "unknown command \"fly\""),
+            ("\"f\u{1b}ly\"", "not JSON: control character"),
+            (
+                "{\"gain\":\"x\"}",
+                "invalid arguments of \"gain\": invalid type: string \"x\"",
+            ),
+            ("{\"shown\":-1}", "invalid arguments of \"shown\": "),
+            ("{\"gain\":1,\"marks\":true}", "a message must be the name of a command"),
+            ("7", "a message must be the name of a command"),
+            ("{", "not JSON: EOF"),
+        ] {
+            let found = Request::parse(message).unwrap_err();
+            assert!(
+                found.starts_with(error) && !found.contains("enum"),
+                "{message}: {found}"
+            );
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! How far two pictures are apart: `wgray diff` without its command line. `docs/golden-pictures.md` says what each measure is.
+
+mod color_map;
+mod colors;
+mod flip;
+mod picture;
+mod plain;
+mod show;
+mod ssim;
+
+pub use color_map::color;
+pub use flip::{Flip, Map, PIXELS_PER_DEGREE, flip};
+pub use picture::{Channel, Kind, Picture, Plane, Unreadable};
+pub use plain::{COLOR, Difference, Largest, Layer, PixelCoord, Values, layer_of, layers};
+pub use show::{Shown, show, step};
+pub use ssim::ssim;

@@ -1,0 +1,140 @@
+//! Panics of libraries, contained: what they panic for is an error here. wgpu 30 panics where it waits for a device that is
+//! lost, and some of what it drops does too.
+
+use std::any::Any;
+use std::cell::Cell;
+use std::mem::ManuallyDrop;
+use std::ops::Deref;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+thread_local! {
+    static DEPTH: Cell<u32> = const { Cell::new(0) };
+}
+
+/// Whether a panic of this thread, now, would be contained. A program's panic hook that asks this can be silent, as the
+/// error is told by whoever contains it; [`install_quiet_hook`] installs such a hook.
+pub fn is_contained() -> bool {
+    DEPTH.try_with(Cell::get).is_ok_and(|depth| depth > 0)
+}
+
+/// Sets a panic hook that says nothing of panics that are contained, and leaves all others to the hook of before.
+pub fn install_quiet_hook() {
+    let before = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        if !is_contained() {
+            before(info);
+        }
+    }));
+}
+
+/// Runs calls to a library.
+///
+/// # Errors
+///
+/// The message of their panic. What the calls have touched is fit for being dropped, and for nothing else.
+pub fn contained<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
+    let _inside = Inside::enter();
+    catch_unwind(AssertUnwindSafe(calls)).map_err(|panic| message(panic.as_ref()))
+}
+
+pub use contained as catch_panic;
+
+fn message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    // Of several lines one: wgpu lists causes below each other.
+    let lines = text.unwrap_or("it panicked").lines().map(str::trim);
+    lines.filter(|line| !line.is_empty()).collect::<Vec<_>>().join(": ")
+}
+
+/// Counted while it lives.
+struct Inside;
+
+impl Inside {
+    fn enter() -> Inside {
+        let _ = DEPTH.try_with(|depth| depth.set(depth.get() + 1)); // a thread that ends has none, and its panics are told
+        Inside
+    }
+}
+
+impl Drop for Inside {
+    fn drop(&mut self) {
+        let _ = DEPTH.try_with(|depth| depth.set(depth.get().saturating_sub(1)));
+    }
+}
+
+/// A library's value whose drop may panic, which then is contained.
+#[derive(Clone)]
+pub struct DropContained<T>(ManuallyDrop<T>);
+
+impl<T> DropContained<T> {
+    /// Takes the value.
+    pub fn new(value: T) -> DropContained<T> {
+        DropContained(ManuallyDrop::new(value))
+    }
+}
+
+impl<T> Deref for DropContained<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T> Drop for DropContained<T> {
+    fn drop(&mut self) {
+        // SAFETY: the value is not used any more.
+        let value = unsafe { ManuallyDrop::take(&mut self.0) };
+        let _ = contained(|| drop(value)); // nobody is left to be told
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Bad;
+
+    impl Drop for Bad {
+        fn drop(&mut self) {
+            panic!("in a drop");
+        }
+    }
+
+    #[test]
+    fn a_panic_is_an_error_with_its_message() {
+        assert_eq!(contained(|| 7), Ok(7));
+        assert_eq!(contained(|| panic!("text")), Err::<(), _>("text".to_string()));
+        let causes = "Error in Device::poll: Validation Error\n\nCaused by:\n  Parent device is lost\n";
+        let told = contained(|| panic!("{causes}"));
+        let line = "Error in Device::poll: Validation Error: Caused by:: Parent device is lost";
+        assert_eq!(told, Err::<(), _>(line.to_string()));
+        assert_eq!(
+            contained(|| std::panic::panic_any(7)),
+            Err::<(), _>("it panicked".to_string())
+        );
+    }
+
+    #[test]
+    fn panics_are_contained_inside_alone() {
+        assert!(!is_contained());
+        let inner = contained(|| {
+            let deeper = contained(|| panic!("deeper"));
+            assert_eq!(deeper, Err::<(), _>("deeper".to_string()));
+            is_contained()
+        });
+        assert_eq!(inner, Ok(true));
+        assert_eq!(
+            contained(|| std::thread::spawn(is_contained).join().ok()),
+            Ok(Some(false))
+        );
+        assert!(!is_contained());
+    }
+
+    #[test]
+    fn a_drop_that_panics_is_contained_where_others_are_not() {
+        drop(DropContained::new(Bad));
+        assert!(catch_unwind(|| drop(Bad)).is_err(), "which by itself is not");
+    }
+}

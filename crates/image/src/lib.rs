@@ -1,0 +1,27 @@
+//! Images without a renderer: regions, colour and view transforms, atomic files, comparison; and the handling of memory and paths that every
+//! layer of wgray shares.
+
+mod agx;
+pub mod color;
+pub mod compare;
+mod complete;
+pub mod contain;
+mod difference;
+mod file;
+pub mod memory;
+mod output;
+mod pixels;
+mod region;
+mod temporary;
+mod view;
+pub mod visible;
+pub mod waiting;
+
+pub use complete::is_complete;
+pub use difference::{Difference, difference};
+pub use file::{Pending, beside, remove_stale_beside};
+pub use output::Output;
+pub use pixels::Pixels;
+pub use region::Region;
+pub use temporary::remove_temporary_files;
+pub use view::{GAMMA, ViewSettings, ViewTransform, encode, to_8_bits, to_16_bits};

@@ -1,0 +1,12 @@
+//! Images in memory.
+
+/// A picture in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pixels {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Linear RGB, row by row from the top.
+    pub colors: Vec<[f32; 3]>,
+}

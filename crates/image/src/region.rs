@@ -1,0 +1,76 @@
+//! Rectangles of pixels.
+
+use std::fmt;
+
+/// A rectangle of pixels of a picture, half-open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// First column.
+    pub x0: u32,
+    /// First row, from the top.
+    pub y0: u32,
+    /// One past the last column.
+    pub x1: u32,
+    /// One past the last row.
+    pub y1: u32,
+}
+
+impl Region {
+    /// The whole of a picture.
+    pub fn whole(width: u32, height: u32) -> Region {
+        Region {
+            x0: 0,
+            y0: 0,
+            x1: width,
+            y1: height,
+        }
+    }
+
+    /// Columns; 0 if the last is before the first.
+    pub fn width(&self) -> u32 {
+        self.x1.saturating_sub(self.x0)
+    }
+
+    /// Rows; 0 if the last is before the first.
+    pub fn height(&self) -> u32 {
+        self.y1.saturating_sub(self.y0)
+    }
+
+    /// Whether it has no pixels.
+    pub fn is_empty(&self) -> bool {
+        self.pixels() == 0
+    }
+
+    /// Pixels.
+    pub fn pixels(&self) -> u64 {
+        u64::from(self.width()) * u64::from(self.height())
+    }
+
+    /// The region and the pixels beside it, which may be outside of a picture.
+    pub fn with_neighbors(&self) -> Region {
+        Region {
+            x0: self.x0.saturating_sub(1),
+            y0: self.y0.saturating_sub(1),
+            x1: self.x1.saturating_add(1),
+            y1: self.y1.saturating_add(1),
+        }
+    }
+
+    /// The part that is in another region too.
+    pub fn within(&self, other: Region) -> Region {
+        let x = |x: u32| x.max(other.x0).min(other.x1);
+        let y = |y: u32| y.max(other.y0).min(other.y1);
+        Region {
+            x0: x(self.x0),
+            y0: y(self.y0),
+            x1: x(self.x1),
+            y1: y(self.y1),
+        }
+    }
+}
+
+impl fmt::Display for Region {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{},{},{}", self.x0, self.y0, self.x1, self.y1)
+    }
+}

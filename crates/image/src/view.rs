@@ -1,0 +1,498 @@
+//! View transforms: from linear light to what a display is sent, 0 to 1, before it is rounded to whole numbers.
+//!
+//! Light is linear RGB with the primaries of sRGB (Rec. 709, D65). What is no number counts as 0, an infinite value as the
+//! largest finite one, and what is negative, for which a display has no light, as 0.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::agx::agx;
+use crate::color::{linear_to_srgb, srgb_to_linear};
+
+/// From linear light to what a display is sent. In a file the names are those of [`ViewTransform::name`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
+pub enum ViewTransform {
+    /// Clamped to 0 ... 1, to the power 1/2.2.
+    #[default]
+    #[serde(rename = "gamma22")]
+    Gamma22,
+    /// Clamped to 0 ... 1, then the curve of sRGB.
+    #[serde(rename = "srgb")]
+    Srgb,
+    /// AgX: bright colours go to white gradually, as on film. Without a look.
+    #[serde(rename = "agx")]
+    Agx,
+    /// Khronos' PBR Neutral: colours stay as they are up to a brightness, those above it are compressed.
+    #[serde(rename = "khronos-pbr-neutral")]
+    KhronosPbrNeutral,
+}
+
+impl ViewTransform {
+    /// All of them.
+    pub const ALL: [ViewTransform; 4] = [
+        ViewTransform::Gamma22,
+        ViewTransform::Srgb,
+        ViewTransform::Agx,
+        ViewTransform::KhronosPbrNeutral,
+    ];
+
+    /// The name in files and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ViewTransform::Gamma22 => "gamma22",
+            ViewTransform::Srgb => "srgb",
+            ViewTransform::Agx => "agx",
+            ViewTransform::KhronosPbrNeutral => "khronos-pbr-neutral",
+        }
+    }
+}
+
+/// How a picture is shown. What is kept as numbers, such as OpenEXR, takes neither.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ViewSettings {
+    /// From linear light to what a display is sent.
+    pub transform: ViewTransform,
+    /// Stops, -100 to 100: light is multiplied by 2 to this power before the transform.
+    pub exposure: f64,
+}
+
+impl ViewSettings {
+    /// The most stops, up or down: light stays far inside of what 64-bit floats hold.
+    pub const MOST_STOPS: f64 = 100.0;
+
+    /// The rule of an exposure that breaks it.
+    pub fn check_exposure(stops: f64) -> Result<f64, String> {
+        match stops.abs() <= ViewSettings::MOST_STOPS {
+            true => Ok(stops),
+            false => Err("must be from -100 to 100 stops".to_owned()),
+        }
+    }
+}
+
+/// A colour in 64-bit floats.
+pub(crate) type Rgb = [f64; 3];
+
+impl ViewSettings {
+    /// What a display is sent for a linear colour: each from 0 to 1.
+    pub fn display(&self, linear: [f32; 3]) -> [f64; 3] {
+        transformed(self.transform, self.exposed(linear))
+    }
+
+    /// Returns the light that is displayed as this color, 0 to 1 each, or nearly so if no light is.
+    pub fn light_of(&self, display: [f64; 3]) -> [f64; 3] {
+        let factor = self.exposure.exp2();
+        inverse(self.transform, display).map(|light| light / factor)
+    }
+
+    /// What a display is sent for a share of light, such as an albedo: its curve alone.
+    pub fn display_share(&self, share: [f32; 3]) -> [f64; 3] {
+        match self.transform {
+            ViewTransform::Gamma22 => share.map(sane).map(gamma22),
+            _ => share.map(sane).map(srgb),
+        }
+    }
+
+    /// Light with its exposure.
+    fn exposed(&self, linear: [f32; 3]) -> Rgb {
+        let factor = self.exposure.exp2();
+        linear.map(|value| sane(value) * factor)
+    }
+
+    /// The same in 8 bits each.
+    pub fn rgb8(&self, linear: [f32; 3]) -> [u8; 3] {
+        self.display(linear).map(to_8_bits)
+    }
+
+    /// What a display is sent for a colour that is weighted by its alpha: the colour of what is there by itself, black where
+    /// nothing is; then the share that it covers, linear.
+    pub fn display_straight(&self, linear: [f32; 3], alpha: f32) -> [f64; 4] {
+        let by_itself = linear.map(|value| if alpha > 0.0 { value / alpha } else { 0.0 });
+        let [r, g, b] = self.display(by_itself);
+        [r, g, b, sane(alpha).min(1.0)]
+    }
+
+    /// The same in 8 bits each.
+    pub fn rgba8(&self, linear: [f32; 3], alpha: f32) -> [u8; 4] {
+        self.display_straight(linear, alpha).map(to_8_bits)
+    }
+
+    /// Whether the values are encoded as sRGB has it.
+    pub fn is_srgb(&self) -> bool {
+        self.transform != ViewTransform::Gamma22
+    }
+}
+
+fn transformed(transform: ViewTransform, light: Rgb) -> Rgb {
+    match transform {
+        ViewTransform::Gamma22 => light.map(gamma22),
+        ViewTransform::Srgb => light.map(srgb),
+        ViewTransform::Agx => agx(light).map(srgb),
+        ViewTransform::KhronosPbrNeutral => khronos_pbr_neutral(light).map(srgb),
+    }
+}
+
+/// Returns the light that is displayed as a color, or nearly so if none is displayed as it: then the nearest of what [`solution`] finds and
+/// the multiples of the linear color.
+fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
+    const EXACT: f64 = 0.5 / 255.0;
+    let distance = |light: &Rgb| {
+        let found = transformed(transform, *light);
+        let squares = (0..3).map(|i| (found[i] - display[i]).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let found = solution(transform, display);
+    if distance(&found) < EXACT {
+        return found;
+    }
+    let linear = display.map(srgb_to_linear);
+    let multiples = (0..=400).map(|i| linear.map(|x| x * (0.025 * f64::from(i - 200)).exp2()));
+    let all = multiples.chain([found]);
+    all.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(found)
+}
+
+/// Solves `transformed(transform, light) == display` by bisection of one channel after the other, as each grows with its own light.
+fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
+    /// The maximum light of a channel. PBR Neutral only approaches white.
+    const MAX_LIGHT: f64 = 1e3;
+    /// A displayed value that is rounded to white in 8 bits.
+    const NEARLY_WHITE: f64 = 1.0 - 0.25 / 255.0;
+    const SWEEPS: usize = 100;
+    const BISECTIONS: usize = 60;
+    let [white, ..] = transformed(transform, [MAX_LIGHT; 3]);
+    let goal = display.map(|value| {
+        if value <= white + 1e-9 {
+            value.min(white)
+        } else {
+            NEARLY_WHITE
+        }
+    });
+    let mut light = [0.18; 3];
+    for _ in 0..SWEEPS {
+        for channel in 0..3 {
+            let (mut low, mut high) = (0.0, MAX_LIGHT);
+            for _ in 0..BISECTIONS {
+                light[channel] = 0.5 * (low + high);
+                match transformed(transform, light)[channel] < goal[channel] {
+                    true => low = light[channel],
+                    false => high = light[channel],
+                }
+            }
+            light[channel] = if goal[channel] > 0.0 { high } else { 0.0 };
+        }
+    }
+    light
+}
+
+/// A linear value as 8 bits by [`ViewTransform::Gamma22`]: clamped to [0, 1], raised to the power 1/2.2, times 255, rounded to
+/// the nearest whole number; 0 if it is no number.
+pub fn encode(linear: f32) -> u8 {
+    to_8_bits(gamma22(sane(linear)))
+}
+
+/// The nearest of 256 steps from 0 to 1; halves go up.
+pub fn to_8_bits(value: f64) -> u8 {
+    (value * 255.0 + 0.5) as u8 // the conversion saturates, and takes NaN to 0
+}
+
+/// The nearest of 65,536 steps from 0 to 1; halves go up.
+pub fn to_16_bits(value: f64) -> u16 {
+    (value * 65_535.0 + 0.5) as u16
+}
+
+/// A value as light: not negative, and finite.
+fn sane(value: f32) -> f64 {
+    match value > 0.0 {
+        true => f64::from(value.min(f32::MAX)),
+        false => 0.0, // NaN too
+    }
+}
+
+/// The exponent of the course's display curve.
+pub const GAMMA: f64 = 1.0 / 2.2;
+
+/// Clamped, and to the power 1/2.2.
+fn gamma22(light: f64) -> f64 {
+    light.min(1.0).powf(GAMMA)
+}
+
+/// Clamped and encoded.
+fn srgb(light: f64) -> f64 {
+    linear_to_srgb(light.clamp(0.0, 1.0))
+}
+
+/// PBR Neutral: Khronos Group, "PBR Neutral Tone Mapper" specification (2024), with its F90 = 0.04, Ks = 0.8 - 0.04 and Kd = 0.15.
+/// Linear light up to 1.
+fn khronos_pbr_neutral(light: Rgb) -> Rgb {
+    const F90: f64 = 0.04;
+    const START: f64 = 0.8 - F90;
+    const DESATURATION: f64 = 0.15;
+    let least = smallest(light);
+    let offset = match least <= 2.0 * F90 {
+        true => least - least * least / (4.0 * F90),
+        false => F90,
+    };
+    let light = light.map(|value| value - offset);
+    let peak = largest(light);
+    if peak <= START {
+        return light;
+    }
+    let room = 1.0 - START;
+    let shown = 1.0 - room * room / (peak + room - START);
+    let white = 1.0 - 1.0 / (DESATURATION * (peak - shown) + 1.0);
+    light.map(|value| mix(value * (shown / peak), shown, white))
+}
+
+fn smallest([r, g, b]: Rgb) -> f64 {
+    r.min(g).min(b)
+}
+
+fn largest([r, g, b]: Rgb) -> f64 {
+    r.max(g).max(b)
+}
+
+fn mix(a: f64, b: f64, share: f64) -> f64 {
+    a * (1.0 - share) + b * share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(transform: ViewTransform) -> ViewSettings {
+        ViewSettings {
+            transform,
+            exposure: 0.0,
+        }
+    }
+
+    /// The largest difference of two colours.
+    fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_light_of_a_displayed_color_is_displayed_as_it() {
+        for transform in ViewTransform::ALL {
+            for exposure in [0.0, -2.0, 3.5] {
+                let view = ViewSettings { transform, exposure };
+                for color in [
+                    [255, 255, 255],
+                    [0, 0, 0],
+                    [128, 128, 128],
+                    [20, 20, 20],
+                    [254, 254, 254],
+                    [200, 180, 160],
+                    [90, 140, 200],
+                    [240, 230, 220],
+                ] {
+                    let light = view.light_of(color.map(|value| f64::from(value) / 255.0));
+                    let shown = view.rgb8(light.map(|value| value as f32));
+                    assert_eq!(shown, color, "{view:?}: {light:?}");
+                }
+            }
+        }
+        // The curve of sRGB is inverted exactly.
+        let srgb = view(ViewTransform::Srgb).light_of([1.0, 0.5, 0.0]);
+        assert!(apart(srgb, [1.0, 0.214_041_14, 0.0]) < 1e-8, "{srgb:?}");
+    }
+
+    /// In each of the standard's branches, and where they meet.
+    #[test]
+    fn srgb_has_the_values_of_its_standard() {
+        for (linear, shown) in [
+            (0.0, 0.0),
+            (0.001, 0.01292),
+            (0.003_130_8, 0.040_449_9),
+            (0.214_041_14, 0.5),
+            (0.5, 0.735_356_98),
+            (1.0, 1.0),
+            (7.0, 1.0),
+        ] {
+            let found = view(ViewTransform::Srgb).display([linear; 3]);
+            assert!(apart(found, [shown; 3]) < 1e-6, "{linear}: {found:?}");
+        }
+        let gamma = view(ViewTransform::Gamma22).display([0.5; 3]);
+        assert!(apart(gamma, [0.735_356_98; 3]) > 1e-3, "another curve is seen");
+    }
+
+    /// The specification's own: greys lose 0.04 up to 0.8, those of 0.08 or less are x² / 0.16; primaries keep what they are up to
+    /// 0.76; above it the brightest is 1 - 0.0576 / (x - 0.52), and the others are drawn to it.
+    #[test]
+    fn neutral_keeps_colours_up_to_a_brightness() {
+        let neutral = view(ViewTransform::KhronosPbrNeutral);
+        let srgb = view(ViewTransform::Srgb);
+        for (light, linear) in [
+            ([0.5, 0.5, 0.5], [0.46, 0.46, 0.46]),
+            ([0.08, 0.08, 0.08], [0.04, 0.04, 0.04]),
+            ([0.04, 0.04, 0.04], [0.01, 0.01, 0.01]),
+            ([0.76, 0.0, 0.3], [0.76, 0.0, 0.3]),
+            ([2.04, 2.04, 2.04], [0.961_081_1; 3]),
+        ] {
+            let (found, expected) = (neutral.display(light), srgb.display(linear));
+            assert!(apart(found, expected) < 1e-6, "{light:?}: {found:?}, {expected:?}");
+        }
+        // x = 2 has a peak of 2 and is shown as 1 - 0.0576 / 1.48; the share of white is 1 - 1 / (0.15 (2 - that) + 1).
+        let peak = 1.0 - 0.0576 / 1.48;
+        let white = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
+        let expected = srgb.display([peak as f32, (peak * white) as f32, (peak * white) as f32]);
+        assert!(apart(neutral.display([2.0, 0.0, 0.0]), expected) < 1e-6);
+    }
+
+    #[test]
+    fn colors_that_are_not_displayed_exactly_have_a_near_one() {
+        let distance = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>();
+        for transform in [ViewTransform::KhronosPbrNeutral, ViewTransform::Agx] {
+            let view = view(transform);
+            let shown = |light: [f64; 3]| view.display(light.map(|x| x as f32));
+            for color in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0]] {
+                let found = distance(shown(view.light_of(color)), color);
+                for other in [color.map(srgb_to_linear), solution(transform, color)] {
+                    assert!(found < distance(shown(other), color), "{transform:?} {color:?}");
+                }
+            }
+        }
+        let [red, green, blue] = view(ViewTransform::KhronosPbrNeutral).display(
+            view(ViewTransform::KhronosPbrNeutral)
+                .light_of([1.0, 0.0, 0.0])
+                .map(|x| x as f32),
+        );
+        assert!(red > 0.85 && green < 0.15 && blue < 0.15, "{red} {green} {blue}");
+    }
+
+    /// By `benches/peers/view_check.py`: its own formula in numpy, and what Blender's tables have.
+    #[test]
+    fn agx_is_that_of_blender() {
+        let agx = view(ViewTransform::Agx);
+        for (light, formula, blender) in [
+            ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+            ([0.18, 0.18, 0.18], [0.461_356; 3], [0.4613, 0.4613, 0.4614]),
+            ([1.0, 1.0, 1.0], [0.771_101; 3], [0.771, 0.771, 0.771]),
+            ([16.0, 16.0, 16.0], [0.999_14; 3], [0.9985, 0.9985, 0.9985]),
+            (
+                [1.0, 0.0, 0.0],
+                [0.858_59, 0.224_071, 0.132_639],
+                [0.858, 0.2241, 0.1292],
+            ),
+            (
+                [0.0, 4.0, 0.0],
+                [0.718_556, 0.919_514, 0.660_69],
+                [0.7179, 0.9192, 0.6598],
+            ),
+            ([0.0, 0.0, 0.05], [0.0, 0.032_873, 0.220_254], [0.0, 0.0467, 0.2084]),
+            (
+                [0.8, 0.3, 0.1],
+                [0.769_65, 0.556_776, 0.403_772],
+                [0.7691, 0.5567, 0.4026],
+            ),
+            ([20.0, 5.0, 0.5], [1.0, 0.922_445, 0.862_342], [1.0, 0.9226, 0.8624]),
+            ([0.3, 2.5, 40.0], [0.899_475, 0.936_018, 1.0], [0.8941, 0.9365, 1.0]),
+        ] {
+            let found = agx.display(light);
+            assert!(apart(found, formula) < 2e-5, "{light:?}: {found:?}, {formula:?}");
+            assert!(apart(found, blender) < 0.015, "{light:?}: {found:?}, {blender:?}");
+        }
+        let grey = agx.display([0.18; 3]);
+        assert!(
+            apart(grey, view(ViewTransform::Srgb).display([0.18; 3])) < 2e-4,
+            "middle grey stays"
+        );
+        assert!(apart(agx.display([1.0; 3]), view(ViewTransform::Srgb).display([1.0; 3])) > 0.2);
+    }
+
+    #[test]
+    fn exposure_multiplies_light() {
+        for transform in ViewTransform::ALL {
+            let light = [0.05, 0.2, 0.4];
+            let brighter = ViewSettings {
+                transform,
+                exposure: 1.0,
+            };
+            assert_eq!(brighter.display(light), view(transform).display(light.map(|x| 2.0 * x)));
+            assert_ne!(brighter.display(light), view(transform).display(light));
+            let share = brighter.display_share(light);
+            assert_eq!(share, view(transform).display_share(light), "an albedo is no light");
+        }
+        for (stops, fits) in [
+            (100.0, true),
+            (-100.0, true),
+            (100.5, false),
+            (f64::NAN, false),
+            (f64::INFINITY, false),
+        ] {
+            assert_eq!(ViewSettings::check_exposure(stops).is_ok(), fits, "{stops}");
+        }
+    }
+
+    /// Whatever comes out of a render is something from 0 to 1.
+    #[test]
+    fn every_value_can_be_shown() {
+        let values = [
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            -1.0,
+            -0.0,
+            0.0,
+            1e-45,
+            0.5,
+            1e30,
+            f32::MAX,
+        ];
+        for transform in ViewTransform::ALL {
+            for exposure in [-100.0, 0.0, 100.0] {
+                let settings = ViewSettings { transform, exposure };
+                for (r, g, b) in values
+                    .iter()
+                    .flat_map(|r| values.map(move |g| (*r, g, values)))
+                    .flat_map(|(r, g, all)| all.map(|b| (r, g, b)))
+                {
+                    let shown = settings.display([r, g, b]);
+                    assert!(
+                        shown.iter().all(|x| (0.0..=1.0).contains(x)),
+                        "{settings:?} {r} {g} {b}: {shown:?}"
+                    );
+                    let straight = settings.display_straight([r, g, b], g);
+                    assert!(
+                        straight.iter().all(|x| (0.0..=1.0).contains(x)),
+                        "{settings:?} {r} {g} {b}: {straight:?}"
+                    );
+                }
+            }
+            assert_eq!(view(transform).rgb8([f32::NAN, -1.0, f32::NEG_INFINITY]), [0; 3]);
+            assert_eq!(view(transform).rgb8([f32::INFINITY; 3]), [255; 3]);
+            assert_eq!(view(transform).rgb8([1e30; 3]), [255; 3]);
+        }
+    }
+
+    /// Brighter light is never shown darker.
+    #[test]
+    fn greys_keep_their_order() {
+        for transform in ViewTransform::ALL {
+            let mut last = 0.0;
+            for i in 0..4000 {
+                let light = 1e-6 * 1.008_f32.powi(i);
+                let [r, g, b] = view(transform).display([light; 3]);
+                assert!(
+                    (r - g).abs() < 1e-6 && (g - b).abs() < 1e-6,
+                    "{transform:?}: {light} is grey: {r} {g} {b}"
+                );
+                assert!(r >= last - 1e-9, "{transform:?}: {light}: {r} after {last}");
+                last = r;
+            }
+            assert!(last > 0.999, "{transform:?}: {last}");
+        }
+    }
+
+    #[test]
+    fn values_are_rounded_to_the_nearest_step() {
+        assert_eq!(
+            [0.0, 0.5 / 255.0, 0.49 / 255.0, 1.0, f64::NAN].map(to_8_bits),
+            [0, 1, 0, 255, 0]
+        );
+        assert_eq!(
+            [0.0, 0.5 / 65_535.0, 0.49 / 65_535.0, 1.0].map(to_16_bits),
+            [0, 1, 0, 65_535]
+        );
+        assert_eq!(to_16_bits(f64::NAN), 0);
+    }
+}

@@ -1,0 +1,74 @@
+//! Files that never end, or would have their reader wait for ever, by the names that somebody gave.
+
+use std::fs::{self, FileType};
+use std::io;
+use std::path::Path;
+
+/// Refuses devices, and pipes that have a name: opening one waits for a writer. A pipe without a name, such as standard input or
+/// what a shell makes of `<(...)`, has somebody who writes. What is not there is nothing of this.
+pub fn check(path: &Path) -> io::Result<()> {
+    let Ok(data) = fs::metadata(path) else { return Ok(()) };
+    let refused = |rule| Err(io::Error::new(io::ErrorKind::InvalidInput, rule));
+    match kind(data.file_type()) {
+        Kind::Device => refused("it is a device, and must be a file"),
+        // The link of a pipe without a name leads nowhere.
+        Kind::Pipe if path.canonicalize().is_ok() => {
+            refused("it is a named pipe, which may never deliver data; it must be a file")
+        }
+        _ => Ok(()),
+    }
+}
+
+enum Kind {
+    Device,
+    Pipe,
+    Other,
+}
+
+#[cfg(unix)]
+fn kind(of: FileType) -> Kind {
+    use std::os::unix::fs::FileTypeExt as _;
+    match () {
+        () if of.is_char_device() || of.is_block_device() => Kind::Device,
+        () if of.is_fifo() => Kind::Pipe,
+        () => Kind::Other,
+    }
+}
+
+#[cfg(not(unix))]
+fn kind(_: FileType) -> Kind {
+    Kind::Other
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pipes_with_names_and_devices_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+        assert!(made.success());
+        assert!(check(&pipe).unwrap_err().to_string().contains("a named pipe"));
+        assert!(
+            check(Path::new("/dev/zero"))
+                .unwrap_err()
+                .to_string()
+                .contains("a device")
+        );
+        let file = folder.path().join("file");
+        fs::write(&file, "").unwrap();
+        for good in [&file, folder.path(), &folder.path().join("none")] {
+            check(good).unwrap();
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn pipes_without_names_are_read() {
+        use std::os::fd::AsRawFd as _;
+        let (reader, _writer) = io::pipe().unwrap();
+        check(Path::new(&format!("/proc/self/fd/{}", reader.as_raw_fd()))).unwrap();
+    }
+}

@@ -1,0 +1,256 @@
+//! The twins over threads.
+
+use std::ops::Range;
+
+use glam::{UVec2, Vec4};
+use rayon::prelude::*;
+
+use super::adaptive::{look_with, moments_with, samples_wanted, whole_look};
+use super::geometry::pixel_first_hit;
+use super::pixel::{Layers, pixel_radiance};
+use crate::backend::{Backend, Rules, Started};
+use crate::error::RenderError;
+use crate::film::{Film, Layer};
+use crate::pack::{FirstHit, Packed};
+use wgray_image::Region;
+
+/// A scene on the CPU. A call does its work in [`Backend::poll`] or [`Backend::wait`], on the current pool of threads.
+pub struct Cpu<'a> {
+    scene: &'a Packed,
+    rules: Rules,
+    film: Option<(Film, Started)>,
+    /// The call that was submitted.
+    pending: Option<(Region, Range<u32>)>,
+}
+
+impl<'a> Cpu<'a> {
+    /// A renderer of a scene.
+    pub fn new(scene: &'a Packed) -> Cpu<'a> {
+        Cpu {
+            scene,
+            rules: Rules::of(scene),
+            film: None,
+            pending: None,
+        }
+    }
+
+    /// The film, not copied.
+    pub fn into_film(self) -> Option<Film> {
+        self.film.map(|(film, _)| film)
+    }
+
+    fn idle(&self) -> Result<(), RenderError> {
+        match self.pending {
+            Some(_) => Err(RenderError::Pending),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Pixels of a row that one thread takes at a time.
+const RUN: usize = 32;
+
+impl Backend for Cpu<'_> {
+    fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+        self.idle()?;
+        let started = self.rules.begin(region)?;
+        self.film = Some((self.rules.empty_film(region), started));
+        Ok(())
+    }
+
+    fn resume(&mut self, film: Film) -> Result<(), RenderError> {
+        self.idle()?;
+        let started = self.rules.resume(&film)?;
+        self.film = Some((film, started));
+        Ok(())
+    }
+
+    fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        self.idle()?;
+        let (_, started) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
+        if self.rules.call(started, tile, &samples)? {
+            self.pending = Some((tile, samples));
+        }
+        Ok(())
+    }
+
+    fn poll(&mut self) -> Result<bool, RenderError> {
+        if let (Some((tile, mut samples)), Some((film, _))) = (self.pending.take(), &mut self.film) {
+            while !samples.is_empty() {
+                let end = self.rules.end_of_part(&samples);
+                add_samples(self.scene, film, tile, samples.start..end);
+                samples.start = end;
+            }
+        }
+        Ok(true)
+    }
+
+    fn wait(&mut self) -> Result<(), RenderError> {
+        self.poll().map(|_| ())
+    }
+
+    fn film(&mut self) -> Result<Film, RenderError> {
+        self.idle()?;
+        let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
+        Ok(film.clone())
+    }
+
+    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        self.idle()?;
+        self.rules.in_picture(region)?;
+        let rows = (region.y0..region.y1).into_par_iter();
+        let pixels = rows.flat_map_iter(|y| (region.x0..region.x1).map(move |x| UVec2::new(x, y)));
+        Ok(pixels.map(|pixel| pixel_first_hit(self.scene, pixel)).collect())
+    }
+
+    fn samples_of_all(&self) -> u32 {
+        self.rules.samples_of_all()
+    }
+
+    fn around(&self, region: Region) -> Region {
+        self.rules.around(region)
+    }
+
+    fn largest_film(&self) -> u64 {
+        u64::MAX
+    }
+}
+
+/// Adds samples to a tile of a film: either first ones or further ones, where that makes a difference.
+fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32>) {
+    let Film {
+        region,
+        sums,
+        moments,
+        looks,
+        layers,
+    } = film;
+    let region = *region;
+    let first_looks = scene.adaptive && samples.start < scene.specialization.first_look;
+    let (looks_to_read, looks_to_write) = match first_looks {
+        true => (&[][..], &mut looks[..]),
+        false => (&looks[..], &mut [][..]),
+    };
+    let runs = |records| runs(region, records, tile).into_iter();
+    let sums = runs(sums);
+    let mut parts: Vec<Run> = sums
+        .map(|(first, sums)| Run {
+            first,
+            sums,
+            moments: &mut [],
+            looks: &mut [],
+            layers: Default::default(),
+        })
+        .collect();
+    for (part, (_, moments)) in parts.iter_mut().zip(runs(moments)) {
+        part.moments = moments;
+    }
+    for (part, (_, looks)) in parts.iter_mut().zip(runs(looks_to_write)) {
+        part.looks = looks;
+    }
+    for (i, layer) in layers.iter_mut().enumerate() {
+        for (part, (_, layer)) in parts.iter_mut().zip(runs(layer)) {
+            part.layers[i] = layer;
+        }
+    }
+    parts.into_par_iter().for_each(|mut run| {
+        for x in 0..run.sums.len() {
+            let pixel = UVec2::new(run.first.x + x as u32, run.first.y);
+            if !scene.adaptive {
+                for sample in samples.clone() {
+                    let (value, layers) = pixel_radiance(scene, pixel, sample);
+                    run.sums[x] += value;
+                    run.add_layers(x, layers);
+                }
+            } else if first_looks {
+                first_look(scene, pixel, samples.clone(), &mut run, x);
+            } else {
+                let looks = looks_around(looks_to_read, region, pixel);
+                further_samples(scene, pixel, samples.clone(), &mut run, x, looks);
+            }
+        }
+    });
+}
+
+/// A piece of a row of a film: its lists, which are empty where the film's are, or where they are only read.
+struct Run<'a> {
+    first: UVec2,
+    sums: &'a mut [Vec4],
+    moments: &'a mut [Vec4],
+    looks: &'a mut [Vec4],
+    layers: [&'a mut [Vec4]; Layer::ALL.len()],
+}
+
+impl Run<'_> {
+    fn add_layers(&mut self, x: usize, found: Layers) {
+        let Layers {
+            emission,
+            direct,
+            indirect,
+            albedo,
+            normal,
+        } = found;
+        let found = [emission, direct, indirect, albedo, normal];
+        for (layer, found) in self.layers.iter_mut().zip(found) {
+            if let Some(sum) = layer.get_mut(x) {
+                *sum += found;
+            }
+        }
+    }
+}
+
+/// The records of a tile's pixels, of a film's region, in pieces of a row, each with its first pixel; none of an empty list.
+fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut [Vec4])> {
+    let rows = records.chunks_mut(region.width() as usize).enumerate();
+    let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
+    let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
+    rows.flat_map(|(y, row)| {
+        let runs = row[columns.clone()].chunks_mut(RUN).enumerate();
+        runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32), run))
+    })
+    .collect()
+}
+
+/// What `shaders/kernels/adaptive.wgsl` does to a pixel at first.
+fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
+    for sample in samples {
+        let (value, layers) = pixel_radiance(scene, pixel, sample);
+        run.looks[x] = look_with(run.looks[x], run.sums[x], value);
+        run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
+        run.sums[x] += value;
+        run.add_layers(x, layers);
+    }
+    run.looks[x] = whole_look(run.looks[x], run.sums[x], run.moments[x]);
+}
+
+/// What it does to a pixel later on.
+fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, looks: Vec4) {
+    let s = &scene.specialization;
+    let end = samples_wanted(looks, s.first_look, f32::from_bits(s.squared_error), samples.end);
+    for sample in samples.start..end {
+        let (value, layers) = pixel_radiance(scene, pixel, sample);
+        run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
+        run.sums[x] += value;
+        run.add_layers(x, layers);
+    }
+}
+
+fn looks_around(looks: &[Vec4], region: Region, pixel: UVec2) -> Vec4 {
+    let (x, y) = (pixel.x - region.x0, pixel.y - region.y0);
+    let width = region.width() as usize;
+    let index = y as usize * width + x as usize;
+    let mut sum = Vec4::ZERO;
+    if y > 0 {
+        sum += looks[index - width];
+    }
+    if x > 0 {
+        sum += looks[index - 1];
+    }
+    if x + 1 < region.width() {
+        sum += looks[index + 1];
+    }
+    if y + 1 < region.height() {
+        sum += looks[index + width];
+    }
+    sum
+}

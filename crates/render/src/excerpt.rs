@@ -1,0 +1,82 @@
+//! A line of a text with a place marked in it, as messages show it.
+
+/// What stands before the bar in a line of an excerpt that is none of the text's.
+pub const NO_NUMBER: &str = "      |";
+/// So many characters of a line are shown.
+const WIDTH: usize = 160;
+/// So many of them before the place, where the line is longer.
+const BEFORE: usize = 60;
+
+/// A line with its number, counted from 1; of a long one the beginning.
+pub fn numbered(number: usize, line: &str) -> String {
+    let (part, _) = window(line, 0);
+    format!("{number:>5} | {part}").trim_end().to_string()
+}
+
+/// The same with marks below so many characters from `start` on; of a long line the part about them.
+pub fn marked(number: usize, line: &str, start: usize, length: usize) -> String {
+    let (part, at) = window(line, start);
+    let room = part.chars().count().saturating_sub(at).max(1);
+    let (indent, marks) = (" ".repeat(at), "^".repeat(length.clamp(1, room)));
+    format!("{number:>5} | {part}\n{NO_NUMBER} {indent}{marks}")
+}
+
+/// The part of a line that is shown, and where in it a character of the line is.
+fn window(line: &str, place: usize) -> (String, usize) {
+    let count = line.chars().count();
+    let place = place.min(count);
+    let first = place.saturating_sub(BEFORE).min(count.saturating_sub(WIDTH));
+    let one_wide = |c: char| if c.is_control() { ' ' } else { c };
+    let mut part: Vec<char> = line.chars().skip(first).take(WIDTH).map(one_wide).collect();
+    if first > 0 {
+        part[0] = '…';
+    }
+    if first + WIDTH < count {
+        part[WIDTH - 1] = '…';
+    }
+    (part.into_iter().collect(), place - first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_without_a_place_begin_at_their_beginning() {
+        assert_eq!(numbered(7, "a = b"), "    7 | a = b");
+        assert_eq!(numbered(7, ""), "    7 |");
+        let long = numbered(1, &"ab".repeat(5000));
+        assert!(long.starts_with("    1 | abab") && long.ends_with('…') && long.chars().count() == 8 + WIDTH);
+    }
+
+    #[test]
+    fn short_lines_are_whole() {
+        assert_eq!(marked(12, "a = é c", 4, 1), "   12 | a = é c\n      |     ^");
+        assert_eq!(marked(1, "ab", 2, 1), "    1 | ab\n      |   ^", "behind the last");
+        assert_eq!(marked(1, "ab", 0, 99), "    1 | ab\n      | ^^");
+        assert_eq!(
+            marked(1, "\ta b", 1, 1),
+            "    1 |  a b\n      |  ^",
+            "a tab is as wide as its mark"
+        );
+    }
+
+    #[test]
+    fn of_long_lines_the_place_is_seen() {
+        let line: String = (0..5000).map(|i| char::from(b'a' + (i % 26) as u8)).collect();
+        for place in [
+            0, 1, 59, 60, 61, 100, 158, 159, 160, 2500, 4838, 4839, 4840, 4998, 4999, 5000,
+        ] {
+            let excerpt = marked(1, &line, place, 3);
+            let (shown, marks) = excerpt.split_once('\n').unwrap();
+            let (shown, marks) = (&shown["    1 | ".len()..], &marks[NO_NUMBER.len() + 1..]);
+            assert_eq!(shown.chars().count(), WIDTH);
+            assert!(marks.chars().count() <= WIDTH + 1);
+            let at = marks.find('^').unwrap();
+            let marked = shown.chars().nth(at);
+            assert_eq!(marked, line.chars().nth(place), "{place}: {excerpt}");
+            assert_eq!(shown.starts_with('…'), place > BEFORE, "{place}");
+            assert_eq!(shown.ends_with('…'), place < 5000 - WIDTH + BEFORE, "{place}");
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! Kernels as text: each is the concatenation of a list of files, since WGSL's module scope has no order.
+
+use std::ops::Range;
+use std::{fs, io, path::Path};
+
+use super::bake::{tables, tree_tables};
+use super::functions::is_same_code;
+use crate::pack::{self, Specialization};
+use wgray_image::waiting;
+use wgray_scene::Integrator;
+use wgray_shaders::{
+    ADAPTIVE_FILE, FIRST_HITS_FILE, FROM_BUFFERS, KERNEL, PATH, PHONG, RENDER_FILE, ROUNDING_FILE, SAMPLES, TEXELS,
+};
+pub use wgray_shaders::{File, SHARED, built_in};
+
+/// The file of quotients and square roots by software.
+pub const ROUNDING: &str = "rounding.wgsl";
+
+/// A compute shader.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Kernel {
+    /// The entry point's name.
+    pub entry_point: &'static str,
+    /// What it is made of besides [`SHARED`], the scene and an integrator. The last file has the entry point, and declares
+    /// what it writes.
+    pub files: &'static [&'static [File]],
+    /// Whether it asks an integrator for radiance.
+    pub integrates: bool,
+}
+
+/// Accumulates samples in the film.
+pub static RENDER: Kernel = Kernel {
+    entry_point: "render",
+    files: &[KERNEL, SAMPLES, RENDER_FILE],
+    integrates: true,
+};
+/// Accumulates samples as long as a pixel needs them.
+pub static ADAPTIVE: Kernel = Kernel {
+    entry_point: "adaptive",
+    files: &[KERNEL, SAMPLES, ADAPTIVE_FILE],
+    integrates: true,
+};
+/// Writes what the ray through each pixel's centre meets first.
+pub static FIRST_HITS: Kernel = Kernel {
+    entry_point: "first_hits",
+    files: &[KERNEL, FIRST_HITS_FILE],
+    integrates: false,
+};
+/// Every kernel.
+pub static KERNELS: [&Kernel; 3] = [&RENDER, &ADAPTIVE, &FIRST_HITS];
+
+/// What an integrator is made of: what light a sample sees.
+fn integrator_files(integrator: Integrator) -> &'static [File] {
+    match integrator {
+        Integrator::Phong => PHONG,
+        Integrator::Path => PATH,
+    }
+}
+
+impl Kernel {
+    /// Whether it is made of a file, as far as that is not another form of the scene.
+    pub fn has(&self, file: &str, integrator: Integrator) -> bool {
+        let own = self.files.iter().copied().flatten().chain(SHARED);
+        let more = if self.integrates {
+            integrator_files(integrator)
+        } else {
+            &[]
+        };
+        own.chain(more).chain(FROM_BUFFERS).any(|(name, _)| *name == file)
+    }
+
+    /// The file that has the entry point.
+    pub fn file(&self) -> &'static str {
+        self.files.iter().copied().flatten().last().map_or("", |(name, _)| name)
+    }
+}
+
+/// The texts of all shader files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shaders {
+    files: Vec<(String, String)>,
+}
+
+/// A file's text with blanks in place of a byte-order mark, which WGSL does not have. What follows stays where it is.
+pub fn without_mark(text: String) -> String {
+    match text.strip_prefix('\u{feff}') {
+        Some(rest) => format!("   {rest}"),
+        None => text,
+    }
+}
+
+impl Shaders {
+    /// The ones in the program.
+    pub fn built_in() -> Shaders {
+        Shaders {
+            files: built_in()
+                .map(|(name, text)| (name.to_string(), text.to_string()))
+                .collect(),
+        }
+    }
+
+    /// The ones in a folder, which has the same files as the project's `shaders/`.
+    pub fn read(folder: &Path) -> io::Result<Shaders> {
+        let read = |name: &str| {
+            let path = folder.join(name);
+            let text = waiting::check(&path).and_then(|()| fs::read_to_string(&path));
+            let text = text.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
+            Ok((name.to_string(), without_mark(text)))
+        };
+        Ok(Shaders {
+            files: built_in().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,
+        })
+    }
+
+    /// Returns whether other shaders have the same code, and differ in comments and white space at most.
+    pub fn has_same_code(&self, other: &Shaders) -> bool {
+        self.files().all(|(name, text)| is_same_code(text, other.text(name)))
+    }
+
+    /// All files: names and texts.
+    pub fn files(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.files.iter().map(|(name, text)| (name.as_str(), text.as_str()))
+    }
+
+    /// These shaders with other texts of files, where there are any.
+    pub fn changed(&self, text: impl Fn(&str, &str) -> Option<String>) -> Shaders {
+        let new = |(name, old): &(String, String)| (name.clone(), text(name, old).unwrap_or_else(|| old.clone()));
+        Shaders {
+            files: self.files.iter().map(new).collect(),
+        }
+    }
+
+    /// These shaders with another text of a file.
+    #[cfg(test)]
+    pub(super) fn with(mut self, name: &str, text: String) -> Shaders {
+        self.files.retain(|(file, _)| file != name);
+        self.files.push((name.to_string(), text));
+        self
+    }
+
+    /// The shared mathematics by themselves: constants, records and pure functions.
+    pub fn shared(&self) -> Source {
+        let mut source = Source::default();
+        source.append("crates/render/src/pack/constants.rs", &pack::constant_declarations());
+        source.append("crates/render/src/pack/layout.rs", &pack::declarations());
+        self.append(&mut source, SHARED);
+        source
+    }
+
+    /// A kernel that reads the scene from buffers, or, if `baked` is the text of the functions that know the scene, has
+    /// it as constants.
+    pub fn compose(&self, kernel: &Kernel, integrator: Integrator, baked: Option<&str>) -> Source {
+        self.compose_with_texels(kernel, integrator, baked, None)
+    }
+
+    /// [`Shaders::compose`] where `texels` is the text of the function that reads texels from several buffers.
+    pub fn compose_with_texels(
+        &self,
+        kernel: &Kernel,
+        integrator: Integrator,
+        baked: Option<&str>,
+        texels: Option<&str>,
+    ) -> Source {
+        let mut source = Source::default();
+        self.append(&mut source, ROUNDING_FILE);
+        source.extend(&self.shared());
+        source.append(
+            "crates/render/src/pack/specialization.rs",
+            &Specialization::declarations(),
+        );
+        for files in kernel.files {
+            self.append(&mut source, files);
+        }
+        if kernel.integrates {
+            self.append(&mut source, integrator_files(integrator));
+        }
+        match baked {
+            Some(text) => source.append("(the scene as constants)", text),
+            None => {
+                self.append(&mut source, FROM_BUFFERS);
+                source.append("(the tables of records)", &tables());
+            }
+        }
+        source.append("(the tables of trees)", &tree_tables());
+        match texels {
+            Some(text) => source.append("(the texels' buffers)", text),
+            None => self.append(&mut source, TEXELS),
+        }
+        source
+    }
+
+    fn append(&self, source: &mut Source, files: &[File]) {
+        for (name, _) in files {
+            source.append(name, self.text(name));
+        }
+    }
+
+    /// The text of a file.
+    pub fn text(&self, name: &str) -> &str {
+        self.files
+            .iter()
+            .find(|(file, _)| file == name)
+            .map_or("", |(_, text)| text)
+    }
+}
+
+/// A kernel's whole text, and where each part of it came from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Source {
+    /// The WGSL.
+    pub text: String,
+    parts: Vec<Part>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Part {
+    file: String,
+    start: usize,
+}
+
+impl Source {
+    /// Adds a file at the end.
+    pub fn append(&mut self, file: &str, text: &str) {
+        self.parts.push(Part {
+            file: file.to_string(),
+            start: self.text.len(),
+        });
+        self.text.push_str(text);
+        if !text.ends_with('\n') {
+            self.text.push('\n');
+        }
+    }
+
+    /// Adds all files of another text.
+    fn extend(&mut self, other: &Source) {
+        let start = self.text.len();
+        self.parts.extend(other.parts.iter().map(|part| Part {
+            file: part.file.clone(),
+            start: start + part.start,
+        }));
+        self.text.push_str(&other.text);
+    }
+
+    /// The text with a part of it replaced, and its lines where they were. What is replaced lies in one file.
+    pub fn replaced(&self, range: Range<usize>, with: &str) -> Source {
+        let lines = self.text[range.clone()].matches('\n').count();
+        let with = with.to_string() + &"\n".repeat(lines);
+        let moved = |start: usize| match start >= range.end {
+            true => start - range.len() + with.len(),
+            false => start,
+        };
+        Source {
+            text: [&self.text[..range.start], &with, &self.text[range.end..]].concat(),
+            parts: self
+                .parts
+                .iter()
+                .map(|part| Part {
+                    file: part.file.clone(),
+                    start: moved(part.start),
+                })
+                .collect(),
+        }
+    }
+
+    /// Where a file starts.
+    pub fn start_of(&self, file: &str) -> Option<usize> {
+        self.parts.iter().find(|part| part.file == file).map(|part| part.start)
+    }
+
+    /// Returns file, line and column of a byte of the text.
+    pub fn place(&self, offset: usize) -> Option<String> {
+        let (file, text, offset) = self.locate(offset)?;
+        let before = &text[..offset];
+        let start = before.rfind('\n').map_or(0, |at| at + 1);
+        let (line, column) = (before.matches('\n').count() + 1, before[start..].chars().count() + 1);
+        Some(format!("{file}:{line}:{column}"))
+    }
+
+    /// The file that a byte of the text came from, its own text, and the byte's offset in it.
+    pub fn locate(&self, offset: usize) -> Option<(&str, &str, usize)> {
+        let i = self.parts.partition_point(|part| part.start <= offset).checked_sub(1)?;
+        let end = self.parts.get(i + 1).map_or(self.text.len(), |next| next.start);
+        let part = &self.parts[i];
+        Some((&part.file, &self.text[part.start..end], offset - part.start))
+    }
+}

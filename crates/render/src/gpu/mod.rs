@@ -1,0 +1,41 @@
+//! The GPU path: kernels in WGSL, run by wgpu. Only this module names wgpu.
+
+mod bake;
+mod compile;
+pub mod compose;
+mod controls;
+mod depth;
+mod device;
+mod failure;
+mod functions;
+mod interface;
+mod kernel_plan;
+mod live;
+pub mod marks;
+mod memory;
+mod pipeline;
+mod place;
+mod prune;
+mod renderer;
+mod rounding;
+mod rounds;
+mod scene;
+pub mod spirv;
+mod texels;
+mod timer;
+mod validate;
+mod wording;
+
+pub use bake::bake;
+pub use compile::{Checked, check};
+pub use controls::FloatControls;
+pub use device::{
+    Choice, Choice as AdapterChoice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose, choose_among, preferred,
+};
+pub use kernel_plan::{KernelPlan, plan_kernel};
+pub use live::{Live, with_edits, without_values};
+pub use renderer::{Call, Gpu, Options};
+pub use rounding::Rounding;
+pub use validate::{Forms, check_kernels};
+// for kernels other than the renderer's
+pub use {naga, wgpu};

@@ -1,0 +1,661 @@
+//! A scene on a device: its buffers, its kernels, and the film that it accumulates.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use bytemuck::{bytes_of, cast_slice};
+use glam::{UVec2, Vec4};
+use web_time::Instant;
+use wgpu::BufferUsages;
+
+use super::bake::bake_if_small;
+use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
+use super::device::{Device, Mapping};
+use super::live::Live;
+use super::memory::{Asked, Held};
+use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
+use super::rounding::Rounding;
+use super::rounds::samples_per_call;
+use super::scene::SceneBuffers;
+use super::texels::TexelParts;
+use super::timer::{TIMES, Timer};
+use crate::backend::{Backend, Rules, Started};
+use crate::error::RenderError;
+use crate::film::{Film, Form};
+use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
+use wgray_image::Region;
+use wgray_scene::Integrator;
+
+/// How a scene is put on a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// SPIR-V that is computed as written, with quotients and square roots of whom; else plain WGSL through wgpu.
+    pub exact: Option<Rounding>,
+    /// The scene as constants of the kernel, if it is small.
+    pub baked: bool,
+}
+
+impl Options {
+    /// What is fastest on a device.
+    pub fn best(device: &Device) -> Options {
+        Options {
+            exact: device.info.exact.then_some(Rounding::Device),
+            baked: device.info.kind == "software",
+        }
+    }
+}
+
+/// A scene on a device.
+pub struct Gpu {
+    device: Device,
+    kernels: Kernels,
+    render: wgpu::ComputePipeline,
+    /// The kernel of first hits, once requested.
+    first_hits: Option<wgpu::ComputePipeline>,
+    scene: SceneBuffers,
+    work: wgpu::Buffer,
+    /// The kernel's receipt of a call: as the kernel writes it, and as the host reads it.
+    receipt: [wgpu::Buffer; 2],
+    /// What the last dispatch of a call has changed, as it was before.
+    before: Option<wgpu::Buffer>,
+    film: Option<(Target, Started)>,
+    pending: Option<Pending>,
+    rules: Rules,
+    /// The most samples of a dispatch that the driver is thought to run whole.
+    samples_per_call: u32,
+    /// The values of constants that are read from a buffer.
+    sliders: Option<wgpu::Buffer>,
+    /// Of calls, where these are timed.
+    timer: Option<Timer>,
+    calls: Vec<Call>,
+}
+
+/// How long a dispatch has taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Call {
+    /// The kernel's entry point.
+    pub kernel: &'static str,
+    /// From its start to its end.
+    pub took: Duration,
+    /// Whether the device has told; else it is from the call to the news of its end.
+    pub by_device: bool,
+    /// Samples of pixels, or pixels where it takes no samples.
+    pub samples: u64,
+}
+
+/// A call that was submitted: one dispatch of it is under way.
+struct Pending {
+    tile: Region,
+    /// The samples that are not known to be added.
+    samples: Range<u32>,
+    /// Where those of the dispatch end.
+    end: u32,
+    start: Instant,
+    /// Tells when the dispatch has ended.
+    receipt: Mapping,
+}
+
+/// What it takes to compile another kernel for the same scene.
+struct Kernels {
+    shaders: Shaders,
+    integrator: Integrator,
+    baked: Option<String>,
+    constants: Specialization,
+    /// Of the groups of bindings.
+    layouts: Vec<wgpu::BindGroupLayout>,
+    exact: Option<Rounding>,
+    texels: TexelParts,
+    live: Live,
+}
+
+/// A buffer with a record for each pixel of a region, and the group of bindings of the kernel that writes it.
+struct Target {
+    region: Region,
+    buffer: wgpu::Buffer,
+    group: wgpu::BindGroup,
+}
+
+/// The rows of a film that a tile lies in: a piece of each of the film's lists of pixels, in bytes.
+struct Rows {
+    lists: u64,
+    list: u64,
+    start: u64,
+    size: u64,
+}
+
+impl Rows {
+    fn of(film: &Target, tile: Region) -> Rows {
+        let row = u64::from(film.region.width()) * size_of::<Vec4>() as u64;
+        let list = u64::from(film.region.height()) * row;
+        Rows {
+            lists: film.buffer.size() / list,
+            list,
+            start: u64::from(tile.y0 - film.region.y0) * row,
+            size: u64::from(tile.height()) * row,
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        self.lists * self.size
+    }
+
+    /// Where each piece starts in the film, and in a copy of all of them.
+    fn pieces(&self) -> impl Iterator<Item = (u64, u64)> {
+        (0..self.lists).map(|i| (i * self.list + self.start, i * self.size))
+    }
+}
+
+/// The size in bytes of a first hit.
+const FIRST_HITS_RECORD: usize = size_of::<FirstHit>();
+
+/// Rounds of the loop that proves a pixel whole: more than the single one of a loop that is cut short.
+const PROOF: UVec2 = UVec2::new(0, 4);
+
+impl Gpu {
+    /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
+    /// returns: drivers compile at the first dispatch.
+    pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
+        Gpu::with_live(device, packed, shaders, options, Live::default())
+    }
+
+    /// As [`Gpu::new`], with constants that are read from a buffer. They are 0 until [`Gpu::set_sliders`].
+    pub fn with_live(
+        device: &Device,
+        packed: &Packed,
+        shaders: &Shaders,
+        options: Options,
+        live: Live,
+    ) -> Result<Gpu, RenderError> {
+        let texels = TexelParts::of(&device.info, packed)?;
+        let kernels = Kernels {
+            shaders: shaders.clone(),
+            integrator: packed.integrator,
+            baked: options.baked.then(|| bake_if_small(packed)).flatten(),
+            constants: packed.specialization,
+            layouts: bind_group_layouts(device, texels.count - 1, !live.sliders().is_empty()),
+            exact: options.exact,
+            texels,
+            live,
+        };
+        let render = kernels.compile(device, kernel_of(packed.adaptive))?;
+        let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
+        let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+        let values = kernels.live.sliders().len() as u64 * size_of::<[u32; 4]>() as u64;
+        let sliders = (values > 0).then(|| device.buffer(values, BufferUsages::UNIFORM | BufferUsages::COPY_DST));
+        let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+        let receipt = [device.buffer(RECEIPT, written), receipt_to_read(device)];
+        let mut gpu = Gpu {
+            samples_per_call: samples_per_call(packed, kernels.baked.is_some()),
+            device: device.clone(),
+            kernels,
+            render,
+            first_hits: None,
+            scene,
+            work,
+            receipt,
+            before: None,
+            film: None,
+            pending: None,
+            rules: Rules::of(packed),
+            sliders,
+            timer: None,
+            calls: Vec::new(),
+        };
+        let nothing = Region {
+            x0: 0,
+            y0: 0,
+            x1: 1,
+            y1: 1,
+        };
+        gpu.begin(nothing)?;
+        gpu.dispatch_part(nothing, 0..0)?;
+        gpu.wait()?;
+        gpu.film = None;
+        Ok(gpu)
+    }
+
+    /// The constants that are read from a buffer, in its order, and what takes the place of light.
+    pub fn live(&self) -> &Live {
+        &self.kernels.live
+    }
+
+    /// Gives the constants that are read from a buffer their values. The film is lost.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Pending`] while a call is pending.
+    pub fn set_sliders(&mut self, values: &[[u32; 4]]) -> Result<(), RenderError> {
+        self.idle()?;
+        self.film = None;
+        match &self.sliders {
+            Some(buffer) => self
+                .device
+                .checked(|| self.device.queue.write_buffer(buffer, 0, cast_slice(values))),
+            None => Ok(()),
+        }
+    }
+
+    /// Times every call from now on; [`Gpu::calls`] has them.
+    pub fn time_calls(&mut self) -> Result<(), RenderError> {
+        self.timer = Some(self.device.checked(|| Timer::new(&self.device))?);
+        Ok(())
+    }
+
+    /// The calls that have ended since this was asked last.
+    pub fn calls(&mut self) -> Vec<Call> {
+        std::mem::take(&mut self.calls)
+    }
+
+    /// The device that it is on.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Uploads a changed scene that needs no other kernel. Returns whether it does not; if it does, nothing is done.
+    /// The film is lost.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Pending`] while a call is pending.
+    pub fn update(&mut self, packed: &Packed) -> Result<bool, RenderError> {
+        self.idle()?;
+        let texels = TexelParts::of(&self.device.info, packed)?;
+        let same_kernel = self.kernels.baked.is_none()
+            && (self.kernels.constants, self.rules.form()) == (packed.specialization, packed.form())
+            && (self.kernels.integrator, self.kernels.texels) == (packed.integrator, texels);
+        if same_kernel {
+            self.film = None;
+            self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts)?;
+            self.samples_per_call = samples_per_call(packed, false);
+            self.rules = Rules::of(packed);
+        }
+        Ok(same_kernel)
+    }
+
+    /// Changes the camera. The film is lost.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Pending`] while a call is pending.
+    pub fn set_camera(&mut self, camera: &Camera) -> Result<(), RenderError> {
+        self.idle()?;
+        self.film = None;
+        self.rules.set_size(camera.width, camera.height);
+        self.device.checked(|| self.scene.set_camera(&self.device, camera))
+    }
+
+    fn target(&self, record: usize, region: Region) -> Result<Target, RenderError> {
+        let size = region.pixels().max(1) * record as u64; // a binding cannot be empty
+        let target = self.device.checked(|| {
+            let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+            let buffer = self.device.buffer(size, usage);
+            let buffers = [&self.work, &buffer, &self.receipt[0]].into_iter().chain(&self.sliders);
+            let group = bind_group(&self.device, &self.kernels.layouts[0], &buffers.collect::<Vec<_>>());
+            Target { region, buffer, group }
+        });
+        let what = format!("a film of {} x {} pixels", region.width(), region.height());
+        self.explained(target, Some((what, size)))
+    }
+
+    /// The kernel that adds samples.
+    fn kernel(&self) -> &'static Kernel {
+        kernel_of(self.rules.form().adaptive)
+    }
+
+    /// What there is on the device.
+    fn held(&self) -> Held {
+        Held {
+            scene: self.scene.bytes,
+            film: self.film.as_ref().map_or(0, |(film, _)| film.buffer.size()),
+            copies: self.before.as_ref().map_or(0, |before| before.size()),
+        }
+    }
+
+    /// An error for want of memory tells the sizes.
+    fn explained<T>(&self, result: Result<T, RenderError>, asked: Option<Asked>) -> Result<T, RenderError> {
+        result.map_err(|error| self.held().explain(error, asked.as_ref()))
+    }
+
+    /// Runs a kernel over a tile of a target, after these copies. Its receipt is asked for.
+    fn dispatch(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        target: &Target,
+        tile: Region,
+        samples: Range<u32>,
+        copies: impl FnOnce(&mut wgpu::CommandEncoder),
+    ) -> Result<Mapping, RenderError> {
+        let work = Work {
+            origin: UVec2::new(tile.x0, tile.y0),
+            size: UVec2::new(tile.width(), tile.height()),
+            film_origin: UVec2::new(target.region.x0, target.region.y0),
+            film_size: UVec2::new(target.region.width(), target.region.height()),
+            samples: UVec2::new(samples.start, samples.end),
+            proof: PROOF,
+        };
+        let Device { device, queue, .. } = &self.device;
+        let [written, read] = &self.receipt;
+        let [columns, rows] = groups(tile);
+        self.device.checked(|| {
+            queue.write_buffer(&self.work, 0, bytes_of(&work));
+            let mut encoder = device.create_command_encoder(&Default::default());
+            copies(&mut encoder);
+            encoder.clear_buffer(written, 0, None);
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: None,
+                timestamp_writes: self.timer.as_ref().and_then(Timer::writes),
+            });
+            pass.set_pipeline(pipeline);
+            let groups_of_bindings = [&target.group].into_iter().chain(&self.scene.groups);
+            for (i, group) in (0..).zip(groups_of_bindings) {
+                pass.set_bind_group(i, group, &[]);
+            }
+            pass.dispatch_workgroups(columns, rows, 1);
+            drop(pass);
+            encoder.copy_buffer_to_buffer(written, 0, read, 0, RECEIPT);
+            if let Some(timer) = &self.timer {
+                timer.resolve(&mut encoder, read, RECEIPT);
+            }
+            queue.submit([encoder.finish()]);
+            self.device.map(read)
+        })
+    }
+
+    /// Whether a dispatch that has ended ran whole for every pixel of its tile: the driver has cut none of its loops short.
+    /// How long it took is noted where that is asked for.
+    fn ran_whole(
+        &mut self,
+        kernel: &'static str,
+        tile: Region,
+        samples: u32,
+        start: Instant,
+    ) -> Result<bool, RenderError> {
+        let waited = start.elapsed();
+        let receipt: Vec<u32> = self.device.mapped(&self.receipt[1])?;
+        let (receipt, ticks) = receipt.split_at((RECEIPT / 4) as usize);
+        if let Some(timer) = &self.timer {
+            let told = timer.took(ticks);
+            self.calls.push(Call {
+                kernel,
+                took: told.unwrap_or(waited),
+                by_device: told.is_some(),
+                samples: tile.pixels() * u64::from(samples),
+            });
+        }
+        let [columns, rows] = groups(tile);
+        Ok(receipt == [columns * rows, 0])
+    }
+
+    fn idle(&self) -> Result<(), RenderError> {
+        match self.pending {
+            Some(_) => Err(RenderError::Pending),
+            None => Ok(()),
+        }
+    }
+
+    /// Submits as much of a call as is thought to run whole, and keeps what it changes as it was before.
+    fn dispatch_part(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
+        let rows = Rows::of(film, tile);
+        let before = match self.before.take().filter(|before| before.size() >= rows.bytes()) {
+            Some(before) => before,
+            None => {
+                let usage = BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+                let before = self.device.checked(|| self.device.buffer(rows.bytes(), usage));
+                let what = format!("a copy of {} rows of the film", tile.height());
+                self.explained(before, Some((what, rows.bytes())))?
+            }
+        };
+        let most = self.rules.end_of_part(&samples) - samples.start;
+        let end = samples.start + self.samples_per_call.min(most);
+        let save = |encoder: &mut wgpu::CommandEncoder| {
+            for (start, copy) in rows.pieces() {
+                encoder.copy_buffer_to_buffer(&film.buffer, start, &before, copy, rows.size);
+            }
+        };
+        let start = Instant::now();
+        let receipt = self.dispatch(&self.render, film, tile, samples.start..end, save)?;
+        self.before = Some(before);
+        self.pending = Some(Pending {
+            tile,
+            samples,
+            end,
+            start,
+            receipt,
+        });
+        Ok(())
+    }
+
+    /// Brings a dispatch that has ended to its end, and submits the next one of the call, if there is any. One that was cut
+    /// short is undone, and the next ones have fewer samples.
+    fn end_part(&mut self, pending: Pending) -> Result<(), RenderError> {
+        let Pending {
+            tile,
+            samples,
+            end,
+            start,
+            ..
+        } = pending;
+        let kernel = self.kernel().entry_point;
+        let rest = match self.ran_whole(kernel, tile, end - samples.start, start)? {
+            true => end..samples.end,
+            false => {
+                self.undo(tile)?;
+                let count = end - samples.start;
+                if count <= 1 {
+                    return Err(self.cut_short());
+                }
+                self.samples_per_call = count / 2;
+                samples
+            }
+        };
+        match rest.is_empty() {
+            true => Ok(()),
+            false => self.dispatch_part(tile, rest),
+        }
+    }
+
+    fn undo(&self, tile: Region) -> Result<(), RenderError> {
+        let (Some((film, _)), Some(before)) = (&self.film, &self.before) else {
+            return Ok(());
+        };
+        let rows = Rows::of(film, tile);
+        self.device.checked(|| {
+            let mut encoder = self.device.device.create_command_encoder(&Default::default());
+            for (start, copy) in rows.pieces() {
+                encoder.copy_buffer_to_buffer(before, copy, &film.buffer, start, rows.size);
+            }
+            self.device.queue.submit([encoder.finish()]);
+        })
+    }
+
+    /// The pending call's next step, if its dispatch has ended.
+    fn step(&mut self) -> Result<(), RenderError> {
+        let Some(pending) = self.pending.take() else {
+            return Ok(());
+        };
+        match pending.receipt.done() {
+            None => {
+                self.pending = Some(pending);
+                Ok(())
+            }
+            Some(Ok(())) => self.end_part(pending),
+            Some(Err(message)) => Err(self.device.error(message)),
+        }
+    }
+
+    /// After an error there is no film. The receipt may still be mapped then, and takes no copy: there is a new one.
+    fn or_lost<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
+        let result = self.explained(result, None);
+        if result.is_err() {
+            self.pending = None;
+            self.film = None;
+            self.receipt[1] = receipt_to_read(&self.device);
+        }
+        result
+    }
+
+    fn find_first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        let pipeline = match self.first_hits.take() {
+            Some(pipeline) => pipeline,
+            None => self.kernels.compile(&self.device, &FIRST_HITS)?,
+        };
+        let target = self.target(FIRST_HITS_RECORD, region)?;
+        let start = Instant::now();
+        let receipt = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
+        self.first_hits = Some(pipeline);
+        self.device.wait_for(&receipt)?;
+        match self.ran_whole(FIRST_HITS.entry_point, region, 1, start)? {
+            true => self.device.download(&target.buffer),
+            false => Err(self.cut_short()),
+        }
+    }
+
+    /// A single sample is too long for the driver.
+    fn cut_short(&self) -> RenderError {
+        RenderError::CutShort {
+            device: self.device.info.name.clone(),
+        }
+    }
+}
+
+/// The kernel that adds samples.
+fn kernel_of(adaptive: bool) -> &'static Kernel {
+    if adaptive { &ADAPTIVE } else { &RENDER }
+}
+
+/// The size of a receipt in bytes.
+const RECEIPT: u64 = size_of::<[u32; 2]>() as u64;
+
+/// A buffer for a receipt that the host reads, and for the times of its call.
+fn receipt_to_read(device: &Device) -> wgpu::Buffer {
+    device.buffer(RECEIPT + TIMES, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
+}
+
+/// A film of the records that a kernel has written: its lists, one after the other, but for those that it does not have.
+fn film_of(region: Region, form: Form, records: &[Vec4]) -> Film {
+    let mut film = Film::of(region, form);
+    let lists = film.lists_mut().filter(|list| !list.is_empty());
+    for (list, records) in lists.zip(records.chunks(region.pixels() as usize)) {
+        list.copy_from_slice(records);
+    }
+    film
+}
+
+/// The workgroups of a tile, along each side.
+fn groups(tile: Region) -> [u32; 2] {
+    [tile.width(), tile.height()].map(|pixels| pixels.div_ceil(WORKGROUP))
+}
+
+impl Backend for Gpu {
+    fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+        self.idle()?;
+        let started = self.rules.begin(region)?;
+        self.film = None; // before the next one: the two together may not fit
+        let film = self.target(self.rules.form().bytes(), region)?;
+        self.film = Some((film, started));
+        Ok(())
+    }
+
+    fn resume(&mut self, film: Film) -> Result<(), RenderError> {
+        self.idle()?;
+        let started = self.rules.resume(&film)?;
+        self.begin(film.region)?;
+        let result = match &self.film {
+            Some((target, _)) => self.device.checked(|| {
+                let mut at = 0;
+                for list in film.lists() {
+                    self.device.queue.write_buffer(&target.buffer, at, cast_slice(list));
+                    at += size_of_val(list.as_slice()) as u64;
+                }
+            }),
+            None => Err(RenderError::NoFilm),
+        };
+        self.or_lost(result)?;
+        self.film = self.film.take().map(|(target, _)| (target, started));
+        Ok(())
+    }
+
+    fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        self.idle()?;
+        let (_, started) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
+        if !self.rules.call(started, tile, &samples)? {
+            return Ok(());
+        }
+        let result = self.dispatch_part(tile, samples);
+        self.or_lost(result)
+    }
+
+    fn poll(&mut self) -> Result<bool, RenderError> {
+        if self.pending.is_some() {
+            let result = self.device.poll().and_then(|()| self.step());
+            self.or_lost(result)?;
+        }
+        Ok(self.pending.is_none())
+    }
+
+    fn wait(&mut self) -> Result<(), RenderError> {
+        while self.pending.is_some() {
+            let result = self.device.wait().and_then(|()| self.step());
+            self.or_lost(result)?;
+        }
+        Ok(())
+    }
+
+    fn film(&mut self) -> Result<Film, RenderError> {
+        self.idle()?;
+        let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
+        let region = film.region;
+        if region.is_empty() {
+            return Ok(self.rules.empty_film(region));
+        }
+        let result = self.device.download(&film.buffer);
+        let result = self.explained(result, Some(("a copy of the film".to_string(), film.buffer.size())));
+        let records: Vec<Vec4> = self.or_lost(result)?;
+        Ok(film_of(region, self.rules.form(), &records))
+    }
+
+    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        self.idle()?;
+        self.rules.in_picture(region)?;
+        if region.is_empty() {
+            return Ok(Vec::new());
+        }
+        let result = self.find_first_hits(region);
+        self.or_lost(result)
+    }
+
+    fn samples_of_all(&self) -> u32 {
+        self.rules.samples_of_all()
+    }
+
+    fn around(&self, region: Region) -> Region {
+        self.rules.around(region)
+    }
+
+    fn largest_film(&self) -> u64 {
+        let info = &self.device.info;
+        let bytes = info.largest_binding.min(info.largest_buffer);
+        let form = self.rules.form();
+        let most = bytes / form.bytes().max(FIRST_HITS_RECORD) as u64;
+        if !form.adaptive {
+            return most;
+        }
+        let picture = self.rules.picture();
+        let beside = 2 * (u64::from(picture.width()) + u64::from(picture.height())) + 4;
+        match picture.pixels() <= most {
+            true => most,
+            false => most.saturating_sub(beside), // a part of it comes with the pixels around
+        }
+    }
+}
+
+impl Kernels {
+    fn compile(&self, device: &Device, kernel: &Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
+        let texels = self.texels.wgsl();
+        let (baked, texels) = (self.baked.as_deref(), texels.as_deref());
+        let source = self.shaders.compose_with_texels(kernel, self.integrator, baked, texels);
+        let source = self.live.applied(kernel, source)?;
+        pipeline(device, &self.layouts, kernel, &source, &self.constants, self.exact)
+    }
+}

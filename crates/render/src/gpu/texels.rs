@@ -1,0 +1,153 @@
+//! What a device may see of a scene: buffers of a largest size, and texels in as many of them as they take.
+
+use std::fmt::Write as _;
+
+use glam::UVec4;
+
+use super::bake::{mesh_rows_count, node_rows_count};
+use super::device::Info;
+use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
+use crate::error::RenderError;
+use crate::pack::Packed;
+
+/// How a scene's texels lie in buffers: all but the last have 2^shift words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TexelParts {
+    /// How many buffers there are, at least 1.
+    pub count: usize,
+    shift: u32,
+}
+
+impl TexelParts {
+    /// What a device needs for a scene, if the device has it.
+    pub fn of(info: &Info, packed: &Packed) -> Result<TexelParts, RenderError> {
+        let largest = info.largest_binding.min(info.largest_buffer);
+        let too_large = |message: String| RenderError::TooLarge {
+            device: info.name.clone(),
+            message,
+        };
+        let sizes = [
+            ("shapes", size_of_val(packed.primitives.as_slice())),
+            ("shapes' bounds", size_of_val(packed.bounds.as_slice())),
+            ("BVHs", size_of::<UVec4>() * node_rows_count(packed)),
+            ("meshes", size_of::<UVec4>() * mesh_rows_count(packed)),
+            ("materials, lights and textures", {
+                let (materials, lights) = (packed.materials.as_slice(), packed.lights.as_slice());
+                size_of_val(materials) + size_of_val(lights) + size_of_val(packed.textures.as_slice())
+            }),
+        ];
+        if let Some((name, size)) = sizes.into_iter().find(|(_, size)| *size as u64 > largest) {
+            let (size, largest) = (mebibytes(size as u64), mebibytes(largest));
+            return Err(too_large(format!(
+                "the scene's {name} need {size} MiB; the limit of a buffer is {largest} MiB"
+            )));
+        }
+        let shift = (largest / 4).max(1).ilog2().min(31);
+        let count = packed.texels.len().div_ceil(1 << shift).max(1);
+        let most = 1 + (info.storage_buffers as usize).saturating_sub(STORAGE_BUFFERS);
+        if count > most {
+            let (size, part) = (mebibytes(4 * packed.texels.len() as u64), mebibytes(4 << shift));
+            return Err(too_large(format!(
+                "the scene's images need {size} MiB; the limit is {most} x {part} MiB"
+            )));
+        }
+        Ok(TexelParts { count, shift })
+    }
+
+    /// The texels of each buffer.
+    pub fn split<'a>(&self, texels: &'a [u32]) -> impl Iterator<Item = &'a [u32]> + use<'a> {
+        let size = 1 << self.shift;
+        (0..self.count)
+            .map(move |i| texels.get(i * size..).unwrap_or_default())
+            .map(move |rest| &rest[..rest.len().min(size)])
+    }
+
+    /// The function of `shaders/texels.wgsl` over these buffers, and those that are not bound otherwise; `None` if there is
+    /// only one.
+    pub fn wgsl(&self) -> Option<String> {
+        if self.count == 1 {
+            return None;
+        }
+        let mut out = String::new();
+        for i in 1..self.count {
+            let binding = GROUPS[SCENE].len() + i - 1;
+            let _ = writeln!(
+                out,
+                "@group({SCENE}) @binding({binding}) var<storage, read> texels_{i}: array<u32>;"
+            );
+        }
+        let (shift, mask) = (self.shift, (1u32 << self.shift) - 1);
+        let _ = writeln!(out, "fn texel_word(i: u32) -> u32 {{");
+        let _ = writeln!(out, "    let part = i >> {shift}u;\n    let at = i & {mask}u;");
+        for i in 1..self.count {
+            let _ = writeln!(out, "    if part == {i}u {{ return texels_{i}[at]; }}");
+        }
+        let _ = writeln!(out, "    return texels[at];\n}}");
+        Some(out)
+    }
+}
+
+fn mebibytes(bytes: u64) -> String {
+    format!("{:.1}", bytes as f64 / f64::from(1 << 20))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pack::pack;
+    use wgray_scene::Scene;
+
+    fn info(largest_binding: u64, storage_buffers: u32) -> Info {
+        Info {
+            name: "small".to_owned(),
+            driver: String::new(),
+            backend: String::new(),
+            kind: "other",
+            exact: false,
+            float_controls: crate::gpu::FloatControls::NONE,
+            largest_binding,
+            largest_buffer: 1 << 31,
+            storage_buffers,
+        }
+    }
+
+    fn packed(shapes: usize, texels: usize) -> Packed {
+        let start = "image = { width = 4, height = 4 }\ncamera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }\n\
+                     materials.m = { type = 'mirror' }\n";
+        let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
+        let text = format!("{start}{}", sphere.repeat(shapes));
+        let mut packed = pack(&Scene::parse(&text, "s").unwrap());
+        packed.texels = (0..texels as u32).collect();
+        packed
+    }
+
+    #[test]
+    fn texels_lie_in_as_few_buffers_as_hold_them() {
+        let storage = STORAGE_BUFFERS as u32;
+        for (texels, buffers) in [(0, 1), (1, 1), (1024, 1), (1025, 2), (2048, 2), (4096, 4)] {
+            let packed = packed(1, texels);
+            let parts = TexelParts::of(&info(5000, storage + 3), &packed).unwrap();
+            assert_eq!(parts.count, buffers, "{texels} texels");
+            assert_eq!(parts.wgsl().is_some(), buffers > 1);
+            let split: Vec<&[u32]> = parts.split(&packed.texels).collect();
+            assert_eq!(split.len(), buffers);
+            assert!(split.iter().all(|part| part.len() <= 1024));
+            assert_eq!(split.concat(), packed.texels);
+        }
+    }
+
+    #[test]
+    fn what_a_device_cannot_see_is_told_with_the_way_out() {
+        let storage = STORAGE_BUFFERS as u32;
+        let told = |info: Info, packed: &Packed| TexelParts::of(&info, packed).unwrap_err().to_string();
+        assert_eq!(
+            told(info(1 << 20, storage), &packed(1, (1 << 18) + 1)),
+            "small: the scene's images need 1.0 MiB; the limit is 1 x 1.0 MiB; the CPU has no such limit"
+        );
+        assert_eq!(
+            told(info(1 << 18, storage), &packed(5000, 0)),
+            "small: the scene's shapes need 0.4 MiB; the limit of a buffer is 0.2 MiB; the CPU has no such limit"
+        );
+        TexelParts::of(&info(1 << 18, storage), &packed(3000, 0)).unwrap();
+    }
+}

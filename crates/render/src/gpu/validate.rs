@@ -1,0 +1,401 @@
+//! All kernels of a scene, checked without a device, and all that is wrong with them at once.
+
+use rayon::prelude::*;
+
+use super::bake::bake_if_small;
+use super::compile::{Checked, check_at};
+use super::compose::{KERNELS, Kernel, Shaders, Source};
+use super::controls::FloatControls;
+use super::functions::functions;
+use super::interface;
+use super::rounding::Rounding;
+use crate::error::{ShaderError, ShaderErrors};
+use crate::pack::Packed;
+
+/// Maximum number of errors that are searched in a kernel.
+const MOST: usize = 16;
+
+/// The representation of the scene in the checked kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Forms {
+    /// In buffers.
+    Buffers,
+    /// In buffers and, if it is small enough, as constants.
+    All,
+}
+
+/// Compiles every kernel for a scene, to SPIR-V, as far as that goes without a driver, and compares its interface with
+/// what the program binds.
+///
+/// # Errors
+///
+/// All that is wrong, each mistake once however many kernels have it. Of a function the first one is found.
+pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result<(), ShaderErrors> {
+    let baked = (forms == Forms::All).then(|| bake_if_small(packed)).flatten();
+    let mut scenes = vec![None];
+    scenes.extend(baked.as_deref().map(Some));
+    let all: Vec<(&Kernel, Option<&str>)> = scenes
+        .into_iter()
+        .flat_map(|scene| KERNELS.map(|kernel| (kernel, scene)))
+        .collect();
+    let found: Vec<Vec<ShaderError>> = all
+        .into_par_iter()
+        .map(|(kernel, scene)| mistakes(kernel, shaders.compose(kernel, packed.integrator, scene), packed))
+        .collect();
+    let mut errors: Vec<ShaderError> = Vec::new();
+    for error in found.into_iter().flatten() {
+        if !errors.contains(&error) {
+            errors.push(error);
+        }
+    }
+    // A mistake in a declaration also breaks the code that the program generates from it: that follows from the cause.
+    if errors.iter().any(|error| is_in_file(error, shaders)) {
+        errors.retain(|error| is_in_file(error, shaders));
+    }
+    if errors.is_empty() {
+        Ok(())
+    } else {
+        Err(ShaderErrors(errors))
+    }
+}
+
+/// Returns whether an error is at a place in a shader file.
+fn is_in_file(error: &ShaderError, shaders: &Shaders) -> bool {
+    let file = error.place.split(':').next();
+    shaders.files().any(|(name, _)| Some(name) == file)
+}
+
+fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
+    let (mut errors, rest) = mistakes_of_functions(source);
+    let Some((source, checked)) = rest else { return errors };
+    match interface::mistakes(kernel, packed.integrator, &source, &checked, errors.is_empty()) {
+        Ok(more) => errors.extend(more),
+        Err(error) => errors.push(error),
+    }
+    if errors.is_empty() {
+        let compiled = checked.exact_spirv(kernel, &packed.specialization, Rounding::Device, FloatControls::ALL);
+        errors.extend(compiled.err());
+    }
+    errors
+}
+
+/// Finds the errors in all functions, although naga stops at the first error: a function with an error gets an empty
+/// body, which does not matter to its callers. The rest is a kernel that naga accepts, unless an error is outside all
+/// bodies.
+fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Source, Checked)>) {
+    let mut errors: Vec<ShaderError> = Vec::new();
+    loop {
+        let (mut error, at) = match check_at(&source) {
+            Ok(checked) => return (errors, Some((source, checked))),
+            Err(error) => error,
+        };
+        let texts = functions(&source.text);
+        let emptied = |i: usize| {
+            let function = &texts[i];
+            let body = match function.result {
+                "" => "{}".to_string(),
+                ty => format!("{{ var nothing: {ty}; return nothing; }}"),
+            };
+            source.replaced(function.body.clone(), &body)
+        };
+        let culprit = match at {
+            Some(at) => texts.iter().position(|text| (text.start..text.body.end).contains(&at)),
+            // naga does not say where: it is where the mistake goes with the body.
+            None => {
+                (0..texts.len()).find(|i| check_at(&emptied(*i)).err().map(|(error, _)| error).as_ref() != Some(&error))
+            }
+        };
+        if let (None, Some(i)) = (at, culprit) {
+            let function = &texts[i];
+            let message = format!("in `{}`: {}", function.name, error.message);
+            let head = function.start..function.start + "fn ".len() + function.name.len();
+            error = ShaderError::at(&source, Some(naga::Span::from(head)), message);
+        }
+        let again = errors.iter().any(|known| known.place == error.place);
+        if !again {
+            errors.push(error);
+        }
+        let Some(i) = culprit.filter(|_| !again && errors.len() < MOST) else {
+            return (errors, None);
+        };
+        source = emptied(i);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pack::pack;
+    use wgray_scene::Scene;
+
+    const SCENE: &str = "
+        image = { width = 8, height = 8 }
+        camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
+        materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }
+        shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
+    ";
+
+    /// Returns the messages for the built-in shaders with parts of files replaced; an empty part is the end of the
+    /// file.
+    fn said(edits: &[(&str, &str, &str)]) -> Vec<String> {
+        let mut shaders = Shaders::built_in();
+        for (name, old, new) in edits {
+            let text = shaders.text(name);
+            assert!(text.contains(old), "{name} has no '{old}'");
+            let text = match *old {
+                "" => format!("{text}{new}\n"),
+                old => text.replacen(old, new, 1),
+            };
+            shaders = shaders.with(name, text);
+        }
+        let packed = pack(&Scene::parse(SCENE, "s.toml").unwrap());
+        let errors = check_kernels(&packed, &shaders, Forms::Buffers).err();
+        errors.map_or(Vec::new(), |errors| errors.0.iter().map(ToString::to_string).collect())
+    }
+
+    #[track_caller]
+    fn says(edits: &[(&str, &str, &str)], wanted: &[&str]) {
+        let said = said(edits);
+        assert_eq!(said.len(), wanted.len(), "{said:#?}");
+        for wanted in wanted {
+            let (place, parts) = wanted.split_once(' ').unwrap();
+            let fits = |line: &&String| line.starts_with(place) && parts.split(" .. ").all(|part| line.contains(part));
+            assert!(said.iter().any(|line| fits(&line)), "{wanted}: {said:#?}");
+        }
+    }
+
+    const FILM: &str = "film.wgsl";
+    const RENDER: &str = "kernels/render.wgsl";
+    const FIRST_HITS: &str = "kernels/first_hits.wgsl";
+    const ADAPTIVE: &str = "kernels/adaptive.wgsl";
+
+    #[test]
+    fn the_built_in_shaders_are_right() {
+        assert_eq!(said(&[]), [""; 0]);
+    }
+
+    #[test]
+    fn every_kernel_is_checked_and_all_mistakes_are_told_once() {
+        says(
+            &[
+                (RENDER, "sample++", "sample+"),
+                (FIRST_HITS, "pixel_first_hit(pixel)", "pixel_first_hit(pixels)"),
+                (ADAPTIVE, "= moments;", "= moments.xyz;"),
+                ("phong.wgsl", "", "fn one() -> f32 { return missing; }"),
+                ("phong.wgsl", "", "fn two() -> f32 { return vec2f(1.0); }"),
+                (
+                    "light.wgsl",
+                    "",
+                    "fn three(a: f32) -> bool { let b = a && true; return b; }",
+                ),
+            ],
+            &[
+                "kernels/render.wgsl: expected",
+                "kernels/first_hits.wgsl:12: `pixels`",
+                "kernels/adaptive.wgsl: in `adaptive`: `moments.xyz` of type `vec3<f32>` cannot be stored in .. `vec4<f32>`",
+                "phong.wgsl: `missing`",
+                "phong.wgsl: in `two`: `vec2f(1.0)` of type `vec2<f32>` is returned where `f32` is declared",
+                "light.wgsl: in `three`: Incompatible operands",
+            ],
+        );
+    }
+
+    #[test]
+    fn the_entry_point_must_be_what_the_program_calls() {
+        says(
+            &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(4, 4)")],
+            &["kernels/render.wgsl: workgroup size of `render` is (4, 4) .. (8, 8)"],
+        );
+        says(
+            &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(BOUNCES, 8)")],
+            &["kernels/render.wgsl: workgroup size of `render` is set by an override"],
+        );
+        says(
+            &[(FIRST_HITS, "fn first_hits", "fn hits_first")],
+            &["kernels/first_hits.wgsl: must be called `first_hits`, not `hits_first`"],
+        );
+        let built_in = Shaders::built_in();
+        let text = built_in.text(FIRST_HITS);
+        let start = text.find("@compute").unwrap();
+        says(
+            &[(FIRST_HITS, &text[start..], "")],
+            &["kernels/first_hits.wgsl:1:1: there is no entry point: @compute @workgroup_size(8, 8) fn first_hits"],
+        );
+        says(
+            &[
+                (FIRST_HITS, "@compute @workgroup_size(8, 8)", ""),
+                (FIRST_HITS, "@builtin(global_invocation_id) ", ""),
+                (FIRST_HITS, "@builtin(local_invocation_index) ", ""),
+            ],
+            &["kernels/first_hits.wgsl: `first_hits` must be the entry point: @compute"],
+        );
+    }
+
+    #[test]
+    fn bindings_must_be_what_the_program_binds() {
+        let film = "@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;";
+        says(
+            &[(FILM, "@binding(1)", "@binding(40)")],
+            &["film.wgsl: `film` must be at @group(0) @binding(1)"],
+        );
+        says(
+            &[(FILM, film, "var<private> film: array<vec4f, 9>;")],
+            &["film.wgsl:1:1: @group(0) @binding(1) .. `var<storage, read_write>` film: array<vec4<f32>> is missing"],
+        );
+        says(
+            &[
+                (FIRST_HITS, "array<FirstHit>", "array<vec4f>"),
+                (
+                    FIRST_HITS,
+                    "= pixel_first_hit(pixel);",
+                    "= vec4f(pixel_first_hit(pixel).depth);",
+                ),
+            ],
+            &["kernels/first_hits.wgsl: `hits[]` is `vec4<f32>` and must be `FirstHit`"],
+        );
+        says(
+            &[("bindings.wgsl", "", "@group(0) @binding(30) var<uniform> more: vec4f;")],
+            &["bindings.wgsl: `more`: the program binds nothing at @group(0) @binding(30)"],
+        );
+        says(
+            &[("bindings.wgsl", "var<uniform> camera", "var<storage, read> camera")],
+            &["bindings.wgsl: `camera` is `var<storage, read>`; @group(1) @binding(0) must be `var<uniform>`"],
+        );
+        says(
+            &[("bindings.wgsl", "texels: array<u32>", "texels: array<u32, 16>")],
+            &["bindings.wgsl: `texels` is `array<u32, 16>` and must be `array<u32>`"],
+        );
+        // A buffer that is only read, and not needed, may go.
+        says(&[("bindings.wgsl", "", "// nothing")], &[]);
+    }
+
+    #[test]
+    fn bindings_must_be_laid_out_as_the_program_writes_them() {
+        let rows = "struct Rows { light_counts: vec4u, more: vec4u }\n";
+        says(
+            &[
+                ("bindings.wgsl", "receipt: Receipt", "receipt: Receipts"),
+                (
+                    "receipt.wgsl",
+                    "",
+                    "struct Receipts { ended: atomic<u32>, more: f32, cut: atomic<u32> }",
+                ),
+            ],
+            &["bindings.wgsl: `receipt` is not laid out .. `receipt.more` is `f32`"],
+        );
+        says(
+            &[
+                ("bindings.wgsl", "", rows),
+                (
+                    "bindings.wgsl",
+                    "filter_table: array<vec4f, BINS>",
+                    "filter_table: array<vec4f, 64>",
+                ),
+            ],
+            &["bindings.wgsl: `filter_table` is `array<vec4<f32>, 64>` and must be `array<vec4<f32>, 128>`"],
+        );
+    }
+
+    #[test]
+    fn errors_in_generated_code_are_left_out_where_a_file_has_the_cause() {
+        let said = said(&[("bindings.wgsl", "records: array<vec4u>", "records: array<vec2u>")]);
+        assert!(
+            said.iter()
+                .any(|line| line.starts_with("bindings.wgsl:") && line.contains("laid out")),
+            "{said:#?}"
+        );
+        assert!(said.iter().all(|line| !line.starts_with('(')), "{said:#?}");
+    }
+
+    #[test]
+    fn a_second_definition_of_a_name_is_reported_with_the_place_of_the_first() {
+        says(
+            &[("phong.wgsl", "", "const steps: i32 = 3;")],
+            &["node.wgsl:5:4: redefinition of `steps`; the other definition is at phong.wgsl:"],
+        );
+    }
+
+    #[test]
+    fn constants_of_a_shader_must_have_values() {
+        says(
+            &[("math.wgsl", "", "override MINE: f32;")],
+            &["math.wgsl: `MINE` has no value"],
+        );
+        says(&[("math.wgsl", "", "override MINE: f32 = 2.0;")], &[]);
+    }
+
+    #[test]
+    fn results_must_be_written() {
+        says(
+            &[(RENDER, "    sign(local);\n", "")],
+            &[
+                "kernels/render.wgsl: `render` never writes `receipt`, which the program reads: every pixel must end with `sign(local)`",
+            ],
+        );
+        says(
+            &[(FIRST_HITS, "hits[place.y * work.film_size.x + place.x] =", "let hit =")],
+            &["kernels/first_hits.wgsl: `first_hits` never writes `hits`"],
+        );
+    }
+
+    /// Messages never contain naga's internal indices.
+    #[test]
+    fn messages_name_what_is_in_the_source() {
+        let with = |body: &str| {
+            said(&[(
+                "phong.wgsl",
+                "",
+                &format!("fn wrong(a: f32, b: vec3f, n: u32) {{\n    {body}\n}}"),
+            )])
+        };
+        for (body, wanted) in [
+            ("if n { }", "the condition `n` of type `u32` must be `bool`"),
+            (
+                "let x = b + vec2f();",
+                "`b` of type `vec3<f32>` and `vec2f()` of type `vec2<f32>` are incompatible",
+            ),
+            ("let x = !a;", "`a` of type `f32` cannot be the operand"),
+            (
+                "let x = wronged(a, a, n); }\nfn wronged(a: f32, b: vec3f, n: u32) -> f32 { return a;",
+                "`wronged`: argument 2, `a` of type `f32`, must be `vec3<f32>`",
+            ),
+            (
+                "return a;",
+                "`a` of type `f32` is returned, but no return type is declared",
+            ),
+            (
+                "var x = film;",
+                "`x`: type `array<vec4<f32>>` cannot be that of a variable",
+            ),
+            (
+                "let x = select(a, a, n);",
+                "the condition of `select` must be `bool`, not `u32`",
+            ),
+            ("let x = vec3f(1.0, 2u, 3.0);", "value 2 has a type that does not fit"),
+            ("let x = n << 40u;", "a shift by more bits than `u32` has"),
+            ("let x = records[a].x;", "Accessing with index `a`"),
+            ("primitives[0].level = a;", "`primitives[0].level`"),
+            ("break;", "outside of a `loop`"),
+            ("let x = all(b);", "`b`"),
+            ("let x = b == camera;", "`camera` of type `Camera` are incompatible"),
+            ("let x = camera == camera;", "Incompatible operands"),
+        ] {
+            let said = with(body);
+            // `film` is in two kernels only: in the third it is another mistake.
+            let line = said
+                .iter()
+                .find(|line| line.contains(wanted))
+                .unwrap_or_else(|| panic!("{body}: {said:?}"));
+            let message = line.split_once(' ').unwrap().1;
+            assert!(line.starts_with("phong.wgsl:"), "{line}");
+            let numbered = message
+                .as_bytes()
+                .windows(2)
+                .any(|pair| pair[0] == b'[' && pair[1].is_ascii_digit());
+            assert!(
+                (!numbered || message.contains("primitives[0]")) && !message.contains("Some("),
+                "{line}"
+            );
+        }
+    }
+}

@@ -1,0 +1,427 @@
+//! Checkpoints: a file that receives every finished piece of an image, and at intervals the unfinished one, so that an
+//! interrupted job can resume. One process writes it at a time; others wait.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use tempfile::NamedTempFile;
+use thiserror::Error;
+
+use super::identity::Identity;
+use super::piece::{CheckpointStore, Piece, StoredPiece};
+use super::pieces_file::{self, Entry, FORMAT, Header, Key};
+use crate::error::RenderError;
+use crate::film::Form;
+use wgray_image::Output;
+
+/// Why a checkpoint cannot be used.
+#[derive(Debug, Error)]
+pub enum CheckpointError {
+    /// The file exists, and resuming was not requested.
+    #[error("{}: already exists; pass --resume to continue it, or choose another name", .0.display())]
+    Exists(PathBuf),
+    /// The checkpoint belongs to another job.
+    #[error("{}: {what}; choose another name or delete it", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// Description of the difference.
+        what: String,
+    },
+    /// The file is not a checkpoint that this program can read.
+    #[error("{}: cannot resume from this file: {what}; choose another name or delete it", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Description of the error.
+        what: String,
+    },
+    /// The caller stopped waiting for the process that writes the file.
+    #[error("{}: still in use by another process", .0.display())]
+    Busy(PathBuf),
+    /// The file cannot be read or written.
+    #[error("{}: {error}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        error: io::Error,
+    },
+}
+
+/// Options for opening a checkpoint.
+pub struct Opening<'a> {
+    /// Path of the file, or of a folder in which each job has its own file.
+    pub path: PathBuf,
+    /// Whether to resume from an existing file.
+    pub resume: bool,
+    /// Interval at which the unfinished piece is written.
+    pub interval: Duration,
+    /// Called at intervals while another process writes the file; returns whether to keep waiting.
+    pub wait: Box<dyn FnMut() -> bool + 'a>,
+    /// Reports problems that do not end the work.
+    pub tell: Box<dyn FnMut(&str) + 'a>,
+}
+
+/// An open checkpoint.
+pub struct Checkpoint<'a> {
+    /// Name in messages.
+    name: PathBuf,
+    path: PathBuf,
+    file: File,
+    header: Header,
+    key: Key,
+    form: Form,
+    entries: Vec<Entry>,
+    /// Pieces that no later one replaces, by their first rows.
+    latest: BTreeMap<u32, usize>,
+    /// End of the last complete piece.
+    end: u64,
+    interval: Duration,
+    tell: Box<dyn FnMut(&str) + 'a>,
+    /// Length below which rewriting the file is not tried again after a failure.
+    untidy: u64,
+    /// Whether a failed write and a lost file have been reported.
+    reported: [bool; 2],
+}
+
+/// Replaced pieces stay in the file until they take more bytes than this and than the pieces in use.
+const WASTE: u64 = 64 << 20;
+/// Interval between two attempts to lock a file that another process writes.
+const RETRY_INTERVAL: Duration = Duration::from_millis(50);
+/// Number of attempts before waiting is reported.
+const QUIET_RETRIES: u32 = 20;
+
+impl<'a> Checkpoint<'a> {
+    /// Creates a checkpoint for a job, or resumes an existing one as soon as no other process writes it.
+    ///
+    /// # Errors
+    ///
+    /// [`CheckpointError`].
+    pub fn open(opening: Opening<'a>, identity: Identity, form: Form) -> Result<Checkpoint<'a>, CheckpointError> {
+        let Opening {
+            path: name,
+            resume,
+            interval,
+            mut wait,
+            mut tell,
+        } = opening;
+        let name = match name.is_dir() {
+            true => name.join(identity.file_name()),
+            false => name,
+        };
+        let failed = |error| CheckpointError::Io {
+            path: name.clone(),
+            error,
+        };
+        // Links are followed and stay in place.
+        let found = Output::find(&name).map_err(failed)?;
+        let no_file = || CheckpointError::Unreadable {
+            path: name.clone(),
+            what: "it is not a regular file".to_owned(),
+        };
+        let path = found.path().ok_or_else(no_file)?;
+        let header = Header {
+            format: FORMAT,
+            identity,
+            part: None,
+        };
+        let mut rounds = 0;
+        loop {
+            match fs::metadata(path) {
+                Ok(_) if !resume => return Err(CheckpointError::Exists(name)),
+                Ok(_) => {}
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                    match start(path, &header) {
+                        Ok((file, key, end)) => {
+                            return Ok(Checkpoint {
+                                name,
+                                path: path.to_owned(),
+                                file,
+                                header,
+                                key,
+                                form,
+                                entries: Vec::new(),
+                                latest: BTreeMap::new(),
+                                end,
+                                interval,
+                                tell,
+                                untidy: 0,
+                                reported: [false; 2],
+                            });
+                        }
+                        // Another process was faster.
+                        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
+                        Err(error) => return Err(failed(error)),
+                    }
+                }
+                Err(error) => return Err(failed(error)),
+            }
+            let file = match File::options().read(true).write(true).open(path) {
+                Ok(file) => file,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(error) => return Err(failed(error)),
+            };
+            match file.try_lock() {
+                Err(TryLockError::WouldBlock) => {
+                    // A process that is being killed ends within a second; that is not worth a message.
+                    rounds += 1;
+                    if rounds == QUIET_RETRIES {
+                        tell(&format!(
+                            "{}: in use by another process; waiting until it ends",
+                            name.display()
+                        ));
+                    }
+                    if !wait() {
+                        return Err(CheckpointError::Busy(name));
+                    }
+                    std::thread::sleep(RETRY_INTERVAL);
+                    continue;
+                }
+                // Some file systems have no locks.
+                Err(TryLockError::Error(_)) | Ok(()) => {}
+            }
+            // The process that held the lock may have replaced the file.
+            if !is_at(&file, path) {
+                continue;
+            }
+            return Checkpoint::continue_from(name, path, file, header, form, interval, tell);
+        }
+    }
+
+    /// Returns the name in messages.
+    pub fn name(&self) -> &Path {
+        &self.name
+    }
+
+    fn continue_from(
+        name: PathBuf,
+        path: &Path,
+        mut file: File,
+        header: Header,
+        form: Form,
+        interval: Duration,
+        mut tell: Box<dyn FnMut(&str) + 'a>,
+    ) -> Result<Checkpoint<'a>, CheckpointError> {
+        let unreadable = |error: io::Error| CheckpointError::Unreadable {
+            path: name.clone(),
+            what: error.to_string(),
+        };
+        let failed = |error| CheckpointError::Io {
+            path: name.clone(),
+            error,
+        };
+        // Left by a process that was killed while it rewrote the file.
+        wgray_image::remove_stale_beside(path);
+        let (found, key, start) = pieces_file::read_header(&mut file).map_err(unreadable)?;
+        let what = match found.part {
+            Some(_) => Some("is a part of an image, which wgray merge reads, and not a checkpoint".to_owned()),
+            None => (header.identity.difference(&found.identity)).map(|what| format!("belongs to another job: {what}")),
+        };
+        if let Some(what) = what {
+            return Err(CheckpointError::Foreign { path: name, what });
+        }
+        let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(failed)?;
+        if contents.damaged > 0 {
+            tell(&format!(
+                "{}: dropped {} bytes after byte {}, which are damaged or incomplete",
+                name.display(),
+                contents.damaged,
+                contents.end
+            ));
+            file.set_len(contents.end).map_err(failed)?;
+        }
+        let latest = pieces_file::latest(&contents.entries);
+        let latest = latest.into_iter().map(|i| (contents.entries[i].region.y0, i)).collect();
+        Ok(Checkpoint {
+            name,
+            path: path.to_owned(),
+            file,
+            header: found,
+            key,
+            form,
+            entries: contents.entries,
+            latest,
+            end: contents.end,
+            interval,
+            tell,
+            untidy: 0,
+            reported: [false; 2],
+        })
+    }
+
+    fn append(&mut self, piece: &Piece) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(self.end))?;
+        let mut out = BufWriter::with_capacity(1 << 20, &self.file);
+        let bytes = pieces_file::write_piece(&mut out, &self.key, piece, &[])?;
+        out.flush()?;
+        drop(out);
+        let entry = Entry::of(piece, self.end, bytes);
+        self.end += bytes;
+        let number = self.entries.len();
+        self.entries.push(entry);
+        pieces_file::replace(&mut self.latest, &self.entries, number, piece.region);
+        Ok(())
+    }
+
+    /// Rewrites the file without replaced pieces if these are the greater part.
+    fn tidy(&mut self) {
+        let lengths = self
+            .latest
+            .values()
+            .map(|i| self.entries[*i].end - self.entries[*i].start);
+        let needed: u64 = lengths.sum();
+        let bound = (2 * needed + WASTE).max(self.untidy);
+        if self.end > bound && self.rewrite(|temporary, path| temporary.persist(path)).is_err() {
+            // The disk may be full, or the file may not be replaceable. Nothing is lost; a later call tries again.
+            self.untidy = 2 * self.end;
+        }
+    }
+
+    /// Rewrites the file with the pieces in use, and renames it into place.
+    fn rewrite(
+        &mut self,
+        name: impl Fn(NamedTempFile, &Path) -> Result<File, tempfile::PersistError>,
+    ) -> io::Result<()> {
+        let (mut temporary, key, mut end) = temporary(&self.path, &self.header)?;
+        let mut entries = Vec::new();
+        for i in self.latest.values() {
+            let entry = &self.entries[*i];
+            let bytes = entry.end - entry.start;
+            self.file.seek(SeekFrom::Start(entry.start))?;
+            io::copy(&mut io::Read::take(&self.file, bytes), temporary.as_file_mut())?;
+            entries.push(Entry {
+                start: end,
+                end: end + bytes,
+                ..entry.clone()
+            });
+            end += bytes;
+        }
+        temporary
+            .as_file()
+            .set_permissions(self.file.metadata()?.permissions())?;
+        temporary.as_file().sync_data()?;
+        self.file = name(temporary, &self.path)?;
+        self.latest = (0..).zip(&entries).map(|(i, entry)| (entry.region.y0, i)).collect();
+        (self.entries, self.key, self.end) = (entries, key, end);
+        Ok(())
+    }
+
+    /// Restores the file if it was deleted. If another file is in its place, keeps that one and reports it.
+    fn still_there(&mut self) -> io::Result<()> {
+        if is_at(&self.file, &self.path) && self.file.metadata()?.len() >= self.end {
+            return Ok(());
+        }
+        let is_gone = fs::symlink_metadata(&self.path).is_err_and(|error| error.kind() == io::ErrorKind::NotFound);
+        if is_gone
+            && self
+                .rewrite(|temporary, path| temporary.persist_noclobber(path))
+                .is_ok()
+        {
+            return Ok(());
+        }
+        self.tell_once(
+            1,
+            "was changed or replaced by another program; this render can no longer be resumed from it",
+        );
+        Ok(())
+    }
+
+    fn tell_once(&mut self, which: usize, what: &str) {
+        if !std::mem::replace(&mut self.reported[which], true) {
+            (self.tell)(&format!("{}: {what}", self.name.display()));
+        }
+    }
+
+    /// Reports the first piece that could not be written. Later ones are still tried.
+    fn noted(&mut self, result: io::Result<()>) {
+        if let Err(error) = result {
+            // Readers drop an incomplete piece, but it takes space on the disk.
+            let _ = self.file.set_len(self.end);
+            self.tell_once(
+                0,
+                &format!("a piece could not be written; rendering continues: {error}"),
+            );
+        }
+    }
+}
+
+impl CheckpointStore for Checkpoint<'_> {
+    fn pieces(&self) -> Vec<StoredPiece> {
+        let kept = |i: &usize| {
+            let entry = &self.entries[*i];
+            StoredPiece {
+                number: *i,
+                region: entry.region,
+                film: entry.film,
+                reached: entry.reached.clone(),
+            }
+        };
+        self.latest.values().map(kept).collect()
+    }
+
+    fn load(&mut self, number: usize) -> Result<Piece, RenderError> {
+        let entry = self.entries.get(number).ok_or(RenderError::NoFilm)?;
+        let read = pieces_file::read_piece(&self.file, &self.key, entry, self.form);
+        let named = |error: io::Error| {
+            let message = format!("{}: cannot be read: {error}", self.name.display());
+            RenderError::Input(io::Error::new(error.kind(), message))
+        };
+        Ok(read.map_err(named)?.0)
+    }
+
+    fn keep(&mut self, piece: &Piece) {
+        let result = self.append(piece);
+        self.noted(result);
+    }
+
+    fn sync(&mut self) {
+        let result = self.file.sync_data().and_then(|()| self.still_there());
+        self.tidy();
+        self.noted(result);
+    }
+
+    fn interval(&self) -> Duration {
+        self.interval
+    }
+
+    fn small_pieces(&self) -> bool {
+        true
+    }
+}
+
+/// Creates the file, which is locked and has its whole header from the moment it exists.
+fn start(path: &Path, header: &Header) -> io::Result<(File, Key, u64)> {
+    let (temporary, key, end) = temporary(path, header)?;
+    temporary.as_file().sync_data()?;
+    let file = temporary.persist_noclobber(path).map_err(|error| error.error)?;
+    Ok((file, key, end))
+}
+
+/// Creates a locked temporary file with a header beside `path`.
+fn temporary(path: &Path, header: &Header) -> io::Result<(NamedTempFile, Key, u64)> {
+    let mut temporary = wgray_image::beside(path)?;
+    let (key, end) = pieces_file::write_header(temporary.as_file_mut(), header)?;
+    Ok((temporary, key, end))
+}
+
+/// Returns whether a path leads to an open file.
+fn is_at(file: &File, path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        match (file.metadata(), fs::metadata(path)) {
+            (Ok(a), Ok(b)) => (a.dev(), a.ino()) == (b.dev(), b.ino()),
+            _ => false,
+        }
+    }
+    #[cfg(not(unix))]
+    {
+        // Other systems do not replace open files.
+        let _ = (file, path);
+        true
+    }
+}

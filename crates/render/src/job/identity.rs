@@ -1,0 +1,308 @@
+//! Identity of a job: two jobs with the same identity produce the same bits, so one can resume what another left.
+
+use bytemuck::{bytes_of, cast_slice};
+use serde::{Deserialize, Serialize};
+
+use crate::pack::{Packed, PackedMesh, Specialization};
+use wgray_image::Region;
+
+/// Maximum side of an image in pixels, and maximum samples per pixel, as in scenes.
+const MAX_COUNT: u32 = 65_536;
+
+/// Everything that determines the bits of a film. The device is not part of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identity {
+    /// Version of the program.
+    pub version: String,
+    /// Hash of the shader files.
+    pub shaders: String,
+    /// Hash of the packed scene, which includes the values of overriding options.
+    pub scene: String,
+    /// Width and height of the whole image in pixels.
+    pub picture: [u32; 2],
+    /// Rendered pixels: x0, y0, x1, y1.
+    pub region: [u32; 4],
+    /// Samples per pixel; under adaptive sampling the maximum.
+    pub pixel_samples: u32,
+    /// True if sampling is adaptive.
+    pub adaptive: bool,
+    /// True if the film has layers that are means over the samples.
+    pub layers: bool,
+    /// True if rounding is done in software.
+    pub exact_rounding: bool,
+}
+
+impl Identity {
+    /// Returns the identity of rendering `region` of a scene.
+    pub fn of(scene: &Packed, region: Region, exact_rounding: bool) -> Identity {
+        let form = scene.form();
+        Identity {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            shaders: wgray_shaders::hash(),
+            scene: hash_of_scene(scene),
+            picture: [scene.camera.width, scene.camera.height],
+            region: [region.x0, region.y0, region.x1, region.y1],
+            pixel_samples: scene.pixel_samples,
+            adaptive: form.adaptive,
+            layers: form.layers,
+            exact_rounding,
+        }
+    }
+
+    /// Returns a file name that is unique to this job.
+    pub fn file_name(&self) -> String {
+        let Identity {
+            version,
+            shaders,
+            scene,
+            picture,
+            region,
+            pixel_samples,
+            adaptive,
+            layers,
+            exact_rounding,
+        } = self;
+        let mut hasher = blake3::Hasher::new();
+        for text in [version, shaders, scene] {
+            list(&mut hasher, text.as_bytes());
+        }
+        list(&mut hasher, bytes_of(picture));
+        list(&mut hasher, bytes_of(region));
+        list(&mut hasher, bytes_of(pixel_samples));
+        list(&mut hasher, &[*adaptive, *layers, *exact_rounding].map(u8::from));
+        format!("{}.checkpoint", &hasher.finalize().to_hex()[..16])
+    }
+
+    /// Returns the rendered pixels.
+    pub fn region(&self) -> Region {
+        let [x0, y0, x1, y1] = self.region;
+        Region { x0, y0, x1, y1 }
+    }
+
+    /// Rejects sizes and regions that this program never writes, as an untrusted file may contain them.
+    pub fn check(&self) -> Result<(), String> {
+        let [width, height] = self.picture;
+        let sides = 1..=MAX_COUNT;
+        if !sides.contains(&width) || !sides.contains(&height) {
+            return Err(format!(
+                "its image size, {width} x {height}, must be from 1 to {MAX_COUNT} pixels along each side"
+            ));
+        }
+        let region = self.region();
+        if region.is_empty() || region.within(Region::whole(width, height)) != region {
+            return Err(format!(
+                "its region, {region}, must lie within its image of {width} x {height} pixels"
+            ));
+        }
+        match sides.contains(&self.pixel_samples) {
+            true => Ok(()),
+            false => Err(format!(
+                "its samples per pixel, {}, must be from 1 to {MAX_COUNT}",
+                self.pixel_samples
+            )),
+        }
+    }
+
+    /// Describes the first difference of another job from this one: "its size is A, not B". Returns `None` if they are equal.
+    pub fn difference(&self, other: &Identity) -> Option<String> {
+        let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
+        let short = |hash: &str| hash.get(..16).unwrap_or(hash).to_owned();
+        let either = |other: bool, set: &str, unset: &str| match other {
+            true => format!("{set}, not {unset}"),
+            false => format!("{unset}, not {set}"),
+        };
+        Some(if self.version != other.version {
+            format!("its version of wgray is {}, not {}", other.version, self.version)
+        } else if self.picture != other.picture {
+            format!("its size is {}, not {}", size(other.picture), size(self.picture))
+        } else if self.region != other.region {
+            format!("its crop is {}, not {}", other.region(), self.region())
+        } else if self.pixel_samples != other.pixel_samples {
+            format!(
+                "its number of samples is {}, not {}",
+                other.pixel_samples, self.pixel_samples
+            )
+        } else if self.adaptive != other.adaptive {
+            format!("its sampling is {}", either(other.adaptive, "adaptive", "uniform"))
+        } else if self.layers != other.layers {
+            format!(
+                "its layers are {}",
+                either(other.layers, "means over the samples", "first hits only")
+            )
+        } else if self.exact_rounding != other.exact_rounding {
+            let text = either(other.exact_rounding, "with", "without");
+            format!("its rounding is {text} --exact-rounding")
+        } else if self.shaders != other.shaders {
+            format!(
+                "its shaders differ: their hash is {}, not {}",
+                short(&other.shaders),
+                short(&self.shaders)
+            )
+        } else if self.scene != other.scene {
+            format!(
+                "its scene or an option (seed, integrator, ...) differs: the hash is {}, not {}",
+                short(&other.scene),
+                short(&self.scene)
+            )
+        } else {
+            return None;
+        })
+    }
+}
+
+/// Returns the hash of a packed scene.
+pub fn hash_of_scene(scene: &Packed) -> String {
+    // Destructures every field, so that a new one cannot be forgotten.
+    let Packed {
+        origin,
+        camera,
+        integrator,
+        environment,
+        primitives,
+        bounds,
+        nodes,
+        items,
+        instances,
+        meshes,
+        group_words,
+        materials,
+        lights,
+        emitters,
+        light_nodes,
+        light_leaves,
+        counts,
+        lookups,
+        textures,
+        texels,
+        filter_table,
+        pixel_samples,
+        adaptive,
+        specialization,
+    } = scene;
+    let mut hasher = blake3::Hasher::new();
+    let records: [&[u8]; 19] = [
+        bytes_of(camera),
+        bytes_of(environment),
+        bytes_of(counts),
+        cast_slice(primitives),
+        cast_slice(bounds),
+        cast_slice(nodes),
+        cast_slice(items),
+        cast_slice(instances),
+        cast_slice(group_words),
+        cast_slice(materials),
+        cast_slice(lights),
+        cast_slice(emitters),
+        cast_slice(light_nodes),
+        cast_slice(light_leaves),
+        cast_slice(lookups),
+        cast_slice(textures),
+        cast_slice(texels),
+        cast_slice(filter_table),
+        integrator.name().as_bytes(),
+    ];
+    for bytes in records {
+        list(&mut hasher, bytes);
+    }
+    for coordinate in origin.to_array() {
+        hasher.update(&coordinate.to_le_bytes());
+    }
+    for mesh in meshes {
+        hash_mesh(&mut hasher, mesh);
+    }
+    hasher.update(&pixel_samples.to_le_bytes());
+    hasher.update(&[u8::from(*adaptive)]);
+    // Layers do not change the scene.
+    let specialization = Specialization {
+        layers: 0,
+        ..*specialization
+    };
+    for (name, value) in specialization.constants() {
+        list(&mut hasher, name.as_bytes());
+        hasher.update(&value.to_le_bytes());
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
+    let PackedMesh {
+        nodes,
+        triangles,
+        vertices,
+        attributes,
+        tangents,
+        colors,
+        more_uvs,
+        groups,
+        low,
+        high,
+    } = mesh;
+    let records: [&[u8]; 10] = [
+        cast_slice(nodes),
+        cast_slice(triangles),
+        cast_slice(vertices),
+        cast_slice(attributes),
+        cast_slice(tangents),
+        cast_slice(colors),
+        cast_slice(more_uvs),
+        cast_slice(groups),
+        bytes_of(low),
+        bytes_of(high),
+    ];
+    for bytes in records {
+        list(hasher, bytes);
+    }
+}
+
+/// Minimum length of a list that is hashed by all threads.
+const PARALLEL_BYTES: usize = 1 << 20;
+
+/// Hashes bytes with their length in front, so that no two lists of lists hash alike.
+fn list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
+    hasher.update(&(bytes.len() as u64).to_le_bytes());
+    match bytes.len() >= PARALLEL_BYTES {
+        true => hasher.update_rayon(bytes),
+        false => hasher.update(bytes),
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers_of_jobs_that_cannot_be_are_refused() {
+        let good = Identity {
+            version: String::new(),
+            shaders: String::new(),
+            scene: String::new(),
+            picture: [65_536, 3],
+            region: [1, 0, 65_536, 3],
+            pixel_samples: 65_536,
+            adaptive: false,
+            layers: false,
+            exact_rounding: false,
+        };
+        good.check().unwrap();
+        for (picture, region, pixel_samples) in [
+            ([0, 3], [0, 0, 0, 3], 1),
+            ([65_537, 3], [0, 0, 1, 1], 1),
+            ([4, u32::MAX], [0, 0, 4, u32::MAX], 1),
+            ([4, 3], [0, 0, 4, 4], 1),
+            ([4, 3], [0, 0, 0, 3], 1),
+            ([4, 3], [3, 0, 2, 3], 1),
+            ([4, 3], [u32::MAX, 0, u32::MAX, 3], 1),
+            ([4, 3], [0, 0, 4, 3], 0),
+            ([4, 3], [0, 0, 4, 3], 65_537),
+        ] {
+            let bad = Identity {
+                picture,
+                region,
+                pixel_samples,
+                ..good.clone()
+            };
+            assert!(bad.check().unwrap_err().contains("must "), "{bad:?}");
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! The schedule of work, above both backends: bands that fit memory, dispatches that end in time, progress and
+//! cancelling. Sums go on from the film's own values, so that every cut gives the same picture.
+
+mod bands;
+pub mod checkpoint;
+mod identity;
+mod pace;
+mod part;
+mod piece;
+mod pieces_file;
+mod steps;
+
+use std::time::Duration;
+
+use crate::backend::Backend;
+use crate::error::RenderError;
+use crate::film::{Film, Form};
+use crate::pack::FirstHit;
+use wgray_image::Region;
+
+pub use bands::{Bands, Finished, Flow, Watch, there_is_memory};
+pub use identity::{Identity, hash_of_scene};
+pub use part::{PartError, PartHeader, Parts, Tile, read_part, write_part};
+pub use piece::{CheckpointStore, INTERVAL, NoCheckpoint, Piece, StoredPiece};
+pub use steps::{Order, Reached, Steps};
+
+/// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
+/// watchdogs, progress and cancelling.
+const CALL: Duration = Duration::from_millis(60);
+
+/// How work is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// The largest film, in pixels.
+    pub band_pixels: u64,
+    /// The samples of one call, if not as many as time allows.
+    pub samples_per_call: Option<u32>,
+    /// The rows of one call, if not as many as time allows.
+    pub rows_per_call: Option<u32>,
+}
+
+impl Default for Cut {
+    /// Bands of 64 MiB, of 192 MiB under adaptive sampling.
+    fn default() -> Cut {
+        Cut {
+            band_pixels: 4 << 20,
+            samples_per_call: None,
+            rows_per_call: None,
+        }
+    }
+}
+
+impl Cut {
+    /// [`Cut::default`], and with layers so few pixels that a band is no larger than one under adaptive sampling.
+    pub fn of(form: Form) -> Cut {
+        const LISTS: u64 = 3;
+        let cut = Cut::default();
+        Cut {
+            band_pixels: cut.band_pixels * LISTS / LISTS.max(form.lists() as u64),
+            ..cut
+        }
+    }
+}
+
+/// The bands that a region is rendered in, from the top: whole rows, as many as a film has room for. A region without
+/// pixels has none.
+pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
+    let [width, height] = [region.width(), region.height()].map(|n| u64::from(n.max(1)));
+    let rows = (cut.band_pixels.min(largest_film) / width).clamp(1, height) as u32;
+    let end = if region.is_empty() { region.y0 } else { region.y1 };
+    (region.y0..end).step_by(rows as usize).map(move |y0| Region {
+        y0,
+        y1: region.y1.min(y0 + rows),
+        ..region
+    })
+}
+
+/// What the rays through the centres of a region's pixels meet first, row by row from the top; in calls of bounded size.
+pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+    const CALL_PIXELS: u64 = 1 << 18;
+    let cut = Cut {
+        band_pixels: CALL_PIXELS,
+        ..Cut::default()
+    };
+    let mut hits = Vec::new();
+    for strip in bands(region, &cut, backend.largest_film()) {
+        hits.extend(backend.first_hits(strip)?);
+    }
+    Ok(hits)
+}
+
+/// Renders a region band by band, from the top, and hands each finished band to `output`. `progress` is told the share
+/// of the work that is done, from 0 to 1, and returns whether to go on.
+pub fn render(
+    backend: &mut dyn Backend,
+    region: Region,
+    samples: u32,
+    cut: &Cut,
+    progress: &mut dyn FnMut(f64) -> bool,
+    output: &mut dyn FnMut(Film) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let mut no_checkpoint = NoCheckpoint;
+    let mut bands = Bands::new(
+        region,
+        samples,
+        cut,
+        Order::Rows,
+        backend.largest_film(),
+        &mut no_checkpoint,
+    );
+    let mut watch = |_: &mut dyn Backend, _: Region, share: f64| Ok(progress(share).into());
+    while let Some(band) = bands.render_next(backend, &mut watch, &mut || {})? {
+        output(band.film)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::Range;
+
+    use super::*;
+
+    /// Notes what it is asked for.
+    struct Notes(Vec<(Region, Range<u32>)>);
+
+    impl Backend for Notes {
+        fn begin(&mut self, _: Region) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn resume(&mut self, _: Film) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn poll(&mut self) -> Result<bool, RenderError> {
+            Ok(true)
+        }
+
+        fn wait(&mut self) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+            self.0.push((tile, samples));
+            Ok(())
+        }
+
+        fn film(&mut self) -> Result<Film, RenderError> {
+            Err(RenderError::Cancelled)
+        }
+
+        fn first_hits(&mut self, _: Region) -> Result<Vec<FirstHit>, RenderError> {
+            Ok(Vec::new())
+        }
+
+        fn largest_film(&self) -> u64 {
+            u64::MAX
+        }
+
+        fn samples_of_all(&self) -> u32 {
+            u32::MAX
+        }
+
+        fn around(&self, region: Region) -> Region {
+            region
+        }
+    }
+
+    #[test]
+    fn rows_get_all_samples_first_or_all_pixels_some() {
+        for (order, first) in [(Order::Rows, 0..16), (Order::Pixels, 0..4)] {
+            let (mut notes, region) = (Notes(Vec::new()), Region::whole(64, 64));
+            let mut steps = Steps::new(&Cut::default(), CALL, order);
+            steps.start(&notes, region, 16);
+            while steps.step(&mut notes).unwrap().is_some() {}
+            assert_eq!(notes.0[0].1, first, "{order:?}");
+            // every sample of every pixel once, those of a pixel in their order
+            let mut samples = [0; 64];
+            for (tile, range) in notes.0 {
+                assert_eq!((tile.x0, tile.x1), (0, 64));
+                for done in &mut samples[tile.y0 as usize..tile.y1 as usize] {
+                    assert_eq!(*done, range.start);
+                    *done = range.end;
+                }
+            }
+            assert_eq!(samples, [16; 64], "{order:?}");
+        }
+    }
+
+    /// Notes what it is asked for; four samples of a pixel decide on those of its neighbours.
+    #[derive(Default)]
+    struct Looks {
+        film: Option<Region>,
+        calls: Vec<(Region, Range<u32>)>,
+    }
+
+    impl Backend for Looks {
+        fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+            self.film = Some(region);
+            Ok(())
+        }
+
+        fn resume(&mut self, _: Film) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn poll(&mut self) -> Result<bool, RenderError> {
+            Ok(true)
+        }
+
+        fn wait(&mut self) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+            self.calls.push((tile, samples));
+            Ok(())
+        }
+
+        fn film(&mut self) -> Result<Film, RenderError> {
+            self.film.map(Film::adaptive).ok_or(RenderError::Cancelled)
+        }
+
+        fn first_hits(&mut self, _: Region) -> Result<Vec<FirstHit>, RenderError> {
+            Ok(Vec::new())
+        }
+
+        fn largest_film(&self) -> u64 {
+            u64::MAX
+        }
+
+        fn samples_of_all(&self) -> u32 {
+            4
+        }
+
+        fn around(&self, region: Region) -> Region {
+            region.with_neighbors().within(Region::whole(64, 64))
+        }
+    }
+
+    #[test]
+    fn a_region_and_its_neighbours_get_first_looks_before_any_pixel_gets_more() {
+        let (region, film) = (
+            Region {
+                x0: 5,
+                y0: 10,
+                x1: 64,
+                y1: 64,
+            },
+            Region {
+                x0: 4,
+                y0: 9,
+                x1: 64,
+                y1: 64,
+            },
+        );
+        for samples_per_call in [None, Some(3)] {
+            let cut = Cut {
+                samples_per_call,
+                ..Cut::default()
+            };
+            let (mut backend, mut done, mut outputs) = (Looks::default(), 0.0, Vec::new());
+            let mut progress = |share| {
+                done = share;
+                true
+            };
+            let mut output = |film: Film| {
+                outputs.push((film.region, film.sums.len(), film.moments.len()));
+                Ok(())
+            };
+            render(&mut backend, region, 16, &cut, &mut progress, &mut output).unwrap();
+            assert_eq!((backend.film, outputs.len()), (Some(film), 1));
+            assert_eq!(outputs[0], (region, region.pixels() as usize, region.pixels() as usize));
+            let further = backend
+                .calls
+                .iter()
+                .position(|(_, samples)| samples.start >= 4)
+                .unwrap();
+            let work = |calls: &[(Region, Range<u32>)], part: Region, samples: Range<u32>| {
+                for (tile, range) in calls {
+                    assert_eq!((tile.x0, tile.x1), (part.x0, part.x1));
+                    assert!(range.start >= samples.start && range.end <= samples.end);
+                    assert_eq!(*tile, tile.within(part));
+                }
+                let pixels = calls.iter().map(|(tile, range)| tile.pixels() * range.len() as u64);
+                assert_eq!(pixels.sum::<u64>(), part.pixels() * samples.len() as u64);
+            };
+            work(&backend.calls[..further], film, 0..4);
+            work(&backend.calls[further..], region, 4..16);
+            assert!((done - 1.0).abs() < 1e-12, "{done}");
+        }
+    }
+}

@@ -1,0 +1,489 @@
+//! Parts of a picture, rendered apart and joined: files of finished pieces, with the first hits where layers need them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::identity::Identity;
+use super::piece::Piece;
+use super::pieces_file::{self, Entry, FORMAT, Header, Key};
+use super::steps::Reached;
+use crate::error::RenderError;
+use crate::film::Form;
+use crate::output::{Aov, AovSource, Band, Layout, Metadata, Sink};
+use wgray_image::Pending;
+use wgray_image::Region;
+use wgray_image::waiting;
+use wgray_scene::{Integrator, ViewSettings, ViewTransform};
+
+/// What a picture needs besides the films of its parts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartHeader {
+    /// Which part it is.
+    pub tile: Tile,
+    /// The layers, by their names.
+    pub aovs: Vec<String>,
+    /// Whether the picture has alpha.
+    pub alpha: bool,
+    /// The bits of the distance that is half bright in a PNG of the depth, as an f32.
+    pub middle_depth: u32,
+    /// How the picture is shown.
+    pub view_transform: String,
+    /// The bits of the exposure in stops, as an f64.
+    pub exposure: u64,
+    /// What is told in the picture about how it came to be, but for what rendered it: names and texts.
+    pub told: Vec<(String, String)>,
+}
+
+impl PartHeader {
+    /// Describes why another part does not belong to the same image, or returns `None` if it does.
+    fn difference(&self, other: &PartHeader, view_is_given: bool) -> Option<&'static str> {
+        let view = |header: &PartHeader| (header.view_transform.clone(), header.exposure);
+        if (&self.aovs, self.alpha) != (&other.aovs, other.alpha) {
+            Some("has different layers")
+        } else if !view_is_given && view(self) != view(other) {
+            Some("has a different view transform or exposure")
+        } else if self.middle_depth != other.middle_depth || self.told != other.told {
+            Some("was rendered with different settings")
+        } else {
+            None
+        }
+    }
+
+    /// Refuses what this program never writes: pieces that are not finished, layers that nothing is there for, and numbers that show
+    /// nothing.
+    fn check(&self, identity: &Identity, entries: &[Entry]) -> Result<(), String> {
+        let samples = identity.pixel_samples;
+        for Entry {
+            region, film, reached, ..
+        } in entries
+        {
+            if film != region || reached.pass != (samples..samples) {
+                return Err(format!("its piece of the pixels {region} is not finished"));
+            }
+        }
+        let known = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
+        for aov in self.aovs.iter().filter_map(known) {
+            let is_there = match aov.source(Integrator::Phong) {
+                AovSource::Adaptive => identity.adaptive,
+                AovSource::Samples => identity.layers,
+                AovSource::FirstHit => {
+                    entries.iter().all(|entry| entry.has_hits) || aov == Aov::ShadingNormal && identity.layers
+                }
+            };
+            if !is_there {
+                return Err(format!("has no values for its layer {}", aov.name()));
+            }
+        }
+        let depth = f32::from_bits(self.middle_depth);
+        if !(depth > 0.0 && depth.is_finite()) {
+            return Err(format!("its depth, {depth}, must be finite and greater than 0"));
+        }
+        let exposure = ViewSettings::check_exposure(f64::from_bits(self.exposure));
+        exposure.map(drop).map_err(|rule| format!("its exposure {rule}"))
+    }
+
+    /// That of a part of a picture.
+    pub fn of(tile: Tile, layout: &Layout, told: Metadata) -> PartHeader {
+        PartHeader {
+            tile,
+            aovs: layout.aovs.iter().map(|aov| aov.name().to_owned()).collect(),
+            alpha: layout.alpha,
+            middle_depth: layout.middle_depth.to_bits(),
+            view_transform: layout.view.transform.name().to_owned(),
+            exposure: layout.view.exposure.to_bits(),
+            told: told.pairs,
+        }
+    }
+}
+
+/// One of so many parts of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tile {
+    /// Which one, counted from 1.
+    pub number: u32,
+    /// How many there are.
+    pub of: u32,
+}
+
+impl Tile {
+    /// Its rows of a region: as many as those of the others, or one more. `None` where there are more parts than rows.
+    pub fn rows(self, region: Region) -> Option<Region> {
+        let Tile { number, of } = self;
+        let height = u64::from(region.height());
+        let row = |i: u32| region.y0 + (height * u64::from(i) / u64::from(of.max(1))) as u32;
+        let is_part = 1 <= number && number <= of && u64::from(of) <= height;
+        is_part.then(|| Region {
+            y0: row(number - 1),
+            y1: row(number),
+            ..region
+        })
+    }
+}
+
+impl std::fmt::Display for Tile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+/// Writes a part: what `render` hands to the sink, which are finished bands.
+///
+/// # Errors
+///
+/// The errors of `render`, and [`RenderError::Output`] if the file cannot be written.
+pub fn write_part(
+    mut file: Pending,
+    identity: &Identity,
+    part: &PartHeader,
+    render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let header = Header {
+        format: FORMAT,
+        identity: identity.clone(),
+        part: Some(part.clone()),
+    };
+    let (key, _) = pieces_file::write_header(&mut file, &header)?;
+    let samples = identity.pixel_samples;
+    render(&mut |Band { film, hits }| {
+        let region = film.region;
+        let piece = Piece {
+            region,
+            reached: Reached {
+                pass: samples..samples,
+                next: [region.x0, region.y0],
+            },
+            film: film.clone(),
+        };
+        pieces_file::write_piece(&mut file, &key, &piece, hits)?;
+        Ok(())
+    })?;
+    file.flush()?;
+    Ok(file.finish()?)
+}
+
+/// Returns what a file is a part of, and which one.
+///
+/// # Errors
+///
+/// Files that cannot be read, are not parts, or are damaged or truncated.
+pub fn read_part(path: &Path) -> Result<(Identity, PartHeader), PartError> {
+    let (_, header, part, _) = open(path)?;
+    Ok((header.identity, part))
+}
+
+/// Why parts cannot be joined.
+#[derive(Debug, Error)]
+pub enum PartError {
+    /// A file that is no part, or a damaged one.
+    #[error("{}: {what}", path.display())]
+    Bad {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// Rows that no part has.
+    #[error("{0}")]
+    Gap(String),
+}
+
+/// All parts of a picture.
+#[derive(Debug)]
+pub struct Parts {
+    /// What they are of.
+    pub identity: Identity,
+    /// What the picture needs besides, the same of all of them but for the tile.
+    pub header: PartHeader,
+    /// The files: where they are, and the keys of their hashes. They are opened when they are read: there may be more than can be
+    /// open.
+    files: Vec<(PathBuf, Key)>,
+    /// The pieces by their first rows: the file, and where they are in it.
+    pieces: BTreeMap<u32, (usize, Entry)>,
+}
+
+impl Parts {
+    /// Looks at all parts of a picture, in any order: they are whole, of one job, and have every row once. They are shown in one
+    /// way, unless another one is given.
+    ///
+    /// # Errors
+    ///
+    /// [`PartError`].
+    pub fn open(paths: &[PathBuf], view_is_given: bool) -> Result<Parts, PartError> {
+        let mut parts: Option<Parts> = None;
+        let mut tiles = Vec::new();
+        for path in paths {
+            let bad = |what: String| PartError::Bad {
+                path: path.clone(),
+                what,
+            };
+            let (key, header, part, entries) = open(path)?;
+            tiles.push(part.tile);
+            let all = parts.get_or_insert_with(|| Parts {
+                identity: header.identity.clone(),
+                header: part.clone(),
+                files: Vec::new(),
+                pieces: BTreeMap::new(),
+            });
+            let first = || all.files.first().map_or(path, |(first, _)| first).display();
+            if let Some(what) = all.identity.difference(&header.identity) {
+                return Err(bad(format!("belongs to another image than {}: {what}", first())));
+            }
+            if let Some(what) = all.header.difference(&part, view_is_given) {
+                return Err(bad(format!("{what} than {}", first())));
+            }
+            for entry in entries {
+                let Region { y0, y1, .. } = entry.region;
+                let above = all.pieces.range(..y1).next_back();
+                if let Some((_, (number, other))) = above.filter(|(_, (_, other))| other.region.y1 > y0) {
+                    let (from, to) = (y0.max(other.region.y0), y1.min(other.region.y1) - 1);
+                    let other = all.files.get(*number).map_or(path, |(other, _)| other).display();
+                    return Err(bad(format!("overlaps {other} in rows {from} to {to}")));
+                }
+                all.pieces.insert(y0, (all.files.len(), entry));
+            }
+            all.files.push((path.clone(), key));
+        }
+        let parts = parts.ok_or_else(|| PartError::Gap("no parts were given".to_owned()))?;
+        match parts.gap() {
+            None => Ok(parts),
+            Some((from, to)) => Err(PartError::Gap(missing(from, to, &tiles))),
+        }
+    }
+
+    /// The first rows that no part has, the last of them with them.
+    fn gap(&self) -> Option<(u32, u32)> {
+        let Region { y0, y1, .. } = self.identity.region();
+        let mut next = y0;
+        for (_, entry) in self.pieces.values() {
+            if entry.region.y0 > next {
+                return Some((next, entry.region.y0 - 1));
+            }
+            next = entry.region.y1;
+        }
+        (next < y1).then(|| (next, y1 - 1))
+    }
+
+    /// What a picture of all parts holds. Names that another version of the program has written, and this one does not know,
+    /// are left out; that of a part is the same version's.
+    pub fn layout(&self) -> Layout {
+        let Identity {
+            picture, pixel_samples, ..
+        } = self.identity;
+        let known = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
+        let transform = ViewTransform::ALL
+            .into_iter()
+            .find(|view| view.name() == self.header.view_transform);
+        Layout {
+            picture: picture.into(),
+            region: self.identity.region(),
+            aovs: self.header.aovs.iter().filter_map(known).collect(),
+            alpha: self.header.alpha,
+            middle_depth: f32::from_bits(self.header.middle_depth),
+            max_samples: pixel_samples,
+            view: ViewSettings {
+                transform: transform.unwrap_or_default(),
+                exposure: f64::from_bits(self.header.exposure),
+            },
+        }
+    }
+
+    /// What is told in a picture of all parts.
+    pub fn told(&self) -> Metadata {
+        Metadata {
+            pairs: self.header.told.clone(),
+        }
+    }
+
+    /// Hands all pieces to a sink, from the top.
+    ///
+    /// # Errors
+    ///
+    /// Those of the sink, and files that cannot be read any more.
+    pub fn read(&self, sink: &mut Sink) -> Result<(), RenderError> {
+        let Identity { adaptive, layers, .. } = self.identity;
+        for (number, entry) in self.pieces.values() {
+            let Some((path, key)) = self.files.get(*number) else {
+                continue;
+            };
+            let form = Form { adaptive, layers };
+            let read = File::open(path).and_then(|file| pieces_file::read_piece(&file, key, entry, form));
+            let (piece, hits) = read.map_err(|error| {
+                let message = format!("{}: cannot be read: {error}", path.display());
+                RenderError::Input(io::Error::new(error.kind(), message))
+            })?;
+            sink(Band {
+                film: &piece.film,
+                hits: &hits,
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Which parts rows are missing of, where that can be told.
+fn missing(from: u32, to: u32, tiles: &[Tile]) -> String {
+    let rows = match from == to {
+        true => format!("row {from} is missing"),
+        false => format!("rows {from} to {to} are missing"),
+    };
+    let Some(of) = tiles
+        .first()
+        .map(|tile| tile.of)
+        .filter(|of| tiles.iter().all(|tile| tile.of == *of))
+    else {
+        return rows;
+    };
+    const MOST: usize = 20;
+    let there: BTreeSet<u32> = tiles.iter().map(|tile| tile.number).collect();
+    let absent = (1..=of).filter(|number| !there.contains(number));
+    let mut names: Vec<String> = absent
+        .take(MOST + 1)
+        .map(|number| Tile { number, of }.to_string())
+        .collect();
+    let dots = if names.len() > MOST { " ..." } else { "" };
+    names.truncate(MOST);
+    let listed = names.join(", ");
+    format!("{rows}: add part {listed}{dots}")
+}
+
+fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError> {
+    let bad = |what: String| PartError::Bad {
+        path: path.to_owned(),
+        what,
+    };
+    let io = |error: io::Error| bad(error.to_string());
+    waiting::check(path).map_err(io)?;
+    let mut file = File::open(path).map_err(io)?;
+    let data = file.metadata().map_err(io)?;
+    if !data.is_file() {
+        let what = if data.is_dir() {
+            "it is a directory"
+        } else {
+            "it is not a regular file, and parts are read twice"
+        };
+        return Err(bad(what.to_owned()));
+    }
+    let (header, key, start) = pieces_file::read_header(&mut file).map_err(io)?;
+    let Some(part) = header.part.clone() else {
+        let what = "is a checkpoint, not a part; wgray merge reads the files that wgray render --tile writes";
+        return Err(bad(what.to_owned()));
+    };
+    let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(io)?;
+    part.check(&header.identity, &contents.entries).map_err(bad)?;
+    let rows = part.tile.rows(header.identity.region());
+    let height: u64 = contents
+        .entries
+        .iter()
+        .map(|entry| u64::from(entry.region.height()))
+        .sum();
+    let is_whole = rows.is_some_and(|rows| u64::from(rows.height()) == height);
+    if contents.damaged > 0 || !is_whole {
+        return Err(bad(format!(
+            "is damaged or truncated at byte {}; render part {} again",
+            contents.end, part.tile
+        )));
+    }
+    Ok((key, header, part, contents.entries))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::film::Film;
+
+    /// What is told of a part of 4 x 3 pixels whose header and piece were changed; nothing if it is good.
+    fn told(change: impl Fn(&mut Header, &mut Piece)) -> String {
+        let region = Region::whole(4, 3);
+        let mut header = Header {
+            format: FORMAT,
+            identity: Identity {
+                version: "1".to_owned(),
+                shaders: String::new(),
+                scene: String::new(),
+                picture: [4, 3],
+                region: [0, 0, 4, 3],
+                pixel_samples: 16,
+                adaptive: false,
+                layers: false,
+                exact_rounding: false,
+            },
+            part: Some(PartHeader {
+                tile: Tile { number: 1, of: 1 },
+                aovs: Vec::new(),
+                alpha: false,
+                middle_depth: 1f32.to_bits(),
+                view_transform: "gamma22".to_owned(),
+                exposure: 0f64.to_bits(),
+                told: Vec::new(),
+            }),
+        };
+        let mut piece = Piece {
+            region,
+            reached: Reached {
+                pass: 16..16,
+                next: [0, 0],
+            },
+            film: Film::of(region, Form::default()),
+        };
+        change(&mut header, &mut piece);
+        let mut bytes = Vec::new();
+        let (key, _) = pieces_file::write_header(&mut bytes, &header).unwrap();
+        pieces_file::write_piece(&mut bytes, &key, &piece, &[]).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.part");
+        fs::write(&path, bytes).unwrap();
+        let name = format!("{}: ", path.display());
+        match Parts::open(&[path], false) {
+            Ok(_) => String::new(),
+            Err(error) => error.to_string().replace(&name, ""),
+        }
+    }
+
+    fn part(header: &mut Header) -> &mut PartHeader {
+        header.part.as_mut().unwrap()
+    }
+
+    /// Files with the right hashes that no program wrote. Fuzzing found the panic that the first made.
+    #[test]
+    fn what_no_program_writes_is_refused() {
+        assert_eq!(told(|_, _| ()), "");
+        for aov in ["normal", "shading_normal", "albedo", "variance", "sample_count"] {
+            let without = told(|header, _| part(header).aovs = vec![aov.to_owned()]);
+            assert_eq!(without, format!("has no values for its layer {aov}"));
+        }
+        assert_eq!(told(|header, _| part(header).aovs = vec!["other".to_owned()]), "");
+        for (depth, exposure, wanted) in [
+            (f32::NAN, 0.0, "its depth, NaN, must be"),
+            (0.0, 0.0, "its depth, 0, must be"),
+            (1.0, f64::INFINITY, "its exposure "),
+        ] {
+            let told = told(|header, _| {
+                part(header).middle_depth = depth.to_bits();
+                part(header).exposure = exposure.to_bits();
+            });
+            assert!(told.starts_with(wanted), "{told}");
+        }
+        let unfinished = told(|_, piece| piece.reached.pass = 8..16);
+        assert_eq!(unfinished, "its piece of the pixels 0,0,4,3 is not finished");
+        let rows = told(|_, piece| piece.region.y1 = 2);
+        assert_eq!(rows, "its piece of the pixels 0,0,4,2 is not finished");
+        let huge = told(|header, _| {
+            header.identity.picture = [1, u32::MAX];
+            header.identity.region = [0, 0, 1, u32::MAX];
+            part(header).tile.of = u32::MAX;
+        });
+        assert_eq!(
+            huge,
+            "its image size, 1 x 4294967295, must be from 1 to 65536 pixels along each side"
+        );
+    }
+}

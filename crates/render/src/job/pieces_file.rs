@@ -1,0 +1,436 @@
+//! Files of pieces: a header that says what they are of, then one piece after the other, each with its hash. Numbers are
+//! little-endian. A file is only ever gone on with at its end, so that what was whole stays whole.
+//!
+//! | part | bytes |
+//! | --- | --- |
+//! | file | [`MAGIC`], header, pieces |
+//! | header | length (u32), JSON of a [`Header`], BLAKE3 hash of both |
+//! | piece | head (14 words: see `Head`), hash of it, the film's lists, first hits, hash of all these: BLAKE3 keyed with the header's, so that a piece of another file is none of this one |
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+
+use bytemuck::{cast_slice, cast_slice_mut};
+use glam::Vec4;
+use serde::{Deserialize, Serialize};
+
+use super::identity::Identity;
+use super::part::PartHeader;
+use super::piece::Piece;
+use super::steps::Reached;
+use crate::film::{Film, Form};
+use crate::pack::FirstHit;
+use wgray_image::Region;
+
+/// The first bytes of such a file, which no program that moves text leaves as they are.
+pub const MAGIC: &[u8; 16] = b"\x89wgray pieces\r\n\x1a";
+
+/// The version of the format.
+pub const FORMAT: u32 = 1;
+
+/// The largest header in bytes.
+const LARGEST_HEADER: u32 = 1 << 20;
+
+/// What a file of pieces is of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// The job.
+    pub identity: Identity,
+    /// Of a part of a picture what else a picture of it needs; nothing in a checkpoint.
+    pub part: Option<PartHeader>,
+}
+
+/// Where a piece is in a file, and what it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its rows.
+    pub region: Region,
+    /// The pixels of its film.
+    pub film: Region,
+    /// Which samples they have.
+    pub reached: Reached,
+    /// Whether the first hits of its rows are there too.
+    pub has_hits: bool,
+    /// Its first byte.
+    pub start: u64,
+    /// One past its last byte.
+    pub end: u64,
+}
+
+impl Entry {
+    /// Where a piece without first hits was written to.
+    pub fn of(piece: &Piece, start: u64, bytes: u64) -> Entry {
+        Entry {
+            region: piece.region,
+            film: piece.film.region,
+            reached: piece.reached.clone(),
+            has_hits: false,
+            start,
+            end: start + bytes,
+        }
+    }
+}
+
+/// What a file turned out to hold.
+pub struct Contents {
+    /// All whole pieces, in their order.
+    pub entries: Vec<Entry>,
+    /// One past the last byte of the last of them, or of the header.
+    pub end: u64,
+    /// Bytes after that, which are no whole pieces.
+    pub damaged: u64,
+}
+
+/// The words of a piece's head.
+const WORDS: usize = 14;
+const HASH: usize = blake3::OUT_LEN;
+const HEAD: u64 = (4 * WORDS + HASH) as u64;
+
+/// Counts and hashes what goes through it.
+struct Hashed<T> {
+    inner: T,
+    hasher: blake3::Hasher,
+    bytes: u64,
+}
+
+/// The hash of a file's header, with which its pieces are hashed.
+pub type Key = [u8; HASH];
+
+impl<T> Hashed<T> {
+    fn new(inner: T) -> Hashed<T> {
+        Hashed {
+            inner,
+            hasher: blake3::Hasher::new(),
+            bytes: 0,
+        }
+    }
+
+    fn keyed(inner: T, key: &Key) -> Hashed<T> {
+        Hashed {
+            hasher: blake3::Hasher::new_keyed(key),
+            ..Hashed::new(inner)
+        }
+    }
+
+    fn hash(&self) -> [u8; HASH] {
+        *self.hasher.finalize().as_bytes()
+    }
+}
+
+impl<W: Write> Hashed<W> {
+    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.inner.write_all(bytes)?;
+        self.hasher.update(bytes);
+        self.bytes += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// The hash of all so far, which counts among the bytes that follow.
+    fn put_hash(&mut self) -> io::Result<()> {
+        let hash = self.hash();
+        self.put(&hash)
+    }
+
+    fn put_words(&mut self, words: &[u32]) -> io::Result<()> {
+        const CHUNK: usize = 4096;
+        for chunk in words.chunks(CHUNK) {
+            let mut copy = [0; CHUNK];
+            for (to, word) in copy.iter_mut().zip(chunk) {
+                *to = word.to_le();
+            }
+            self.put(cast_slice(&copy[..chunk.len()]))?;
+        }
+        Ok(())
+    }
+}
+
+impl<R: Read> Hashed<R> {
+    fn get(&mut self, bytes: &mut [u8]) -> io::Result<()> {
+        self.inner.read_exact(bytes)?;
+        self.hasher.update(bytes);
+        self.bytes += bytes.len() as u64;
+        Ok(())
+    }
+
+    fn get_words(&mut self, words: &mut [u32]) -> io::Result<()> {
+        self.get(cast_slice_mut(words))?;
+        for word in words {
+            *word = u32::from_le(*word);
+        }
+        Ok(())
+    }
+
+    /// Whether what was read so far has the hash that follows.
+    fn is_whole(&mut self) -> io::Result<bool> {
+        let (hash, mut found) = (self.hash(), [0; HASH]);
+        self.get(&mut found)?;
+        Ok(found == hash)
+    }
+}
+
+/// Writes the start of a file, and tells its hash and its length.
+pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u64)> {
+    let text = serde_json::to_vec(header)?;
+    let mut out = Hashed::new(out);
+    out.inner.write_all(MAGIC)?;
+    out.put_words(&[text.len() as u32])?;
+    out.put(&text)?;
+    let key = out.hash();
+    out.put_hash()?;
+    Ok((key, MAGIC.len() as u64 + out.bytes))
+}
+
+/// Reads the start of a file, and tells its hash and its length. Of what is no such file, or a damaged one, the error says so.
+pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
+    let bad = |what: &str| io::Error::new(io::ErrorKind::InvalidData, what.to_owned());
+    let none = |_| bad("it is not a part or checkpoint that wgray wrote");
+    let cut = |_| bad("its header is damaged or truncated");
+    let mut magic = [0; MAGIC.len()];
+    input.read_exact(&mut magic).map_err(none)?;
+    if magic != *MAGIC {
+        return Err(none(io::ErrorKind::InvalidData.into()));
+    }
+    let mut input = Hashed::new(input);
+    let mut length = [0];
+    input.get_words(&mut length).map_err(cut)?;
+    if length[0] > LARGEST_HEADER {
+        return Err(cut(io::ErrorKind::InvalidData.into()));
+    }
+    let mut text = vec![0; length[0] as usize];
+    input.get(&mut text).map_err(cut)?;
+    let key = input.hash();
+    if !input.is_whole().map_err(cut)? {
+        return Err(cut(io::ErrorKind::InvalidData.into()));
+    }
+    // The program's version is told even where another one has written a header of other fields.
+    let header: Header = serde_json::from_slice(&text).map_err(|_| {
+        let version = serde_json::from_slice(&text).ok().and_then(|value: serde_json::Value| {
+            let version = value.get("identity")?.get("version")?.as_str()?;
+            Some(version.to_owned())
+        });
+        let version = version.unwrap_or("an unknown version".to_owned());
+        bad(&format!("it was written by another version of wgray: {version}"))
+    })?;
+    if header.format != FORMAT {
+        let (found, version) = (header.format, header.identity.version);
+        return Err(bad(&format!(
+            "it has format {found} (wgray {version}); this program reads format {FORMAT}"
+        )));
+    }
+    header.identity.check().map_err(|rule| bad(&rule))?;
+    Ok((header, key, MAGIC.len() as u64 + input.bytes))
+}
+
+/// The first words of a piece.
+struct Head {
+    region: Region,
+    film: Region,
+    reached: Reached,
+    form: Form,
+    has_hits: bool,
+}
+
+impl Head {
+    fn words(&self) -> [u32; WORDS] {
+        let Region { x0, y0, x1, y1 } = self.region;
+        let film = self.film;
+        let Reached { pass, next } = &self.reached;
+        let flags = [self.form.adaptive, self.form.layers, self.has_hits];
+        let flags = (0..).zip(flags).map(|(i, flag)| u32::from(flag) << i).sum();
+        let words = [x0, y0, x1, y1, film.x0, film.y0, film.x1, film.y1];
+        let more = [pass.start, pass.end, next[0], next[1], flags, 0];
+        std::array::from_fn(|i| {
+            if i < words.len() {
+                words[i]
+            } else {
+                more[i - words.len()]
+            }
+        })
+    }
+
+    /// The head of these words, if a piece of this job may have it.
+    fn of(words: &[u32; WORDS], identity: &Identity) -> Option<Head> {
+        let &[x0, y0, x1, y1, fx0, fy0, fx1, fy1, start, end, x, y, flags, _] = words;
+        let region = |x0, y0, x1, y1| Region { x0, y0, x1, y1 };
+        let head = Head {
+            region: region(x0, y0, x1, y1),
+            film: region(fx0, fy0, fx1, fy1),
+            reached: Reached {
+                pass: start..end,
+                next: [x, y],
+            },
+            form: Form {
+                adaptive: flags & 1 != 0,
+                layers: flags & 2 != 0,
+            },
+            has_hits: flags & 4 != 0,
+        };
+        let (whole, [width, height]) = (identity.region(), identity.picture);
+        let picture = Region::whole(width, height);
+        let rows = head.region;
+        let lies_in = |part: Region, of: Region| !part.is_empty() && part.within(of) == part;
+        let is_good = lies_in(rows, whole)
+            && (rows.x0, rows.x1) == (whole.x0, whole.x1)
+            && lies_in(rows, head.film)
+            && lies_in(head.film, rows.with_neighbors())
+            && lies_in(head.film, picture)
+            && start <= end
+            && end <= identity.pixel_samples
+            && (head.film.x0..head.film.x1).contains(&x)
+            && (head.film.y0..=head.film.y1).contains(&y)
+            && head.form
+                == Form {
+                    adaptive: identity.adaptive,
+                    layers: identity.layers,
+                };
+        is_good.then_some(head)
+    }
+
+    /// The bytes of the film and the first hits.
+    fn data(&self) -> u64 {
+        let hits = if self.has_hits { self.region.pixels() } else { 0 };
+        self.film.pixels() * self.form.bytes() as u64 + hits * size_of::<FirstHit>() as u64
+    }
+}
+
+/// Writes a piece, with the first hits of its rows if there are any, and tells how many bytes it took.
+pub fn write_piece(out: &mut impl Write, key: &Key, piece: &Piece, hits: &[FirstHit]) -> io::Result<u64> {
+    let lists: Vec<_> = piece.film.lists().collect();
+    let head = Head {
+        region: piece.region,
+        film: piece.film.region,
+        reached: piece.reached.clone(),
+        form: piece.film.form(),
+        has_hits: !hits.is_empty(),
+    };
+    let mut out = Hashed::keyed(out, key);
+    out.put_words(&head.words())?;
+    out.put_hash()?;
+    for list in lists {
+        out.put_words(cast_slice(list))?;
+    }
+    out.put_words(cast_slice(hits))?;
+    out.put_hash()?;
+    Ok(out.bytes)
+}
+
+/// Looks through a file whose header was read, up to the first piece that is not whole.
+pub fn scan(file: &File, identity: &Identity, key: &Key, header: u64) -> io::Result<Contents> {
+    let length = file.metadata()?.len();
+    let mut input = BufReader::with_capacity(1 << 20, file);
+    let mut contents = Contents {
+        entries: Vec::new(),
+        end: header,
+        damaged: 0,
+    };
+    input.seek(SeekFrom::Start(header))?;
+    loop {
+        match next_entry(&mut input, identity, key, contents.end, length) {
+            Ok(Some(entry)) => {
+                contents.end = entry.end;
+                contents.entries.push(entry);
+            }
+            Ok(None) => break,
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => break,
+            Err(error) => return Err(error),
+        }
+    }
+    contents.damaged = length.saturating_sub(contents.end);
+    Ok(contents)
+}
+
+fn next_entry(
+    input: &mut impl Read,
+    identity: &Identity,
+    key: &Key,
+    start: u64,
+    length: u64,
+) -> io::Result<Option<Entry>> {
+    let mut input = Hashed::keyed(input, key);
+    let mut words = [0; WORDS];
+    input.get_words(&mut words)?;
+    if !input.is_whole()? {
+        return Ok(None);
+    }
+    let Some(head) = Head::of(&words, identity) else {
+        return Ok(None);
+    };
+    let end = start + HEAD + head.data() + HASH as u64;
+    if end > length {
+        return Ok(None);
+    }
+    let mut left = head.data();
+    let mut buffer = vec![0; 1 << 18];
+    while left > 0 {
+        let count = left.min(buffer.len() as u64) as usize;
+        input.get(&mut buffer[..count])?;
+        left -= count as u64;
+    }
+    Ok(input.is_whole()?.then_some(Entry {
+        region: head.region,
+        film: head.film,
+        reached: head.reached,
+        has_hits: head.has_hits,
+        start,
+        end,
+    }))
+}
+
+/// Reads a piece, and the first hits of its rows if they are there.
+pub fn read_piece(file: &File, key: &Key, entry: &Entry, form: Form) -> io::Result<(Piece, Vec<FirstHit>)> {
+    let mut input = BufReader::with_capacity(1 << 20, file);
+    input.seek(SeekFrom::Start(entry.start))?;
+    let mut input = Hashed::keyed(input, key);
+    let mut head = [0; HEAD as usize];
+    input.get(&mut head)?;
+    let mut film = Film::of(entry.film, form);
+    for list in film.lists_mut() {
+        input.get_words(cast_slice_mut::<Vec4, u32>(list))?;
+    }
+    let count = if entry.has_hits {
+        entry.region.pixels() as usize
+    } else {
+        0
+    };
+    let mut hits = vec![<FirstHit as bytemuck::Zeroable>::zeroed(); count];
+    input.get_words(cast_slice_mut(&mut hits))?;
+    if !input.is_whole()? {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidData,
+            "a piece has changed since the file was opened",
+        ));
+    }
+    let piece = Piece {
+        region: entry.region,
+        reached: entry.reached.clone(),
+        film,
+    };
+    Ok((piece, hits))
+}
+
+/// Of pieces in the order in which they were written, those that no later one stands in for: numbers, from the top.
+pub fn latest(entries: &[Entry]) -> Vec<usize> {
+    let mut rows = std::collections::BTreeMap::<u32, usize>::new();
+    for (number, entry) in entries.iter().enumerate() {
+        replace(&mut rows, entries, number, entry.region);
+    }
+    rows.into_values().collect()
+}
+
+/// Puts a piece among those that are known by their first rows, in place of all that it shares rows with.
+pub fn replace(rows: &mut std::collections::BTreeMap<u32, usize>, entries: &[Entry], number: usize, region: Region) {
+    // They have no rows in common, so only the last one that starts above can reach into it.
+    let above = rows
+        .range(..region.y0)
+        .next_back()
+        .filter(|(_, i)| entries[**i].region.y1 > region.y0);
+    let first = above.map_or(region.y0, |(y, _)| *y);
+    let gone: Vec<u32> = rows.range(first..region.y1).map(|(y, _)| *y).collect();
+    for y in gone {
+        rows.remove(&y);
+    }
+    rows.insert(region.y0, number);
+}

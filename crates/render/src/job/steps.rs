@@ -1,0 +1,264 @@
+//! The calls that render a film.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use web_time::Instant;
+
+use super::Cut;
+use super::pace::Pace;
+use crate::backend::Backend;
+use crate::error::RenderError;
+use wgray_image::Region;
+
+/// What comes first in a film. The picture is the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// A row's samples, as many as fit a call of a few rows: a kernel that adds more samples at once is faster.
+    Rows,
+    /// All pixels: each gets a few samples before any gets more, for a picture that is looked at meanwhile.
+    Pixels,
+}
+
+/// The fewest rows of a call where a pixel's samples come first: two rows of workgroups on a GPU.
+const ROWS: u32 = 16;
+
+/// Which samples the pixels of a film have.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reached {
+    /// The samples that are being added: all before them are there. Empty once all are.
+    pub pass: Range<u32>,
+    /// The first pixel that does not have them, in the order of reading: column and row.
+    pub next: [u32; 2],
+}
+
+/// The calls that render a film, one after the other.
+#[derive(Clone, Debug)]
+pub struct Steps {
+    cut: Cut,
+    order: Order,
+    pace: Pace,
+    region: Region,
+    /// The region, and the pixels around it that get the samples of all.
+    film: Region,
+    samples: u32,
+    /// How many samples all pixels get.
+    of_all: u32,
+    /// The samples to stop at.
+    until: u32,
+    reached: Reached,
+    /// The call that is under way.
+    call: Option<Call>,
+}
+
+/// A call that was submitted.
+#[derive(Clone, Copy, Debug)]
+struct Call {
+    tile: Region,
+    samples: u32,
+    start: Instant,
+}
+
+impl Call {
+    fn work(&self) -> f64 {
+        self.tile.pixels() as f64 * f64::from(self.samples)
+    }
+}
+
+impl Steps {
+    /// No work yet. A call aims to take `call`.
+    pub fn new(cut: &Cut, call: Duration, order: Order) -> Steps {
+        Steps {
+            cut: *cut,
+            order,
+            pace: Pace::new(call),
+            region: Region::whole(0, 0),
+            film: Region::whole(0, 0),
+            samples: 0,
+            of_all: 0,
+            until: 0,
+            reached: Reached {
+                pass: 0..0,
+                next: [0; 2],
+            },
+            call: None,
+        }
+    }
+
+    /// Starts a film of a region, at the pace learnt so far. Its pixels are those of [`Steps::film`].
+    pub fn start(&mut self, backend: &dyn Backend, region: Region, samples: u32) {
+        self.region = region;
+        self.samples = samples;
+        self.until = samples;
+        self.of_all = backend.samples_of_all().min(samples);
+        self.film = film_of(backend, region, samples);
+        self.call = None;
+        self.pace.start_film();
+        self.begin_pass(0);
+    }
+
+    /// Goes on with a film of a region that was begun before, perhaps on another backend.
+    pub fn go_on(&mut self, backend: &dyn Backend, region: Region, samples: u32, reached: &Reached) {
+        self.start(backend, region, samples);
+        self.reached = reached.clone();
+        self.next_pass_if_ended();
+    }
+
+    /// Ends once all pixels have so many samples. A pass that is under way is brought to its end.
+    pub fn stop_at(&mut self, samples: u32) {
+        self.until = samples.min(self.samples);
+        let Reached { pass, next } = &self.reached;
+        if *next == [self.region_of_pass().x0, self.region_of_pass().y0] {
+            self.begin_pass(pass.start);
+        }
+    }
+
+    /// The pixels of the film.
+    pub fn film(&self) -> Region {
+        self.film
+    }
+
+    /// Which samples the film has, between two calls.
+    pub fn reached(&self) -> &Reached {
+        &self.reached
+    }
+
+    /// Forgets the pace: other work comes, or another backend.
+    pub fn forget_pace(&mut self) {
+        self.pace.forget();
+    }
+
+    /// A call has failed: what it did is lost, and the next ones are smaller.
+    pub fn failed(&mut self) {
+        self.pace.forget();
+        if let Some(call) = self.call.take() {
+            self.pace.failed(call.work());
+        }
+    }
+
+    /// Makes the next call, and returns how many samples of pixels it was; `None` once the film has them all.
+    pub fn step(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
+        if !self.submit(backend)? {
+            return Ok(None);
+        }
+        backend.wait()?;
+        Ok(self.end_call())
+    }
+
+    /// Submits the next call and does not wait for it; [`Steps::poll`] tells when it has ended. Returns whether there is one.
+    pub fn submit(&mut self, backend: &mut dyn Backend) -> Result<bool, RenderError> {
+        if self.is_done() {
+            return Ok(false);
+        }
+        let pass = self.reached.pass.clone();
+        let call = Call {
+            tile: self.next_tile(),
+            samples: pass.len() as u32,
+            start: Instant::now(),
+        };
+        self.call = Some(call);
+        backend.submit(call.tile, pass)?;
+        Ok(true)
+    }
+
+    /// Whole rows, or where not even one fits a call a part of one.
+    fn next_tile(&self) -> Region {
+        let region = self.region_of_pass();
+        let width = u64::from(region.width().max(1));
+        let [x, y] = self.reached.next;
+        let pixels = (self.pace.work() / f64::from(self.reached.pass.len() as u32)).max(1.0) as u64;
+        let pixels = (self.cut.rows_per_call).map_or(pixels, |rows| u64::from(rows.max(1)) * width);
+        if x == region.x0 && pixels >= width {
+            let rows = (pixels / width).min(u64::from(region.y1 - y)) as u32;
+            return Region {
+                y0: y,
+                y1: y + rows,
+                ..region
+            };
+        }
+        let columns = pixels.min(u64::from(region.x1 - x)) as u32;
+        Region {
+            x0: x,
+            y0: y,
+            x1: x + columns,
+            y1: y + 1,
+        }
+    }
+
+    /// How many samples of pixels the submitted call was, if it has ended; `None` if it has not, or if there is none.
+    pub fn poll(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
+        Ok(if backend.poll()? { self.end_call() } else { None })
+    }
+
+    fn end_call(&mut self) -> Option<f64> {
+        let call = self.call.take()?;
+        let Call { tile, samples, start } = call;
+        let of_all = self.reached.pass.end <= self.of_all;
+        self.pace.took(call.work(), start.elapsed(), of_all);
+        let region = self.region_of_pass();
+        self.reached.next = match tile.x1 < region.x1 {
+            true => [tile.x1, tile.y0],
+            false => [region.x0, tile.y1],
+        };
+        self.next_pass_if_ended();
+        Some(tile.within(self.region).pixels() as f64 * f64::from(samples))
+    }
+
+    fn next_pass_if_ended(&mut self) {
+        if self.reached.next[1] >= self.region_of_pass().y1 {
+            self.begin_pass(self.reached.pass.end);
+        }
+    }
+
+    /// The pixels that the pass is for.
+    fn region_of_pass(&self) -> Region {
+        if self.reached.pass.start < self.of_all {
+            self.film
+        } else {
+            self.region
+        }
+    }
+
+    /// Whether every pixel has all its samples, or those that it was told to stop at.
+    pub fn is_done(&self) -> bool {
+        self.reached.pass.is_empty()
+    }
+
+    /// The samples that every pixel has.
+    pub fn samples(&self) -> u32 {
+        self.reached.pass.start
+    }
+
+    /// The samples that all pixels of a row have.
+    pub fn samples_of_row(&self, y: u32) -> u32 {
+        let Reached { pass, next } = &self.reached;
+        if y < next[1] { pass.end } else { pass.start }
+    }
+
+    /// Samples of pixels per second, once a call has been made.
+    pub fn speed(&self) -> Option<f64> {
+        self.pace.speed()
+    }
+
+    fn begin_pass(&mut self, first: u32) {
+        let rows = match self.order {
+            Order::Rows => self.region.height().min(ROWS),
+            Order::Pixels => self.region.height(),
+        };
+        let pixels = f64::from(self.region.width()) * f64::from(rows);
+        let count = (self.cut.samples_per_call).unwrap_or_else(|| (self.pace.work() / pixels).max(1.0) as u32);
+        let end = if first < self.of_all { self.of_all } else { self.samples };
+        let end = end.min(self.until).max(first);
+        self.reached.pass = first..first + count.min(end - first);
+        let region = self.region_of_pass();
+        self.reached.next = [region.x0, region.y0];
+    }
+}
+
+/// The film that a region is rendered in: where pixels decide on their neighbours' samples, with the pixels around it.
+pub(super) fn film_of(backend: &dyn Backend, region: Region, samples: u32) -> Region {
+    match backend.samples_of_all() < samples {
+        true => backend.around(region),
+        false => region,
+    }
+}

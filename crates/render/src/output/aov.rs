@@ -1,0 +1,263 @@
+//! What a picture can show besides radiance ("arbitrary output variables"): the first hit through each pixel's centre, what
+//! adaptive sampling knows of the pixel, and means over its samples.
+
+use glam::Vec3;
+
+use super::{Band, Layout};
+use crate::film::Layer;
+use crate::pack::{FirstHit, NOTHING};
+use wgray_scene::Integrator;
+
+/// A value of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aov {
+    /// The outward normal.
+    Normal,
+    /// The normal that it is shaded by, outwards: without normal maps that of the first hit; under the integrator `path` the
+    /// mean over the samples, with normal maps, which is shorter than 1 where they differ.
+    ShadingNormal,
+    /// The distance along the ray.
+    Depth,
+    /// The texture coordinates.
+    Uv,
+    /// The number of the shape in the scene file; of a mesh's triangle its number in the mesh.
+    Primitive,
+    /// The number of the shape in the scene file: `[[shapes]]`, then `[[instances]]`, then lights.
+    Instance,
+    /// The barycentric coordinates, of its second and third vertex, in a mesh's triangle.
+    Barycentric,
+    /// The share of light that the surfaces reflect, those seen in mirrors and through glass too.
+    Albedo,
+    /// Light that was reflected once.
+    Direct,
+    /// Light that was reflected more often. Emission, direct and indirect light together are the picture.
+    Indirect,
+    /// Light that was not reflected: of what shines itself, and of the environment.
+    Emission,
+    /// The number of samples.
+    SampleCount,
+    /// The variance of the pixel's value, as [`Film::variance`](crate::film::Film::variance) estimates it.
+    Variance,
+}
+
+/// Where a value of a pixel comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AovSource {
+    /// The first hit of the ray through the pixel's centre.
+    FirstHit,
+    /// The mean over the pixel's samples, weighted as the picture is; there under the integrator `path` alone.
+    Samples,
+    /// What adaptive sampling knows of the pixel; there under adaptive sampling alone.
+    Adaptive,
+}
+
+/// One channel of a layer.
+pub enum Channel {
+    /// A number for each first hit.
+    Float(&'static str, fn(&FirstHit) -> f32),
+    /// A whole number for each first hit.
+    Whole(&'static str, fn(&FirstHit) -> u32),
+    /// A part of the mean of the film's layer.
+    Mean(&'static str, Layer, usize),
+    /// A part of the shading normal: of its mean where the film has layers, else of each first hit.
+    ShadingNormal(&'static str, usize),
+    /// The number of samples.
+    Count(&'static str),
+    /// The variance of a colour channel.
+    Variance(&'static str, usize),
+}
+
+impl Channel {
+    /// Its name in OpenEXR files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Channel::Float(name, _) | Channel::Whole(name, _) | Channel::Count(name) => name,
+            Channel::Mean(name, ..) | Channel::ShadingNormal(name, _) | Channel::Variance(name, _) => name,
+        }
+    }
+
+    /// Whether its values are integers.
+    pub fn is_whole(&self) -> bool {
+        matches!(self, Channel::Whole(..) | Channel::Count(_))
+    }
+
+    /// The bytes of pixel `i` of a band.
+    pub fn bytes(&self, band: Band, i: usize) -> [u8; 4] {
+        match self {
+            Channel::Float(_, value) => value(&band.hits[i]).to_ne_bytes(),
+            Channel::Whole(_, value) => value(&band.hits[i]).to_ne_bytes(),
+            Channel::Mean(_, layer, part) => band.film.layer(*layer, i)[*part].to_ne_bytes(),
+            Channel::ShadingNormal(_, part) if band.film.has_layers() => {
+                band.film.layer(Layer::Normal, i)[*part].to_ne_bytes()
+            }
+            Channel::ShadingNormal(_, part) => band.hits[i].shading_normal[*part].to_ne_bytes(),
+            Channel::Count(_) => band.film.sample_count(i).to_ne_bytes(),
+            Channel::Variance(_, channel) => band.film.variance(i)[*channel].to_ne_bytes(),
+        }
+    }
+}
+
+impl Aov {
+    /// All of them.
+    pub const ALL: [Aov; 13] = [
+        Aov::Normal,
+        Aov::ShadingNormal,
+        Aov::Depth,
+        Aov::Uv,
+        Aov::Primitive,
+        Aov::Instance,
+        Aov::Barycentric,
+        Aov::Albedo,
+        Aov::Direct,
+        Aov::Indirect,
+        Aov::Emission,
+        Aov::SampleCount,
+        Aov::Variance,
+    ];
+
+    /// Where its values come from in pictures by an integrator. By another one there may be none.
+    pub fn source(self, integrator: Integrator) -> AovSource {
+        match self {
+            Aov::SampleCount | Aov::Variance => AovSource::Adaptive,
+            Aov::Albedo | Aov::Direct | Aov::Indirect | Aov::Emission => AovSource::Samples,
+            Aov::ShadingNormal if integrator == Integrator::Path => AovSource::Samples,
+            Aov::Normal | Aov::ShadingNormal | Aov::Depth | Aov::Uv => AovSource::FirstHit,
+            Aov::Primitive | Aov::Instance | Aov::Barycentric => AovSource::FirstHit,
+        }
+    }
+
+    /// Why pictures by an integrator, under adaptive sampling or not, do not have it; `None` if they do.
+    pub fn missing(self, integrator: Integrator, adaptive: bool) -> Option<&'static str> {
+        match self.source(integrator) {
+            AovSource::Adaptive if !adaptive => Some("needs adaptive sampling"),
+            AovSource::Samples if integrator != Integrator::Path => Some("needs integrator = \"path\""),
+            _ => None,
+        }
+    }
+
+    /// The layer of the film that it shows as a picture of light.
+    pub fn light(self) -> Option<Layer> {
+        match self {
+            Aov::Albedo => Some(Layer::Albedo),
+            Aov::Direct => Some(Layer::Direct),
+            Aov::Indirect => Some(Layer::Indirect),
+            Aov::Emission => Some(Layer::Emission),
+            _ => None,
+        }
+    }
+
+    /// The name in options, files and layers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Aov::Normal => "normal",
+            Aov::ShadingNormal => "shading_normal",
+            Aov::Depth => "depth",
+            Aov::Uv => "uv",
+            Aov::Primitive => "primitive",
+            Aov::Instance => "instance",
+            Aov::Barycentric => "barycentric",
+            Aov::Albedo => "albedo",
+            Aov::Direct => "direct",
+            Aov::Indirect => "indirect",
+            Aov::Emission => "emission",
+            Aov::SampleCount => "sample_count",
+            Aov::Variance => "variance",
+        }
+    }
+
+    /// The channels of an EXR layer.
+    pub fn channels(self) -> Vec<Channel> {
+        let colors = |names: [&'static str; 3], layer| {
+            let channels = names.into_iter().zip(0..);
+            channels.map(|(name, part)| Channel::Mean(name, layer, part)).collect()
+        };
+        match self {
+            Aov::Normal => vec![
+                Channel::Float("normal.X", |hit| hit.normal.x),
+                Channel::Float("normal.Y", |hit| hit.normal.y),
+                Channel::Float("normal.Z", |hit| hit.normal.z),
+            ],
+            Aov::ShadingNormal => vec![
+                Channel::ShadingNormal("shading_normal.X", 0),
+                Channel::ShadingNormal("shading_normal.Y", 1),
+                Channel::ShadingNormal("shading_normal.Z", 2),
+            ],
+            Aov::Depth => vec![Channel::Float("depth.Z", |hit| hit.depth)],
+            Aov::Uv => vec![
+                Channel::Float("uv.U", |hit| hit.uv.x),
+                Channel::Float("uv.V", |hit| hit.uv.y),
+            ],
+            Aov::Primitive => vec![Channel::Whole("primitive.ID", |hit| hit.primitive)],
+            Aov::Instance => vec![Channel::Whole("instance.ID", |hit| hit.shape)],
+            Aov::Barycentric => vec![
+                Channel::Float("barycentric.U", |hit| hit.barycentric.x),
+                Channel::Float("barycentric.V", |hit| hit.barycentric.y),
+            ],
+            Aov::Albedo => colors(["albedo.R", "albedo.G", "albedo.B"], Layer::Albedo),
+            Aov::Direct => colors(["direct.R", "direct.G", "direct.B"], Layer::Direct),
+            Aov::Indirect => colors(["indirect.R", "indirect.G", "indirect.B"], Layer::Indirect),
+            Aov::Emission => colors(["emission.R", "emission.G", "emission.B"], Layer::Emission),
+            Aov::SampleCount => vec![Channel::Count("sample_count.N")],
+            Aov::Variance => vec![
+                Channel::Variance("variance.R", 0),
+                Channel::Variance("variance.G", 1),
+                Channel::Variance("variance.B", 2),
+            ],
+        }
+    }
+
+    /// The colour of pixel `i` of a band in a PNG, before rounding to 8 bits; black where nothing is hit. Albedo and light are
+    /// linear: they take the display's curve, as the picture does; all else is shown as it is. The normal is
+    /// moved from [-1, 1] to [0, 1]; the depth d is `1 / (1 + (d / middle)^4)`, near is bright; of texture coordinates the
+    /// fraction is shown in red and green; a shape has a colour by its number. Sample counts are
+    /// `log(count) / log(most)`, variances the standard error to the power 1/2.2.
+    pub fn color(self, band: Band, i: usize, layout: &Layout) -> Vec3 {
+        let film = band.film;
+        if let Some(layer) = self.light() {
+            return film.layer(layer, i).into();
+        }
+        match self {
+            // The mean of the samples' colours: where some of them hit nothing it is darker.
+            Aov::ShadingNormal if film.has_layers() => {
+                Vec3::from(film.layer(Layer::Normal, i)) * 0.5 + 0.5 * film.alpha(i)
+            }
+            Aov::SampleCount => {
+                let [count, most] = [band.film.sample_count(i), layout.max_samples].map(|n| n.max(1) as f32);
+                Vec3::splat(count.ln() / most.max(2.0).ln())
+            }
+            Aov::Variance => Vec3::from(band.film.variance(i)).map(|v| v.sqrt().powf(1.0 / 2.2)),
+            _ => self.color_of_hit(&band.hits[i], layout.middle_depth),
+        }
+    }
+
+    /// The colour of a first hit in a PNG, before rounding to 8 bits, as [`Aov::color`] gives it. A layer of another source has that
+    /// of [`Aov::Primitive`].
+    pub fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
+        if hit.shape == NOTHING {
+            return Vec3::ZERO;
+        }
+        match self {
+            Aov::Normal => hit.normal * 0.5 + 0.5,
+            Aov::Depth => Vec3::splat(1.0 / (1.0 + (hit.depth / middle_depth).powi(4))),
+            Aov::ShadingNormal => hit.shading_normal * 0.5 + 0.5,
+            Aov::Uv => (hit.uv - hit.uv.floor()).extend(0.0),
+            Aov::Barycentric => hit.barycentric.extend(1.0 - hit.barycentric.x - hit.barycentric.y),
+            Aov::Primitive => number_color(hit.primitive),
+            _ => number_color(hit.shape),
+        }
+    }
+}
+
+/// A colour for each number: hues a golden section of the circle apart, so that no few numbers in a row look alike, in
+/// three lightnesses. None is as dark as nothing is.
+fn number_color(number: u32) -> Vec3 {
+    const GOLDEN_SECTION: u32 = 0x9e37_79b9; // of 2^32
+    let hue = number.wrapping_mul(GOLDEN_SECTION) as f32 / u32::MAX as f32 * 6.0;
+    let pure = Vec3::new(
+        (hue - 3.0).abs() - 1.0,
+        2.0 - (hue - 2.0).abs(),
+        2.0 - (hue - 4.0).abs(),
+    );
+    let lightness = [1.0, 0.6, 0.8][number as usize % 3];
+    (pure.clamp(Vec3::ZERO, Vec3::ONE) * 0.75 + 0.25) * lightness
+}

@@ -1,0 +1,131 @@
+//! JPEG and WebP files, for thumbnails: pictures of 8 bits a channel that are in memory until they are whole, as their encoders
+//! take them.
+
+use std::fs::File;
+use std::io::{self, BufReader, Cursor};
+
+use ::image::codecs::jpeg::JpegEncoder;
+use ::image::codecs::webp::WebPEncoder;
+use ::image::{ExtendedColorType, ImageEncoder, ImageError};
+use exif::experimental::Writer as ExifWriter;
+use exif::{Field, In, Tag, Value};
+use rayon::prelude::*;
+
+use super::{Band, Format, Layout, Metadata, Pending, SaveOptions, Sink};
+use crate::error::RenderError;
+use crate::film::mean;
+use wgray_image::memory::fallible;
+
+/// Bytes of a pixel that the encoder of WebP takes beside the picture: another copy, of four channels, and the file, whose room is
+/// doubled as it grows.
+const WEBP_BESIDE: u64 = 12;
+
+/// Writes the radiance. A JPEG of a picture with alpha has it over black.
+pub fn write(
+    files: &mut [Pending],
+    format: Format,
+    layout: &Layout,
+    options: &SaveOptions,
+    render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let [file] = files else {
+        return Err(io::Error::other("JPEG and WebP are one file").into());
+    };
+    let (width, height) = (layout.region.width(), layout.region.height());
+    format.check_size(width, height).map_err(io::Error::other)?;
+    let alpha = layout.alpha && format == Format::WebP;
+    let (channels, color) = match alpha {
+        true => (4, ExtendedColorType::Rgba8),
+        false => (3, ExtendedColorType::Rgb8),
+    };
+    let bytes = layout.region.pixels() * channels;
+    let beside = match format {
+        Format::WebP => layout.region.pixels() * WEBP_BESIDE,
+        _ => 0,
+    };
+    // Before anything is rendered, and an error where the process would be ended later. What the encoder takes is given back.
+    let mut pixels: Vec<u8> = room(bytes).ok_or(RenderError::Memory(bytes + beside))?;
+    room(beside).ok_or(RenderError::Memory(bytes + beside))?;
+    render(&mut |band| {
+        pixels.par_extend(match alpha {
+            true => with_alpha(band, layout),
+            false => without_alpha(band, layout),
+        });
+        Ok(())
+    })?;
+    let exif = exif(&options.metadata)?;
+    let written = match format {
+        Format::WebP => {
+            let mut encoder = WebPEncoder::new_lossless(file);
+            told(&mut encoder, exif)?;
+            encoder.write_image(&pixels, width, height, color)
+        }
+        _ => {
+            let mut encoder = JpegEncoder::new_with_quality(file, options.quality);
+            told(&mut encoder, exif)?;
+            encoder.write_image(&pixels, width, height, color)
+        }
+    };
+    written.map_err(|error| match error {
+        ImageError::IoError(error) => RenderError::Output(error),
+        other => RenderError::Output(io::Error::other(other)),
+    })
+}
+
+/// Memory for so many bytes, if there is any.
+fn room(bytes: u64) -> Option<Vec<u8>> {
+    let mut room = Vec::new();
+    let bytes = usize::try_from(bytes).ok()?;
+    fallible(|| room.try_reserve_exact(bytes)).ok()?;
+    Some(room)
+}
+
+fn without_alpha(band: Band, layout: &Layout) -> Vec<u8> {
+    let sums = band.film.sums.par_iter();
+    sums.flat_map_iter(|sum| layout.view.rgb8(mean(*sum))).collect()
+}
+
+fn with_alpha(band: Band, layout: &Layout) -> Vec<u8> {
+    let pixel = |i| layout.view.rgba8(mean(band.film.sums[i]), band.film.alpha(i));
+    (0..band.film.sums.len()).into_par_iter().flat_map_iter(pixel).collect()
+}
+
+fn told(encoder: &mut impl ImageEncoder, exif: Option<Vec<u8>>) -> io::Result<()> {
+    match exif {
+        Some(exif) => encoder.set_exif_metadata(exif).map_err(io::Error::other),
+        None => Ok(()),
+    }
+}
+
+/// Reads the metadata of a JPEG or WebP file from its Exif tags.
+pub(super) fn read_metadata(mut file: BufReader<File>) -> Option<Metadata> {
+    let exif = exif::Reader::new().read_from_container(&mut file).ok()?;
+    let text = |tag| match &exif.get_field(tag, In::PRIMARY)?.value {
+        Value::Ascii(lines) => Some(String::from_utf8_lossy(lines.first()?).into_owned()),
+        _ => None,
+    };
+    let lines = text(Tag::ImageDescription).unwrap_or_default();
+    Some(Metadata::from_lines(text(Tag::Software), &lines))
+}
+
+/// What is told, as Exif has it: the program under its own tag, all else as the picture's description, a line each.
+fn exif(metadata: &Metadata) -> io::Result<Option<Vec<u8>>> {
+    let tags = [
+        (Tag::Software, metadata.software().map(str::to_owned)),
+        (Tag::ImageDescription, metadata.lines()),
+    ];
+    let field = |(tag, text): (Tag, Option<String>)| {
+        let value = Value::Ascii(vec![text?.into_bytes()]);
+        let ifd_num = In::PRIMARY;
+        Some(Field { tag, ifd_num, value })
+    };
+    let fields: Vec<Field> = tags.into_iter().filter_map(field).collect();
+    if fields.is_empty() {
+        return Ok(None);
+    }
+    let mut writer = ExifWriter::new();
+    fields.iter().for_each(|field| writer.push_field(field));
+    let mut bytes = Cursor::new(Vec::new());
+    writer.write(&mut bytes, false).map_err(io::Error::other)?;
+    Ok(Some(bytes.into_inner()))
+}

@@ -1,0 +1,29 @@
+//! The metadata of existing image files.
+
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+
+use super::{Metadata, exr, flat, png};
+use wgray_image::contain::catch_panic;
+
+/// Reads the metadata of an image that this program wrote, in any of its formats; `None` for other files. The format is
+/// detected from the first bytes.
+pub fn read_metadata(path: &Path) -> Option<Metadata> {
+    let mut file = BufReader::new(File::open(path).ok()?);
+    let start = file.fill_buf().ok()?;
+    let read = if start.starts_with(b"\x89PNG") {
+        png::read_metadata
+    } else if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        exr::read_metadata
+    } else {
+        flat::read_metadata
+    };
+    // The file may be from anywhere, and the readers are made for good files.
+    let metadata = catch_panic(|| read(file)).ok().flatten();
+    metadata.filter(|metadata| {
+        metadata
+            .software()
+            .is_some_and(|software| software.starts_with("wgray "))
+    })
+}

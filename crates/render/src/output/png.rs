@@ -1,0 +1,141 @@
+//! PNG files.
+
+use std::fs::File;
+use std::io::{self, BufReader, Write};
+
+use ::png::{
+    BitDepth as Bits, ColorType, Compression, Decoder, Encoder, EncodingError, ScaledFloat, SrgbRenderingIntent,
+};
+use rayon::prelude::*;
+
+use super::{Aov, Band, BitDepth, Layout, Metadata, Pending, SaveOptions, Sink, to_8_bits, to_16_bits};
+use crate::error::RenderError;
+use crate::film::mean;
+use wgray_image::GAMMA;
+
+/// A PNG file of 8-bit RGB in memory, packed for speed.
+///
+/// # Errors
+///
+/// Sizes that do not fit the number of bytes.
+pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
+    let mut file = Vec::new();
+    let mut png = encoder(&mut file, (width, height), ColorType::Rgb, BitDepth::Eight);
+    png.set_compression(Compression::Fast);
+    png.write_header()
+        .and_then(|mut writer| writer.write_image_data(rgb))
+        .map_err(plain)?;
+    Ok(file)
+}
+
+/// Reads the texts before the pixels of a PNG.
+pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
+    let reader = Decoder::new(file).read_info().ok()?;
+    let texts = reader.info().uncompressed_latin1_text.iter();
+    let pairs = texts.map(|text| (text.keyword.clone(), text.text.clone()));
+    Some(Metadata { pairs: pairs.collect() })
+}
+
+fn encoder<W: Write>(file: W, (width, height): (u32, u32), color: ColorType, depth: BitDepth) -> Encoder<'static, W> {
+    let mut png = Encoder::new(file, width, height);
+    png.set_color(color);
+    png.set_depth(match depth {
+        BitDepth::Eight => Bits::Eight,
+        BitDepth::Sixteen => Bits::Sixteen,
+    });
+    png
+}
+
+/// Writes the radiance to the first file and the AOVs to those after it.
+pub fn write(
+    files: &mut [Pending],
+    layout: &Layout,
+    options: &SaveOptions,
+    render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let depth = options.bit_depth;
+    let mut writers = Vec::new();
+    let contents = [None].into_iter().chain(layout.aovs.iter().copied().map(Some));
+    for (file, content) in files.iter_mut().zip(contents) {
+        let color = match layout.alpha && content.is_none() {
+            true => ColorType::Rgba,
+            false => ColorType::Rgb,
+        };
+        let mut png = encoder(file, (layout.region.width(), layout.region.height()), color, depth);
+        if content.is_none() {
+            match layout.view.is_srgb() {
+                true => png.set_source_srgb(SrgbRenderingIntent::Perceptual),
+                false => png.set_source_gamma(ScaledFloat::new(GAMMA as f32)),
+            }
+        }
+        tell(&mut png, &options.metadata).map_err(plain)?;
+        writers.push((png.write_header().map_err(plain)?, content));
+    }
+    let mut streams = Vec::new();
+    for (writer, content) in &mut writers {
+        streams.push((writer.stream_writer().map_err(plain)?, *content));
+    }
+    render(&mut |band| {
+        for (stream, content) in &mut streams {
+            stream.write_all(&bytes(band, *content, layout, depth))?;
+        }
+        Ok(())
+    })?;
+    for (stream, _) in streams {
+        stream.finish().map_err(plain)?;
+    }
+    for (writer, _) in writers {
+        writer.finish().map_err(plain)?;
+    }
+    Ok(())
+}
+
+/// Puts texts into a file's header: as Latin-1 where they are that, as every reader knows, else as UTF-8.
+fn tell<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) -> Result<(), EncodingError> {
+    for (name, text) in metadata.pairs.iter().cloned() {
+        match text.chars().all(|c| c <= '\u{ff}') {
+            true => png.add_text_chunk(name, text)?,
+            false => png.add_itxt_chunk(name, text)?,
+        }
+    }
+    Ok(())
+}
+
+/// The bytes of all pixels of a band: of the radiance, or of an AOV.
+fn bytes(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> Vec<u8> {
+    match (content, layout.alpha) {
+        (None, true) => rounded(band, depth, |i| {
+            layout
+                .view
+                .display_straight(mean(band.film.sums[i]), band.film.alpha(i))
+        }),
+        (None, false) => rounded(band, depth, |i| layout.view.display(mean(band.film.sums[i]))),
+        (Some(aov), _) => rounded(band, depth, |i| {
+            let color = aov.color(band, i, layout).to_array();
+            match (aov, aov.light()) {
+                (Aov::Albedo, _) => layout.view.display_share(color),
+                (_, Some(_)) => layout.view.display(color),
+                (_, None) => color.map(f64::from),
+            }
+        }),
+    }
+}
+
+/// All pixels of a band, from values of 0 to 1.
+fn rounded<const N: usize>(band: Band, depth: BitDepth, pixel: impl Fn(usize) -> [f64; N] + Sync) -> Vec<u8> {
+    let pixels = (0..band.film.sums.len()).into_par_iter();
+    match depth {
+        BitDepth::Eight => pixels.flat_map_iter(|i| pixel(i).map(to_8_bits)).collect(),
+        BitDepth::Sixteen => {
+            let values = pixels.flat_map_iter(|i| pixel(i).map(to_16_bits));
+            values.flat_map_iter(u16::to_be_bytes).collect()
+        }
+    }
+}
+
+fn plain(error: EncodingError) -> io::Error {
+    match error {
+        EncodingError::IoError(error) => error,
+        other => io::Error::other(other),
+    }
+}

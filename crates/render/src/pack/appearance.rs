@@ -1,0 +1,478 @@
+//! Materials and their textures as records, and images as pyramids of texels.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{DVec3, UVec2, Vec3};
+
+use super::energy::{Parts, energy_table, streak_table};
+use super::pyramid::pyramid;
+use super::*;
+use crate::cpu::lobe::{facet_alpha, is_polished};
+use wgray_scene::{
+    self, AlphaMode, Channel, Color, Encoding, Facets, Image, Integrator, Reflection, Scene, Texels, TextureFilter,
+    TextureKind, Value, VertexColors, Wrap,
+};
+
+/// The records of a scene's materials and of the textures that they use.
+#[derive(Default)]
+pub struct Appearances {
+    pub materials: Vec<Material>,
+    /// What materials look up; those of a material lie together.
+    pub lookups: Vec<Lookup>,
+    pub textures: Vec<Texture>,
+    pub texels: Vec<u32>,
+    /// Where the pyramids of the scene's images are, by the images' addresses.
+    places: BTreeMap<usize, u32>,
+    /// How many levels their textures need.
+    levels: BTreeMap<usize, u32>,
+    /// The records of the scene's textures, apart for each strength as a normal map.
+    records: BTreeMap<(usize, Option<u64>), u32>,
+    /// The tables of rough glass, by its index and alpha where that is one.
+    energies: BTreeMap<(u32, Option<u32>), u32>,
+    /// Those of facets that are rougher along one axis, by what is in them, roughness and anisotropy.
+    streaks: BTreeMap<(Parts, Option<u32>, Option<u32>), u32>,
+}
+
+/// What of a material the camera does not see.
+fn hidden(material: &scene::Material) -> u32 {
+    match &material.reflection {
+        _ if !material.visible => 1,
+        Reflection::Principled(principled) if !principled.double_sided => HIDDEN_BACK,
+        _ => 0,
+    }
+}
+
+/// A record of facets; `texture` gives the roughness of one.
+fn faceted(facets: &Facets, found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
+    Material {
+        roughness: of_value(&facets.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, found),
+        anisotropy: facets.anisotropy as f32,
+        rotation: (facets.rotation / 180.0) as f32,
+        energy: if facets.compensated { 0 } else { NOTHING },
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// A record of facets as one of a kind without them, where it is polished everywhere; so is glass that hardly refracts.
+fn simplest(record: Material, textured: bool) -> Material {
+    let polished = !textured && is_polished(&record);
+    let kind = match record.kind {
+        METAL if polished && record.eta == Vec3::ZERO => MIRROR,
+        ROUGH_GLASS if polished || (record.ior - 1.0).abs() < SMALLEST_ALPHA => GLASS,
+        _ => return record,
+    };
+    Material {
+        roughness: 0.0,
+        anisotropy: 0.0,
+        rotation: 0.0,
+        energy: 0,
+        kind,
+        ..record
+    }
+}
+
+impl Appearances {
+    pub fn of(scene: &Scene) -> Appearances {
+        let mut appearances = Appearances::default();
+        for texture in &scene.textures {
+            if let TextureKind::Image { image, filter, .. } = &texture.kind {
+                let levels = appearances.levels.entry(address(image)).or_default();
+                *levels = levels_of(image, *filter).max(*levels);
+            }
+        }
+        for material in &scene.materials {
+            let material = appearances.material(scene, material);
+            appearances.materials.push(material);
+        }
+        appearances
+    }
+
+    /// Most lookups of a material, and of one of mirrors or glass; of any, twice, where all are looked up in one place.
+    pub fn lookups(&self, integrator: Integrator) -> (u32, u32) {
+        let most = |specular: bool| {
+            let materials = self
+                .materials
+                .iter()
+                .filter(|m| specular == (m.kind == MIRROR || m.kind == GLASS));
+            let lookups = materials.map(|material| material.lookups.y);
+            lookups.max().unwrap_or(0)
+        };
+        let (others, specular) = (most(false), most(true));
+        match integrator {
+            Integrator::Path => (others.max(specular), others.max(specular)),
+            _ => (others, specular),
+        }
+    }
+
+    pub fn has_normal_maps(&self) -> bool {
+        self.have_lookup(FOR_NORMAL | FOR_COAT_NORMAL)
+    }
+
+    /// Whether any texture is looked up for any of these purposes.
+    pub fn have_lookup(&self, purposes: u32) -> bool {
+        self.lookups.iter().any(|lookup| lookup.purposes & purposes != 0)
+    }
+
+    /// Whether a material looks any texture up for any of these purposes.
+    pub fn has_lookup(&self, material: &Material, purposes: u32) -> bool {
+        let [first, count] = material.lookups.to_array().map(|x| x as usize);
+        let mut lookups = self.lookups.iter().skip(first).take(count);
+        lookups.any(|lookup| lookup.purposes & purposes != 0)
+    }
+
+    /// Bits of the textures' kinds.
+    pub fn kinds(&self) -> u32 {
+        self.textures.iter().fold(0, |bits, texture| bits | 1 << texture.kind)
+    }
+
+    /// Bits of the texels' formats.
+    pub fn formats(&self) -> u32 {
+        let images = self.textures.iter().filter(|texture| texture.kind >= NEAREST);
+        images.fold(0, |bits, texture| bits | 1 << texture.format)
+    }
+
+    /// Whether any texture is filtered over footprints.
+    pub fn needs_footprints(&self) -> bool {
+        self.kinds() & !(1 << NEAREST | 1 << BILINEAR) != 0
+    }
+
+    fn material(&mut self, scene: &Scene, material: &scene::Material) -> Material {
+        let mut lookups = Lookups::default();
+        let uv_set = |i: usize| scene.textures[i].uv_set;
+        let mut found = |color: &Color, purpose: u32, channel: Option<(Channel, u32)>| match *color {
+            Color::Plain(color) => color.as_vec3(),
+            Color::Texture(i) => match scene.textures[i].kind {
+                TextureKind::Constant(color) => color.as_vec3(),
+                _ => {
+                    lookups.add(self.texture(scene, i, None), uv_set(i), purpose, channel);
+                    Vec3::ZERO
+                }
+            },
+        };
+        let mut record = match &material.reflection {
+            Reflection::Phong {
+                ambient,
+                diffuse,
+                specular,
+                shininess,
+            } => Material {
+                ambient: match scene.render.integrator {
+                    Integrator::Path => Vec3::ZERO, // without effect
+                    _ => found(ambient, FOR_AMBIENT, None),
+                },
+                kind: PHONG,
+                diffuse: found(diffuse, FOR_DIFFUSE, None),
+                shininess: *shininess as f32,
+                specular: found(specular, FOR_SPECULAR, None),
+                exponent: *shininess as u32,
+                ..bytemuck::Zeroable::zeroed()
+            },
+            Reflection::Mirror { tint } => Material {
+                kind: MIRROR,
+                tint: found(tint, FOR_TINT, None),
+                ..bytemuck::Zeroable::zeroed()
+            },
+            Reflection::Glass { ior, tint } => Material {
+                kind: GLASS,
+                tint: found(tint, FOR_TINT, None),
+                ior: *ior as f32,
+                ..bytemuck::Zeroable::zeroed()
+            },
+            Reflection::Conductor {
+                color: tint,
+                index,
+                facets,
+            } => Material {
+                kind: METAL,
+                tint: found(tint, FOR_TINT, None),
+                eta: index.map_or(Vec3::ZERO, |index| index.eta.as_vec3()),
+                k: index.map_or(Vec3::ZERO, |index| index.k.as_vec3()),
+                ..faceted(facets, &mut found)
+            },
+            Reflection::Dielectric {
+                ior,
+                color: tint,
+                absorption,
+                thin,
+                facets,
+            } => Material {
+                kind: if *thin { THIN } else { ROUGH_GLASS },
+                tint: found(tint, FOR_TINT, None),
+                ior: *ior as f32,
+                absorption: absorption.as_vec3(),
+                ..faceted(facets, &mut found)
+            },
+            Reflection::Principled(principled) => self::principled(principled, &mut found),
+            Reflection::Diffuse {
+                color: albedo,
+                roughness,
+            } => Material {
+                kind: DIFFUSE,
+                diffuse: found(albedo, FOR_DIFFUSE, None),
+                roughness: of_value(roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, &mut found),
+                ..bytemuck::Zeroable::zeroed()
+            },
+        };
+        record.emission = found(&material.emission, FOR_EMISSION, None);
+        let has = |purpose: u32| lookups.0.iter().any(|lookup| lookup.purposes & purpose != 0);
+        let textured = has(FOR_ROUGHNESS);
+        let mut record = simplest(record, textured);
+        record.hidden = hidden(material);
+        let passes = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
+        let parts = match record.kind {
+            METAL | THIN if record.energy != NOTHING => Some(Parts::Mirror),
+            ROUGH_GLASS if record.energy != NOTHING => Some(Parts::Glass(record.ior.to_bits())),
+            PRINCIPLED => Some(Parts::Mixture(passes.then_some(record.ior.to_bits()))),
+            _ => None,
+        };
+        if let Some(parts) = parts {
+            if record.anisotropy > 0.0 || has(FOR_ANISOTROPY) {
+                record.streaks = 1 + self.streaks(&record, parts, textured, has(FOR_ANISOTROPY));
+            } else if record.kind == ROUGH_GLASS || record.kind == PRINCIPLED && passes {
+                record.energy = self.energy(&record, textured);
+            }
+        }
+        if let Some(map) = material.normal_map {
+            let texture = self.texture(scene, map.texture, Some(map.strength));
+            lookups.add(texture, uv_set(map.texture), FOR_NORMAL, None);
+        }
+        if let Reflection::Principled(principled) = &material.reflection
+            && let Some(texture) = principled.anisotropy_direction
+        {
+            lookups.add(self.texture(scene, texture, None), uv_set(texture), FOR_DIRECTION, None);
+        }
+        if let Reflection::Principled(principled) = &material.reflection
+            && let Some(map) = principled.clearcoat_normal_map
+        {
+            let texture = self.texture(scene, map.texture, Some(map.strength));
+            lookups.add(texture, uv_set(map.texture), FOR_COAT_NORMAL, None);
+        }
+        record.lookups = UVec2::new(self.lookups.len() as u32, lookups.0.len() as u32);
+        self.lookups.extend(lookups.0);
+        record
+    }
+
+    /// Where the table of what rough glass reflects and lets pass at once starts; a new one where there is none such.
+    fn energy(&mut self, record: &Material, textured: bool) -> u32 {
+        let square = 0.5 * facet_alpha(record).length_squared();
+        let alpha = if textured { None } else { Some(square.sqrt()) };
+        let key = (record.ior.to_bits(), alpha.map(f32::to_bits));
+        let texels = &mut self.texels;
+        *self.energies.entry(key).or_insert_with(|| {
+            let start = texels.len() as u32;
+            texels.extend(energy_table(record.ior, alpha).iter().map(|x| x.to_bits()));
+            start
+        })
+    }
+
+    /// The same of facets that are rougher along one axis; textures may give roughness and anisotropy.
+    fn streaks(&mut self, record: &Material, parts: Parts, rough: bool, long: bool) -> u32 {
+        let known = |number: f32, textured: bool| (!textured).then_some(number);
+        let (roughness, anisotropy) = (known(record.roughness, rough), known(record.anisotropy, long));
+        let key = (parts, roughness.map(f32::to_bits), anisotropy.map(f32::to_bits));
+        let texels = &mut self.texels;
+        *self.streaks.entry(key).or_insert_with(|| {
+            let start = texels.len() as u32;
+            texels.extend(streak_table(parts, roughness, anisotropy));
+            start
+        })
+    }
+
+    /// The record of a texture that gives a colour, or a normal if it has a strength.
+    fn texture(&mut self, scene: &Scene, i: usize, strength: Option<f64>) -> u32 {
+        let key = (i, strength.map(f64::to_bits));
+        if let Some(record) = self.records.get(&key) {
+            return *record;
+        }
+        let texture = &scene.textures[i];
+        let plain = Texture {
+            u: texture.transform[0].as_vec3(),
+            v: texture.transform[1].as_vec3(),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let between = |first: DVec3, second: DVec3| (first.as_vec3(), second.as_vec3());
+        let record = match &texture.kind {
+            TextureKind::Constant(color) => {
+                let (first, second) = between(*color, *color);
+                Texture {
+                    first,
+                    kind: CHECKER,
+                    second,
+                    ..plain
+                }
+            }
+            TextureKind::Checker { even, odd } => {
+                let (first, second) = between(*even, *odd);
+                Texture {
+                    first,
+                    kind: CHECKER,
+                    second,
+                    ..plain
+                }
+            }
+            TextureKind::Lines { cell, line, line_width } => {
+                let (first, second) = between(*cell, *line);
+                Texture {
+                    first,
+                    kind: LINES,
+                    second,
+                    parameter: *line_width as f32,
+                    ..plain
+                }
+            }
+            TextureKind::Image {
+                image,
+                wrap,
+                filter,
+                max_anisotropy,
+                factor,
+            } => {
+                let (first, second) = match strength {
+                    Some(s) => between(DVec3::new(-s, -s, -1.0), DVec3::new(s, s, 1.0)),
+                    None => between(DVec3::ZERO, *factor),
+                };
+                let levels = levels_of(image, *filter);
+                let address = address(image);
+                let most_levels = self.levels.get(&address).map_or(levels, |most| levels.max(*most));
+                let texels = &mut self.texels;
+                Texture {
+                    first,
+                    kind: match filter {
+                        TextureFilter::Nearest => NEAREST,
+                        TextureFilter::Bilinear => BILINEAR,
+                        TextureFilter::Trilinear => TRILINEAR,
+                        TextureFilter::Ewa => EWA,
+                    },
+                    second,
+                    parameter: *max_anisotropy as f32,
+                    format: match image.texels {
+                        Texels::Bytes(Encoding::Srgb, _) => SRGB8,
+                        Texels::Bytes(Encoding::Linear, _) => LINEAR8,
+                        Texels::Floats(_) => FLOAT,
+                    },
+                    wrap: self::wrap(wrap[0]) + 4 * self::wrap(wrap[1]),
+                    texels: *(self.places.entry(address)).or_insert_with(|| pyramid(image, most_levels, texels)),
+                    width: image.width,
+                    height: image.height,
+                    levels,
+                    ..plain
+                }
+            }
+        };
+        let number = self.textures.len() as u32;
+        self.textures.push(record);
+        self.records.insert(key, number);
+        number
+    }
+}
+
+fn wrap(wrap: Wrap) -> u32 {
+    match wrap {
+        Wrap::Repeat => REPEAT,
+        Wrap::Clamp => CLAMP,
+        Wrap::Mirror => MIRRORED,
+    }
+}
+
+/// What tells a scene's images apart while it stands.
+fn address(image: &Arc<Image>) -> usize {
+    Arc::as_ptr(image).addr()
+}
+
+fn levels_of(image: &Image, filter: TextureFilter) -> u32 {
+    if filter.needs_levels() { image.levels() } else { 1 }
+}
+
+/// The lookups of a material: each texture once, with all its purposes.
+#[derive(Default)]
+struct Lookups(Vec<Lookup>);
+
+impl Lookups {
+    /// A number has a place for its channel.
+    fn add(&mut self, texture: u32, uv_set: u32, purpose: u32, channel: Option<(Channel, u32)>) {
+        let known = self.0.iter().position(|lookup| lookup.texture == texture);
+        let place = known.unwrap_or_else(|| {
+            self.0.push(Lookup {
+                texture,
+                uv_set,
+                ..bytemuck::Zeroable::zeroed()
+            });
+            self.0.len() - 1
+        });
+        let lookup = &mut self.0[place];
+        lookup.purposes |= purpose;
+        if let Some((channel, place)) = channel {
+            lookup.channels |= number_of(channel) << (2 * place);
+        }
+    }
+}
+
+/// The record of a principled material, but for what all have.
+fn principled(p: &scene::Principled, found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
+    let sees_through = p.alpha_mode != AlphaMode::Opaque;
+    Material {
+        kind: PRINCIPLED,
+        diffuse: found(&p.base_color, FOR_DIFFUSE, None),
+        specular: found(&p.specular_color, FOR_SPECULAR, None),
+        ior: p.ior as f32,
+        absorption: p.absorption.as_vec3(),
+        roughness: of_value(&p.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, found),
+        anisotropy: of_value(&p.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL, found),
+        rotation: (p.anisotropy_rotation / std::f64::consts::PI) as f32,
+        thin: p.thin.into(),
+        sheen: found(&p.sheen_color, FOR_SHEEN, None),
+        sheen_roughness: of_value(&p.sheen_roughness, FOR_SHEEN_ROUGHNESS, SHEEN_ROUGHNESS_CHANNEL, found),
+        metallic: of_value(&p.metallic, FOR_METALLIC, METALLIC_CHANNEL, found),
+        transmission: of_value(&p.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL, found),
+        clearcoat: of_value(&p.clearcoat, FOR_COAT, COAT_CHANNEL, found),
+        clearcoat_roughness: of_value(
+            &p.clearcoat_roughness,
+            FOR_COAT_ROUGHNESS,
+            COAT_ROUGHNESS_CHANNEL,
+            found,
+        ),
+        specular_weight: of_value(&p.specular, FOR_WEIGHT, WEIGHT_CHANNEL, found),
+        opacity: match sees_through {
+            true => of_value(&p.alpha, FOR_OPACITY, OPACITY_CHANNEL, found),
+            false => 1.0,
+        },
+        cutoff: p.alpha_cutoff as f32,
+        alpha_mode: match p.alpha_mode {
+            AlphaMode::Opaque => OPAQUE,
+            AlphaMode::Mask => MASK,
+            AlphaMode::Blend => BLEND,
+        },
+        vertex_colors: match p.vertex_colors {
+            VertexColors::None => NO_COLORS,
+            VertexColors::BaseColor => COLORS_OF_BASE,
+            VertexColors::Emission => COLORS_OF_EMISSION,
+        },
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// Asks `found` for a colour, or notes a lookup of it, and takes a number of it.
+fn of_value(
+    value: &Value,
+    purpose: u32,
+    place: u32,
+    found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
+) -> f32 {
+    match *value {
+        Value::Plain(number) => number as f32,
+        Value::Texture(i, channel) => {
+            let color = found(&Color::Texture(i), purpose, Some((channel, place)));
+            color[number_of(channel) as usize]
+        }
+    }
+}
+
+/// Which value of a texture's colour it is.
+fn number_of(channel: Channel) -> u32 {
+    match channel {
+        Channel::R | Channel::A => 0,
+        Channel::G => 1,
+        Channel::B => 2,
+    }
+}

@@ -1,0 +1,529 @@
+//! What shines, for the integrator `path`: of each thing how likely a sample of light is one of it, which is by its power.
+
+use std::collections::BTreeMap;
+
+use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::geometry::Trees;
+use super::light_tree::{self, Cone, Lamp};
+use super::{
+    DIRECTIONAL, DISK, DISTANT, ELLIPSOID, EMITTER, ENVIRONMENT, Emitter, Light, LightNode, Material, NO_SHADOW,
+    NOTHING, PLANE, POINT, Primitive, RECTANGLE, SPOT, TRIANGLE, reach,
+};
+use wgray_scene::{Color, Scene, Texels, TextureKind};
+
+/// What shines.
+#[derive(Default)]
+pub struct Shining {
+    /// The primitives that shine, and the lights without extent.
+    pub lights: Vec<Light>,
+    /// These, and the triangles of meshes that shine; or, where they are many, a tree and what is far away.
+    pub emitters: Vec<Emitter>,
+    /// How likely a sample of light is one of the image that surrounds the scene.
+    pub environment: f64,
+    /// The tree, if there is one.
+    pub nodes: Vec<LightNode>,
+    /// [`Packed::light_leaves`](super::Packed::light_leaves) of that tree.
+    pub leaves: Vec<u32>,
+    /// Of each instance of a mesh [`Instance::leaves`](super::Instance::leaves), if there is a tree.
+    pub of_instances: Vec<u32>,
+}
+
+/// So many things that shine are chosen by their power alone, at most.
+pub const MOST_LISTED: usize = 16;
+/// So many have a tree, at most: its nodes are some 100 bytes for each of them. More are chosen by their power alone.
+const MOST_IN_TREE: usize = 500_000;
+
+/// All that shines, of primitives with their materials, lights without extent and meshes. The materials are told how densely samples lie on
+/// what shines. `around` is the sum of what the image that surrounds the scene sends from all directions, where there is one.
+pub fn emitters(
+    scene: &Scene,
+    materials: &mut [Material],
+    delta_lights: &[Light],
+    primitives: &[(Primitive, bool)],
+    trees: &Trees,
+    around: Option<f64>,
+) -> Shining {
+    // Of each material the mean radiance, and the power of a unit of area.
+    let radiances: Vec<f64> = (materials.iter().enumerate())
+        .map(
+            |(i, material)| match scene.materials.get(i).map(|material| &material.emission) {
+                Some(emission) => mean_of(scene, emission),
+                None => mean(material.emission), // a light's own
+            },
+        )
+        .collect();
+    let mut strengths: Vec<f64> = (materials.iter().zip(&radiances))
+        .map(|(material, radiance)| {
+            let sides = if material.kind == EMITTER { 1.0 } else { 2.0 };
+            std::f64::consts::PI * radiance * sides
+        })
+        .collect();
+    let mut shining = Shining::default();
+    let mut powers = Vec::new();
+    // Of each of these its material; of lights without one a number of their own.
+    let mut kinds = Vec::new();
+    for (i, (primitive, _)) in (0..).zip(primitives) {
+        let material = &materials[primitive.material as usize];
+        let strength = strengths[primitive.material as usize];
+        if strength > 0.0 && primitive.kind != PLANE {
+            let light = light_of(primitive, i, material, reach(scene.render.shadow_epsilon));
+            powers.push(strength * area(primitive));
+            kinds.push(primitive.material as usize);
+            shining.lights.push(light);
+        }
+    }
+    for light in delta_lights.iter().filter(|light| light.color != Vec3::ZERO) {
+        powers.push(match light.kind {
+            POINT => 4.0 * std::f64::consts::PI * mean(light.color),
+            SPOT => spot_power(light) * mean(light.color),
+            _ => std::f64::consts::PI * radius(primitives, trees).powi(2) * mean(light.color),
+        });
+        shining.lights.push(*light);
+    }
+    let environment = shining.lights.len();
+    let of_materials = kinds.len();
+    kinds.extend((of_materials..environment).map(|i| materials.len() + i));
+    if let Some(around) = around {
+        powers.push(std::f64::consts::PI * radius(primitives, trees).powi(2) * around);
+        shining.lights.push(environment_light());
+        kinds.push(materials.len() + environment);
+    }
+    let mut places: Vec<(u32, u32)> = (0..shining.lights.len() as u32).map(|i| (0, i)).collect();
+    for (number, instance) in (1..).zip(&trees.instances) {
+        let mesh = &trees.meshes[instance.mesh as usize];
+        let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
+        for (slot, triangle) in (0..).zip(&mesh.triangles) {
+            let group = mesh.groups.get(slot as usize).copied().unwrap_or(0);
+            let material = trees.group_words[(instance.materials + group) as usize] & !NO_SHADOW;
+            let strength = strengths[material as usize];
+            if strength > 0.0 {
+                let [a, b, c] = [triangle.x, triangle.y, triangle.z]
+                    .map(|vertex| columns * mesh.vertices[vertex as usize].truncate().as_dvec3());
+                let area = 0.5 * (b - a).cross(c - a).length();
+                if area > 0.0 {
+                    places.push((number, slot));
+                    powers.push(strength * area);
+                    kinds.push(material as usize);
+                }
+            }
+        }
+    }
+    balance(&mut powers, &places, &shining.lights);
+    let is_far = |place: &(u32, u32)| is_far(&shining.lights, place);
+    let near = places.iter().filter(|place| !is_far(place)).count();
+    if (MOST_LISTED + 1..=MOST_IN_TREE).contains(&near) {
+        let found = Found {
+            places,
+            powers,
+            radiances,
+            strengths,
+        };
+        return with_tree(shining, materials, primitives, trees, &found);
+    }
+    for (kind, factor) in defend(&mut powers, &kinds, |i| is_far(&places[i])) {
+        if let Some(strength) = strengths.get_mut(kind) {
+            *strength *= factor;
+        }
+    }
+    let total: f64 = powers.iter().sum();
+    for (material, strength) in materials.iter_mut().zip(strengths) {
+        // Where all that shines is tiny, what shines nowhere may be beyond all numbers.
+        material.density = if total > 0.0 {
+            (strength / total).min(f64::from(f32::MAX)) as f32
+        } else {
+            0.0
+        };
+    }
+    for (light, power) in shining.lights.iter_mut().zip(&powers) {
+        light.density = match light.kind {
+            POINT | DIRECTIONAL | SPOT | ENVIRONMENT => (power / total) as f32,
+            _ => materials[primitives[light.primitive as usize].0.material as usize].density,
+        };
+    }
+    shining.environment = around.map_or(0.0, |_| powers[environment] / total);
+    shining.emitters = (table(&powers).into_iter().zip(places))
+        .map(|((threshold, other), (instance, index))| Emitter {
+            threshold,
+            other,
+            instance,
+            index,
+        })
+        .collect();
+    shining
+}
+
+/// Makes the power of each kind of what is near count as much that a quarter of the samples are of all alike: a strong lamp that lights nothing
+/// here does not hide all others. For each kind the factor of its power; where there is one kind, it is exactly 1.
+fn defend(powers: &mut [f64], kinds: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
+    let mut near: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+    for (i, (power, kind)) in powers.iter().zip(kinds).enumerate() {
+        if !is_far(i) {
+            let (sum, count) = near.entry(*kind).or_default();
+            *sum += power;
+            *count += 1.0;
+        }
+    }
+    let (total, all) = near
+        .values()
+        .fold((0.0, 0.0), |(total, all), (sum, count)| (total + sum, all + count));
+    if near.len() < 2 {
+        return Vec::new();
+    }
+    let factors: BTreeMap<usize, f64> = (near.iter())
+        .map(|(kind, (sum, count))| (*kind, 0.75 + 0.25 * (count / all) * (total / sum)))
+        .collect();
+    for (i, power) in powers.iter_mut().enumerate() {
+        if let Some(factor) = factors.get(&kinds[i])
+            && !is_far(i)
+        {
+            *power *= factor;
+        }
+    }
+    factors.into_iter().collect()
+}
+
+/// Makes the power of what is far away count as much that its share is half what it is, and half a half: a lamp in a wide landscape has hardly
+/// any of the power that arrives there, and yet lights what is around it.
+fn balance(powers: &mut [f64], places: &[(u32, u32)], lights: &[Light]) {
+    let far: Vec<bool> = places.iter().map(|place| is_far(lights, place)).collect();
+    let sum = |wanted: bool| -> f64 {
+        let chosen = powers.iter().zip(&far).filter(|(_, far)| **far == wanted);
+        chosen.map(|(power, _)| power).sum()
+    };
+    let (of_far, of_near) = (sum(true), sum(false));
+    if of_far > 0.0 && of_near > 0.0 {
+        let share = 0.5 * (of_far / (of_far + of_near)) + 0.25;
+        let factor = of_near * share / (1.0 - share) / of_far;
+        for (power, _) in powers.iter_mut().zip(far).filter(|(_, far)| *far) {
+            *power *= factor;
+        }
+    }
+}
+
+fn environment_light() -> Light {
+    Light {
+        reach: DISTANT,
+        primitive: NOTHING,
+        number: NOTHING,
+        kind: ENVIRONMENT,
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// Whether what shines there, an instance and the number of a light or a triangle, is infinitely far away.
+fn is_far(lights: &[Light], &(instance, index): &(u32, u32)) -> bool {
+    instance == 0 && matches!(lights[index as usize].kind, DIRECTIONAL | ENVIRONMENT)
+}
+
+/// What was found to shine.
+struct Found {
+    /// The instance, and the light's or the triangle's number.
+    places: Vec<(u32, u32)>,
+    /// The power of each of these.
+    powers: Vec<f64>,
+    /// The mean radiance of each material.
+    radiances: Vec<f64>,
+    /// The power of a unit of area of each material.
+    strengths: Vec<f64>,
+}
+
+/// What shines where a tree chooses of it, but for what is far away.
+fn with_tree(
+    mut shining: Shining,
+    materials: &mut [Material],
+    primitives: &[(Primitive, bool)],
+    trees: &Trees,
+    found: &Found,
+) -> Shining {
+    let is_far = |place: &(u32, u32)| is_far(&shining.lights, place);
+    let (mut in_tree, mut far) = (Vec::new(), Vec::new());
+    for (place, power) in found.places.iter().zip(&found.powers) {
+        if is_far(place) { &mut far } else { &mut in_tree }.push((*place, *power));
+    }
+    let power_of = |some: &[((u32, u32), f64)]| some.iter().map(|(_, power)| power).sum::<f64>();
+    let (of_tree, total) = (power_of(&in_tree), power_of(&in_tree) + power_of(&far));
+    let share = of_tree / total;
+    let lamps: Vec<Lamp> = in_tree
+        .iter()
+        .map(|(place @ (instance, index), _)| {
+            let lamp = match *instance {
+                0 => lamp_of(&shining.lights[*index as usize], primitives, &found.radiances),
+                number => {
+                    let (corners, material) = face(trees, number as usize - 1, *index);
+                    lamp_of_triangle(corners, found.radiances[material as usize], true)
+                }
+            };
+            Lamp {
+                density: lamp.density * share,
+                instance: place.0,
+                index: place.1,
+                ..lamp
+            }
+        })
+        .collect();
+    shining.nodes = light_tree::build(&lamps);
+    shining.leaves = vec![NOTHING; primitives.len()];
+    shining.of_instances = vec![NOTHING; trees.instances.len()];
+    for lamp in lamps.iter().filter(|lamp| lamp.instance != 0) {
+        let number = lamp.instance as usize - 1;
+        if shining.of_instances[number] == NOTHING {
+            shining.of_instances[number] = shining.leaves.len() as u32;
+            let triangles = trees.meshes[trees.instances[number].mesh as usize].triangles.len();
+            shining.leaves.resize(shining.leaves.len() + triangles, NOTHING);
+        }
+    }
+    for (number, node) in (0..).zip(&shining.nodes) {
+        for (i, child) in (4 * number..).zip(0..4) {
+            if node.children[child] != NOTHING || node.intensity[child] == 0.0 {
+                continue;
+            }
+            let place = match node.instance[child] {
+                0 => shining.lights[node.index[child] as usize].primitive,
+                number => shining.of_instances[number as usize - 1] + node.index[child],
+            };
+            if place != NOTHING {
+                shining.leaves[place as usize] = i;
+            }
+        }
+    }
+    for (material, strength) in materials.iter_mut().zip(&found.strengths) {
+        material.density = if *strength > 0.0 { 1.0 } else { 0.0 };
+    }
+    for ((_, index), power) in &far {
+        let light = &mut shining.lights[*index as usize];
+        light.density = (power / total) as f32;
+        if light.kind == ENVIRONMENT {
+            shining.environment = power / total;
+        }
+    }
+    let weights: Vec<f64> = [of_tree]
+        .into_iter()
+        .chain(far.iter().map(|(_, power)| *power))
+        .collect();
+    let places = [(0, NOTHING)].into_iter().chain(far.iter().map(|(place, _)| *place));
+    shining.emitters = (table(&weights).into_iter().zip(places))
+        .map(|((threshold, other), (instance, index))| Emitter {
+            threshold,
+            other,
+            instance,
+            index,
+        })
+        .collect();
+    shining
+}
+
+/// The corners of a triangle of an instance, and its material.
+fn face(trees: &Trees, number: usize, slot: u32) -> ([DVec3; 3], u32) {
+    let instance = &trees.instances[number];
+    let mesh = &trees.meshes[instance.mesh as usize];
+    let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
+    let triangle = mesh.triangles[slot as usize];
+    let corners = [triangle.x, triangle.y, triangle.z]
+        .map(|vertex| instance.anchor.as_dvec3() + columns * mesh.vertices[vertex as usize].truncate().as_dvec3());
+    let group = mesh.groups.get(slot as usize).copied().unwrap_or(0);
+    (
+        corners,
+        trees.group_words[(instance.materials + group) as usize] & !NO_SHADOW,
+    )
+}
+
+/// A triangle that shines on one side or on both, in the tree over all.
+fn lamp_of_triangle([a, b, c]: [DVec3; 3], radiance: f64, two_sided: bool) -> Lamp {
+    let span = (b - a).cross(c - a);
+    let area = 0.5 * span.length();
+    Lamp {
+        low: a.min(b).min(c),
+        high: a.max(b).max(c),
+        cone: Cone::flat(span.normalize_or(DVec3::Z), two_sided),
+        intensity: radiance * area,
+        density: 1.0 / area,
+        instance: 0,
+        index: 0,
+    }
+}
+
+/// A light in the tree over all that shines.
+fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -> Lamp {
+    let center = light.center.as_dvec3();
+    let point = |cone: Cone| Lamp {
+        low: center,
+        high: center,
+        cone,
+        intensity: mean(light.color),
+        density: 1.0,
+        instance: 0,
+        index: 0,
+    };
+    match light.kind {
+        POINT => return point(Cone::ALL),
+        SPOT => {
+            // Brightest inside, then as bright as the cosine beyond says, or less.
+            let angle = |below_one: f64| (1.0 - below_one).clamp(-1.0, 1.0).acos();
+            let cone = f64::from(light.cone);
+            let (outer, inner) = (angle(cone), angle(cone - 1.0 / f64::from(light.falloff)));
+            let spread = inner.max(outer - std::f64::consts::FRAC_PI_2);
+            return point(Cone {
+                axis: light.normal.as_dvec3(),
+                spread,
+                edge: outer - spread,
+                two_sided: false,
+            });
+        }
+        _ => {}
+    }
+    let primitive = &primitives[light.primitive as usize].0;
+    let radiance = radiances[primitive.material as usize];
+    let [u, v, w] = axes(primitive);
+    let normal = u.cross(v).normalize_or(DVec3::Z);
+    let area = area(primitive);
+    let root = |squares: DVec3| squares.map(f64::sqrt);
+    let (half, cone, intensity) = match primitive.kind {
+        TRIANGLE => {
+            let corners = [center, center + u, center + v];
+            return lamp_of_triangle(corners, radiance, light.sides == 2);
+        }
+        // From afar it is a disk.
+        ELLIPSOID => (root(u * u + v * v + w * w), Cone::ALL, radiance * area / 4.0),
+        DISK => (
+            root(u * u + v * v),
+            Cone::flat(normal, light.sides == 2),
+            radiance * area,
+        ),
+        _ => (u.abs() + v.abs(), Cone::flat(normal, light.sides == 2), radiance * area),
+    };
+    let middle = match primitive.kind {
+        ELLIPSOID => center + DMat3::from_cols(u, v, w) * primitive.middle.as_dvec3(),
+        _ => center,
+    };
+    Lamp {
+        low: middle - half,
+        high: middle + half,
+        cone,
+        intensity,
+        density: 1.0 / area,
+        instance: 0,
+        index: 0,
+    }
+}
+
+/// For each of some weights a threshold and another index: one of n numbers is as likely as its weight if it is taken itself with
+/// its threshold's probability, else the other. Vose, "A Linear Algorithm for Generating Random Numbers with a Given Distribution",
+/// IEEE TSE 17(9), 1991.
+fn table(weights: &[f64]) -> Vec<(f32, u32)> {
+    let mean = weights.iter().sum::<f64>() / weights.len() as f64;
+    let mut rest: Vec<f64> = weights.iter().map(|weight| weight / mean).collect();
+    let mut table: Vec<(f32, u32)> = (0..weights.len() as u32).map(|i| (1.0, i)).collect();
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..weights.len()).partition(|i| rest[*i] < 1.0);
+    while let (Some(i), Some(&j)) = (small.pop(), large.last()) {
+        table[i] = (rest[i] as f32, j as u32);
+        rest[j] -= 1.0 - rest[i];
+        if rest[j] < 1.0 {
+            small.push(j);
+            large.pop();
+        }
+    }
+    table
+}
+
+/// The power of a spot of intensity 1: the integral of the square of a ramp that is linear in the cosine, and of 1 inside of it.
+fn spot_power(light: &Light) -> f64 {
+    let (cone, ramp) = (f64::from(light.cone), 1.0 / f64::from(light.falloff));
+    2.0 * std::f64::consts::PI * (cone - ramp + ramp / 3.0)
+}
+
+fn mean(color: Vec3) -> f64 {
+    color.as_dvec3().element_sum() / 3.0
+}
+
+/// The mean of a colour's components, over the whole of a texture.
+fn mean_of(scene: &Scene, color: &Color) -> f64 {
+    let mean = |color: DVec3| color.element_sum() / 3.0;
+    match *color {
+        Color::Plain(color) => mean(color),
+        Color::Texture(i) => match &scene.textures[i].kind {
+            TextureKind::Constant(color) => mean(*color),
+            TextureKind::Checker { even, odd } => mean((*even + *odd) / 2.0),
+            TextureKind::Lines { cell, line, .. } => mean((*cell + *line) / 2.0),
+            TextureKind::Image { image, factor, .. } => {
+                mean(*factor)
+                    * match &image.texels {
+                        Texels::Bytes(_, bytes) => {
+                            let sum: u64 = bytes.as_flattened().par_iter().map(|byte| u64::from(*byte)).sum();
+                            sum as f64 / 255.0 / (3 * bytes.len().max(1)) as f64
+                        }
+                        Texels::Floats(floats) => {
+                            floats.iter().flatten().map(|x| f64::from(*x)).sum::<f64>()
+                                / (3 * floats.len().max(1)) as f64
+                        }
+                    }
+            }
+        },
+    }
+}
+
+/// A primitive that shines, as a light.
+fn light_of(primitive: &Primitive, number: u32, material: &Material, reach: f32) -> Light {
+    let [u, v, _] = axes(primitive);
+    Light {
+        center: primitive.anchor,
+        reach,
+        u: u.as_vec3(),
+        finite: 1.0,
+        v: v.as_vec3(),
+        primitive: number,
+        color: material.emission,
+        number: primitive.shape,
+        normal: u.cross(v).normalize_or_zero().as_vec3(),
+        kind: primitive.kind,
+        sides: if material.kind == EMITTER { 1 } else { 2 },
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// The images of a local space's axes.
+fn axes(primitive: &Primitive) -> [DVec3; 3] {
+    let rows = [primitive.x, primitive.y, primitive.z].map(Vec3::as_dvec3);
+    let columns = DMat3::from_cols_array_2d(&rows.map(|row| row.to_array()))
+        .transpose()
+        .inverse();
+    [columns.x_axis, columns.y_axis, columns.z_axis]
+}
+
+/// A primitive's area; an ellipsoid's as `ellipsoid_area` has it.
+fn area(primitive: &Primitive) -> f64 {
+    let [u, v, _] = axes(primitive);
+    let span = u.cross(v).length();
+    match primitive.kind {
+        RECTANGLE => 4.0 * span,
+        DISK => std::f64::consts::PI * span,
+        TRIANGLE => 0.5 * span,
+        ELLIPSOID => {
+            let rows = [primitive.x, primitive.y, primitive.z].map(|row| row.as_dvec3().length_squared());
+            let squares: f64 = rows.iter().sum();
+            4.0 * std::f64::consts::PI * (squares / 3.0).sqrt() / f64::from(primitive.determinant).abs()
+        }
+        _ => 0.0,
+    }
+}
+
+/// Half the diagonal of a box around all that is bounded; 1 where there is nothing.
+fn radius(primitives: &[(Primitive, bool)], trees: &Trees) -> f64 {
+    let spheres = primitives.iter().filter(|(p, _)| p.kind != PLANE).map(|(p, _)| {
+        let sphere = super::bounds::sphere(p);
+        let (center, radius) = (sphere.center.as_dvec3(), f64::from(sphere.radius));
+        (center - radius, center + radius)
+    });
+    let items = trees
+        .items
+        .iter()
+        .map(|item| (item.low.as_dvec3(), item.high.as_dvec3()));
+    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = (spheres.chain(items)).fold(empty, |(low, high), (a, b)| (low.min(a), high.max(b)));
+    if low.x <= high.x {
+        (high - low).length() / 2.0
+    } else {
+        1.0
+    }
+}

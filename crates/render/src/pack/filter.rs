@@ -1,0 +1,122 @@
+//! Reconstruction filters as tables of bins, for sampling positions with a filter's own density.
+
+use std::f64::consts::PI;
+
+use glam::{DVec4, Vec4};
+
+use super::BINS;
+use wgray_scene::{PixelFilter, PixelFilterKind};
+
+/// Steps of the numerical integrals, between two sign changes of a filter.
+const STEPS: usize = 1 << 14;
+
+/// A filter's height at a distance from the centre of its pixel, in pixels; not normalised, 0 beyond the radius.
+///
+/// Mitchell: B = C = 1/3, stretched to the radius ("Reconstruction Filters in Computer Graphics", SIGGRAPH 1988, eq. 8).
+/// Gaussian: standard deviation of a third of the radius, lowered to reach 0 there. Blackman-Harris: the window of four
+/// terms with side lobes at -92 dB (Harris, "On the Use of Windows for Harmonic Analysis", Proc. IEEE 66(1), 1978).
+pub fn height(filter: PixelFilter, distance: f64) -> f64 {
+    let x = distance.abs() / filter.radius;
+    if x > 1.0 {
+        return 0.0;
+    }
+    match filter.kind {
+        PixelFilterKind::Box => 1.0,
+        PixelFilterKind::Triangle => 1.0 - x,
+        PixelFilterKind::Gaussian => (-4.5 * x * x).exp() - f64::exp(-4.5),
+        PixelFilterKind::Mitchell => mitchell(2.0 * x),
+        PixelFilterKind::BlackmanHarris => {
+            let cosine = |k: f64| (k * PI * x).cos();
+            0.35875 + 0.48829 * cosine(1.0) + 0.14128 * cosine(2.0) + 0.01168 * cosine(3.0)
+        }
+    }
+}
+
+fn mitchell(x: f64) -> f64 {
+    let six_times = if x < 1.0 {
+        7.0 * x.powi(3) - 12.0 * x.powi(2) + 16.0 / 3.0
+    } else {
+        -7.0 / 3.0 * x.powi(3) + 12.0 * x.powi(2) - 20.0 * x + 32.0 / 3.0
+    };
+    six_times / 6.0
+}
+
+/// The [`BINS`] bins of a filter: inner edge, outer edge and weight, then 0. All bins are met equally often. Those of a lobe have the same integral, and a weight that makes
+/// up for the lobe's share of bins, which is a whole number: close to 1, below 0 in negative lobes.
+pub fn table(filter: PixelFilter) -> Vec<Vec4> {
+    let lobes = lobes(filter);
+    let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
+    let mut table = Vec::new();
+    let mut left = BINS;
+    for (i, lobe) in lobes.iter().enumerate() {
+        let share = f64::from(BINS) * lobe.integral().abs() / total;
+        let bins = match i + 1 == lobes.len() {
+            true => left,
+            false => share.round() as u32,
+        };
+        left -= bins;
+        let weight = lobe.integral().signum() * share / f64::from(bins);
+        let edge = |bin: u32| lobe.quantile(f64::from(bin) / f64::from(bins));
+        for bin in 0..bins {
+            table.push(DVec4::new(edge(bin), 0.0, weight, 0.0).as_vec4());
+        }
+    }
+    for bin in 0..table.len() {
+        let outermost = filter.radius as f32;
+        table[bin].y = table.get(bin + 1).map_or(outermost, |next| next.x);
+    }
+    table
+}
+
+/// A part of a filter, from the centre outwards, in which it has one sign.
+struct Lobe {
+    start: f64,
+    step: f64,
+    /// Integrals from the start to each step.
+    sums: Vec<f64>,
+}
+
+impl Lobe {
+    fn new(filter: PixelFilter, start: f64, end: f64) -> Lobe {
+        let step = (end - start) / STEPS as f64;
+        let at = |i: f64| height(filter, start + step * i);
+        let mut sum = 0.0;
+        let mut sums = vec![sum];
+        for i in 0..STEPS {
+            let i = i as f64;
+            sum += step / 6.0 * (at(i) + 4.0 * at(i + 0.5) + at(i + 1.0)); // Simpson's rule
+            sums.push(sum);
+        }
+        Lobe { start, step, sums }
+    }
+
+    fn integral(&self) -> f64 {
+        self.sums[STEPS]
+    }
+
+    /// Up to where the lobe has a share of its integral.
+    fn quantile(&self, share: f64) -> f64 {
+        let wanted = share * self.integral().abs();
+        let above = self.sums.partition_point(|sum| sum.abs() <= wanted);
+        let above = above.clamp(1, STEPS);
+        let (low, high) = (self.sums[above - 1].abs(), self.sums[above].abs());
+        self.start + self.step * ((above - 1) as f64 + (wanted - low) / (high - low))
+    }
+}
+
+/// The lobes of a filter: one, but for Mitchell's, which has a negative one.
+fn lobes(filter: PixelFilter) -> Vec<Lobe> {
+    if filter.kind != PixelFilterKind::Mitchell {
+        return vec![Lobe::new(filter, 0.0, filter.radius)];
+    }
+    let (mut positive, mut negative) = (0.5 * filter.radius, 0.75 * filter.radius);
+    for _ in 0..64 {
+        let middle = 0.5 * (positive + negative);
+        match height(filter, middle) > 0.0 {
+            true => positive = middle,
+            false => negative = middle,
+        }
+    }
+    let zero = 0.5 * (positive + negative);
+    vec![Lobe::new(filter, 0.0, zero), Lobe::new(filter, zero, filter.radius)]
+}

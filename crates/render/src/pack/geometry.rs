@@ -1,0 +1,239 @@
+//! The scene's tree: its items, and the instances of meshes among them.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use bytemuck::cast_vec;
+use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
+
+use super::mesh::PackedMesh;
+use super::tree::{Aabb, build};
+use super::{
+    CASTS_SHADOW, DISK, ELLIPSOID, INSTANCE, Instance, Item, NO_SHADOW, NOTHING, Node, PAD, Primitive, RECTANGLE,
+    SOME_SHADOWS, TRIANGLE,
+};
+use wgray_scene::mesh::Mesh;
+use wgray_scene::{Geometry, Scene, Shape};
+
+/// Scenes of more bounded primitives have them in the tree. Fewer are faster one by one, and as constants.
+pub const MOST_OUTSIDE: usize = 64;
+
+/// All that the scene's tree is over.
+#[derive(Clone, Debug, Default)]
+pub struct Trees {
+    pub nodes: Vec<Node>,
+    pub items: Vec<Item>,
+    pub instances: Vec<Instance>,
+    pub meshes: Vec<Arc<PackedMesh>>,
+    pub group_words: Vec<u32>,
+    pub room: Vec4,
+}
+
+/// The tree over a scene's instances of meshes and these primitives, which have numbers and may cast a shadow.
+pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl Fn(usize) -> bool) -> Trees {
+    let mut trees = Trees::default();
+    let with_normal_maps = with_normal_maps(scene);
+    let mut known: Vec<*const Mesh> = Vec::new();
+    let mut items = Vec::new();
+    for (number, shape) in scene.shapes.iter().enumerate() {
+        let Geometry::Mesh {
+            mesh,
+            to_world,
+            materials,
+        } = &shape.geometry
+        else {
+            continue;
+        };
+        let place = known.iter().position(|other| *other == Arc::as_ptr(mesh));
+        let place = place.unwrap_or_else(|| {
+            known.push(Arc::as_ptr(mesh));
+            let with_tangents = with_normal_maps.contains(&Arc::as_ptr(mesh));
+            trees.meshes.push(PackedMesh::cached(mesh, with_tangents));
+            known.len() - 1
+        });
+        let word = |material: &usize| *material as u32 | if casts(*material) { 0 } else { NO_SHADOW };
+        let words: Vec<u32> = materials.iter().map(word).collect();
+        let casting = words.iter().filter(|word| **word & NO_SHADOW == 0).count();
+        let packed = &trees.meshes[place];
+        let kind = INSTANCE | if casting > 0 { CASTS_SHADOW } else { 0 };
+        items.push(item(kind, trees.instances.len() as u32, box_in_world(mesh, to_world)));
+        trees.instances.push(Instance {
+            mesh: place as u32,
+            materials: trees.group_words.len() as u32,
+            shape: number as u32,
+            shadows: if casting < words.len() { SOME_SHADOWS } else { 0 },
+            has_uvs: (!mesh.uvs.is_empty()).into(),
+            uv_sets: mesh.more_uvs.len() as u32,
+            ..instance(packed, mesh.center, to_world)
+        });
+        trees.group_words.extend(words);
+    }
+    for (number, primitive, casts) in primitives {
+        let kind = primitive.kind | if *casts { CASTS_SHADOW } else { 0 };
+        items.push(item(kind, *number, box_of(primitive)));
+    }
+    let boxes: Vec<Aabb> = items
+        .iter()
+        .map(|item| Aabb {
+            low: item.low,
+            high: item.high,
+        })
+        .collect();
+    let tree = build(&boxes, 1);
+    trees.items = tree.order.iter().map(|i| items[*i as usize]).collect();
+    trees.nodes = cast_vec(tree.nodes);
+    let condition = trees.instances.iter().map(|i| i.condition).fold(1.0, f32::max);
+    let farthest = boxes
+        .iter()
+        .map(|b| b.low.abs().max(b.high.abs()).max_element())
+        .fold(0.0, f32::max);
+    trees.room = Vec4::new(PAD * condition, farthest, 0.0, 0.0);
+    trees.place_rows();
+    trees
+}
+
+/// The meshes of which any instance has a normal map. What else has a direction along the surface, facets that are rougher along one axis and
+/// the normal map of a coat, takes tangents that come with the mesh, else those of single triangles.
+fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
+    let wants = |mesh: &Mesh, material: &usize| {
+        let material = &scene.materials[*material];
+        material.normal_map.is_some() || !mesh.tangents.is_empty() && material.has_direction()
+    };
+    let mesh = |shape: &Shape| match &shape.geometry {
+        Geometry::Mesh { mesh, materials, .. } if materials.iter().any(|m| wants(mesh, m)) => Some(Arc::as_ptr(mesh)),
+        _ => None,
+    };
+    scene.shapes.iter().filter_map(mesh).collect()
+}
+
+impl Trees {
+    /// Tells the instances where their meshes are in buffers: nodes behind all other rows of the first one.
+    fn place_rows(&mut self) {
+        let mut node_row = self.mesh_nodes_row();
+        let mut row = 0;
+        let places: Vec<[u32; 8]> = self
+            .meshes
+            .iter()
+            .map(|mesh| {
+                let triangles = row;
+                let vertices = triangles + mesh.triangles.len() as u32;
+                let attributes = vertices + mesh.vertices.len() as u32;
+                let tangents = attributes + mesh.attributes.len() as u32;
+                let groups = tangents + TANGENT_ROWS * mesh.tangents.len() as u32;
+                let colors = groups + mesh.groups.len().div_ceil(4) as u32;
+                let more_uvs = colors + mesh.colors.len() as u32;
+                row = more_uvs + mesh.more_uvs.len() as u32;
+                let nodes = node_row;
+                node_row += NODE_ROWS * mesh.nodes.len() as u32;
+                let or_nothing = |row: u32, is_there: bool| if is_there { row } else { NOTHING };
+                [
+                    nodes,
+                    triangles,
+                    vertices,
+                    or_nothing(attributes, !mesh.attributes.is_empty()),
+                    or_nothing(tangents, !mesh.tangents.is_empty()),
+                    or_nothing(groups, !mesh.groups.is_empty()),
+                    or_nothing(colors, !mesh.colors.is_empty()),
+                    or_nothing(more_uvs, !mesh.more_uvs.is_empty()),
+                ]
+            })
+            .collect();
+        for instance in &mut self.instances {
+            let place = places[instance.mesh as usize];
+            [
+                instance.nodes,
+                instance.triangles,
+                instance.vertices,
+                instance.attributes,
+                instance.tangents,
+                instance.groups,
+                instance.colors,
+                instance.more_uvs,
+            ] = place;
+        }
+    }
+
+    /// The rows where items, instances, groups' words, and the nodes of meshes start.
+    pub fn rows(&self) -> [u32; 4] {
+        let items = NODE_ROWS * self.nodes.len() as u32;
+        let instances = items + 2 * self.items.len() as u32;
+        let words = instances + INSTANCE_ROWS * self.instances.len() as u32;
+        [
+            items,
+            instances,
+            words,
+            words + self.group_words.len().div_ceil(4) as u32,
+        ]
+    }
+
+    fn mesh_nodes_row(&self) -> u32 {
+        self.rows()[3]
+    }
+}
+
+const NODE_ROWS: u32 = (size_of::<Node>() / 16) as u32;
+const TANGENT_ROWS: u32 = (size_of::<[Vec4; 2]>() / 16) as u32;
+const INSTANCE_ROWS: u32 = (size_of::<Instance>() / 16) as u32;
+
+fn item(kind: u32, index: u32, (low, high): (DVec3, DVec3)) -> Item {
+    // Outwards, by as much as rounding to 32 bits may take.
+    let down = |x: f64| (x as f32).next_down();
+    let up = |x: f64| (x as f32).next_up();
+    Item {
+        low: Vec3::new(down(low.x), down(low.y), down(low.z)),
+        kind,
+        high: Vec3::new(up(high.x), up(high.y), up(high.z)),
+        index,
+    }
+}
+
+fn box_in_world(mesh: &Arc<Mesh>, to_world: &DAffine3) -> (DVec3, DVec3) {
+    let corners = mesh.corners().map(|corner| to_world.transform_point3(corner));
+    corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+        (low.min(p), high.max(p))
+    })
+}
+
+fn instance(mesh: &PackedMesh, center: DVec3, to_world: &DAffine3) -> Instance {
+    let columns = to_world.matrix3;
+    let rows = columns.inverse().transpose();
+    let pairs = [
+        (rows.x_axis, columns.x_axis),
+        (rows.y_axis, columns.y_axis),
+        (rows.z_axis, columns.z_axis),
+    ];
+    let condition = pairs.map(|(row, column)| row.length() * column.length());
+    Instance {
+        x: rows.x_axis.as_vec3(),
+        y: rows.y_axis.as_vec3(),
+        z: rows.z_axis.as_vec3(),
+        anchor: to_world.transform_point3(center).as_vec3(),
+        u: columns.x_axis.as_vec3(),
+        v: columns.y_axis.as_vec3(),
+        w: columns.z_axis.as_vec3(),
+        size: mesh.size(),
+        condition: condition.into_iter().fold(1.0, f64::max) as f32,
+        side: if columns.determinant() < 0.0 { -1.0 } else { 1.0 },
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// The box of a bounded primitive.
+fn box_of(primitive: &Primitive) -> (DVec3, DVec3) {
+    let [x, y, z] = [primitive.x, primitive.y, primitive.z].map(Vec3::as_dvec3);
+    let axes = DMat3::from_cols(x, y, z).transpose().inverse();
+    let [a, b, c] = [axes.x_axis, axes.y_axis, axes.z_axis];
+    let center = primitive.anchor.as_dvec3() + axes * primitive.middle.as_dvec3();
+    let root = |squares: DVec3| squares.map(f64::sqrt);
+    let half = match primitive.kind {
+        RECTANGLE => a.abs() + b.abs(),
+        DISK => root(a * a + b * b),
+        ELLIPSOID => root(a * a + b * b + c * c),
+        TRIANGLE => {
+            let zero = DVec3::ZERO;
+            return (center + zero.min(a).min(b), center + zero.max(a).max(b));
+        }
+        _ => DVec3::INFINITY,
+    };
+    (center - half, center + half)
+}

@@ -1,0 +1,90 @@
+//! Lights' records.
+
+use std::collections::BTreeMap;
+
+use bytemuck::Zeroable as _;
+
+use super::{DIRECTIONAL, Light, NOTHING, POINT, Primitive, SPOT};
+use wgray_scene as scene;
+
+/// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
+pub(super) const DISTANT: f32 = 1e10;
+
+/// Shadow rays end at least so far before a light's sample, as a part of the way: a light may lie on a surface.
+const BEFORE_LIGHT: f64 = 1e-5;
+
+/// A spot's light falls off over at least so much of the cosine.
+const LEAST_FALLOFF: f64 = 1e-12;
+
+/// Where shadow rays to a point of a light end, as a multiple of the way.
+pub(super) fn reach(shadow_epsilon: f64) -> f32 {
+    (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
+}
+
+pub(super) fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
+    let reach = reach(shadow_epsilon);
+    let unit = Light {
+        finite: 1.0,
+        reach,
+        primitive: NOTHING,
+        number,
+        ..Light::zeroed()
+    };
+    match light {
+        scene::Light::Rectangle { rectangle, color, .. } => Light {
+            center: rectangle.center.as_vec3(),
+            u: rectangle.u.as_vec3(),
+            v: rectangle.v.as_vec3(),
+            color: color.as_vec3(),
+            ..unit
+        },
+        scene::Light::Point { position, color } => Light {
+            center: position.as_vec3(),
+            color: color.as_vec3(),
+            kind: POINT,
+            ..unit
+        },
+        scene::Light::Directional { direction, color } => Light {
+            center: -direction.as_vec3(),
+            finite: 0.0,
+            reach: DISTANT,
+            color: color.as_vec3(),
+            kind: DIRECTIONAL,
+            ..unit
+        },
+        scene::Light::Spot {
+            position,
+            direction,
+            color,
+            cone,
+            inner,
+        } => Light {
+            center: position.as_vec3(),
+            color: color.as_vec3(),
+            normal: direction.as_vec3(),
+            kind: SPOT,
+            cone: below_one(*cone) as f32,
+            falloff: (1.0 / (below_one(*cone) - below_one(*inner)).max(LEAST_FALLOFF)) as f32,
+            ..unit
+        },
+    }
+}
+
+/// 1 minus the cosine of an angle, without what that loses of small ones.
+fn below_one(angle: f64) -> f64 {
+    2.0 * (angle / 2.0).sin().powi(2)
+}
+
+/// Tells the lights that have an area which primitives shine.
+pub(super) fn connect_lights(lights: &mut [Light], order: &[(Primitive, bool)], shapes: usize) {
+    let mut of_number: BTreeMap<u32, u32> = BTreeMap::new();
+    for (i, light) in (0..).zip(&*lights) {
+        of_number.insert(light.number, i);
+    }
+    for (i, (primitive, _)) in (0..).zip(order) {
+        let number = primitive.shape.checked_sub(shapes as u32);
+        if let Some(light) = number.and_then(|number| of_number.get(&number)) {
+            lights[*light as usize].primitive = i;
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Meshes as both backends read them: triangles in the order of a tree's leaves, vertices in rows.
+
+use std::sync::Arc;
+
+use bytemuck::cast_vec;
+use glam::{UVec4, Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::Node;
+use super::tree::{Aabb, build};
+use wgray_scene::mesh::{Mesh, VertexTangents};
+
+/// Triangles in a leaf, at most.
+const MOST_IN_LEAF: u32 = 4;
+
+/// A mesh as both backends read it, in its own space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PackedMesh {
+    /// The tree over its triangles.
+    pub nodes: Vec<Node>,
+    /// The triangles in the order of the tree's leaves: the numbers of three vertices, and the triangle's own.
+    pub triangles: Vec<UVec4>,
+    /// Each vertex's position, and its u.
+    pub vertices: Vec<Vec4>,
+    /// Each vertex's normal, 0 if there is none, and its v; empty if there are neither normals nor texture coordinates.
+    pub attributes: Vec<Vec4>,
+    /// Each vertex's tangents along u and along v, for normal maps; or empty.
+    pub tangents: Vec<[Vec4; 2]>,
+    /// Each vertex's colour, linear RGB and opacity; or empty.
+    pub colors: Vec<Vec4>,
+    /// Each vertex's further texture coordinates, two sets in a row, all of a vertex's rows together; or empty.
+    pub more_uvs: Vec<Vec4>,
+    /// Each triangle's group, in the order of the triangles; none if there is one group alone.
+    pub groups: Vec<u32>,
+    /// The lower corner of its box.
+    pub low: Vec3,
+    /// The upper corner of its box.
+    pub high: Vec3,
+}
+
+impl PackedMesh {
+    /// Packs a mesh, with tangents for normal maps if it can have any. The result is kept with the mesh.
+    pub(crate) fn cached(mesh: &Arc<Mesh>, with_tangents: bool) -> Arc<PackedMesh> {
+        struct WithTangents(Arc<PackedMesh>);
+        if with_tangents && !mesh.uvs.is_empty() && !mesh.normals.is_empty() {
+            let pack = |mesh: &Mesh| {
+                let tangents = VertexTangents::of(mesh).unwrap_or_default();
+                WithTangents(Arc::new(PackedMesh::of(mesh, Some(tangents))))
+            };
+            return Arc::clone(&mesh.cached(pack).0);
+        }
+        mesh.cached(|mesh| PackedMesh::of(mesh, None))
+    }
+
+    /// Packs a mesh, and builds its BVH.
+    fn of(mesh: &Mesh, tangents: Option<VertexTangents>) -> PackedMesh {
+        let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
+        let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| Aabb::around(&corners(t))).collect();
+        let whole = boxes.iter().fold(Aabb::EMPTY, |all, b| all.with(b));
+        let tree = build(&boxes, MOST_IN_LEAF);
+        let (triangles, copies, tangents) = match &tangents {
+            Some(of) => (&of.triangles, of.copies.as_slice(), of.tangents.as_slice()),
+            None => (&mesh.triangles, &[][..], &[][..]),
+        };
+        let triangles = tree.order.par_iter().map(|&number| {
+            let [a, b, c] = triangles[number as usize];
+            UVec4::new(a, b, c, number)
+        });
+        let uv = |i: usize| mesh.uvs.get(i).copied().unwrap_or_default();
+        let normal = |i: usize| mesh.normals.get(i).copied().unwrap_or_default();
+        let own = mesh.positions.len();
+        let count = own + copies.len();
+        // The vertex that one is, or is a copy of.
+        let original = |i: usize| if i < own { i } else { copies[i - own] as usize };
+        let vertices = (0..count).into_par_iter().map(original);
+        let vertices = vertices.map(|i| mesh.positions[i].extend(uv(i).x));
+        let with_attributes = match mesh.normals.is_empty() && mesh.uvs.is_empty() {
+            true => 0,
+            false => count,
+        };
+        let attributes = (0..with_attributes).into_par_iter().map(original);
+        let attributes = attributes.map(|i| normal(i).extend(uv(i).y));
+        let tangents = tangents.par_iter().map(|of| [of.u.extend(0.0), of.v.extend(0.0)]);
+        let colors = (0..if mesh.colors.is_empty() { 0 } else { count })
+            .into_par_iter()
+            .map(original);
+        let colors = colors.map(|i| mesh.colors.get(i).copied().unwrap_or(Vec4::ONE));
+        let further = |set: usize, i: usize| {
+            let uvs = mesh.more_uvs.get(set);
+            uvs.and_then(|uvs| uvs.get(i)).copied().unwrap_or_default()
+        };
+        let pairs = mesh.more_uvs.len().div_ceil(2);
+        let more_uvs = (0..count * pairs).into_par_iter().map(|row| {
+            let (i, first) = (original(row / pairs), 2 * (row % pairs));
+            let [a, b] = [further(first, i), further(first + 1, i)];
+            Vec4::new(a.x, a.y, b.x, b.y)
+        });
+        let group = |&number: &u32| mesh.group_of.get(number as usize).copied();
+        PackedMesh {
+            triangles: triangles.collect(),
+            vertices: vertices.collect(),
+            attributes: attributes.collect(),
+            tangents: tangents.collect(),
+            colors: colors.collect(),
+            more_uvs: more_uvs.collect(),
+            groups: tree.order.iter().filter_map(group).collect(),
+            low: whole.low,
+            high: whole.high,
+            nodes: cast_vec(tree.nodes),
+        }
+    }
+
+    /// The memory that it takes.
+    pub fn bytes(&self) -> u64 {
+        let lists = [
+            size_of_val(self.nodes.as_slice()),
+            size_of_val(self.triangles.as_slice()),
+            size_of_val(self.vertices.as_slice()),
+            size_of_val(self.attributes.as_slice()),
+            size_of_val(self.tangents.as_slice()),
+            size_of_val(self.colors.as_slice()),
+            size_of_val(self.more_uvs.as_slice()),
+            size_of_val(self.groups.as_slice()),
+        ];
+        lists.iter().map(|bytes| *bytes as u64).sum()
+    }
+
+    /// Its largest coordinate.
+    pub fn size(&self) -> f32 {
+        self.low.abs().max(self.high.abs()).max_element()
+    }
+}

@@ -1,0 +1,74 @@
+//! Where a packed scene's coordinates are counted from. 32-bit floats have 24 bits: a thousand of its own sizes away from
+//! the origin a scene would lose ten of them. So the origin is near what the camera looks at.
+
+use std::borrow::Cow;
+
+use glam::DVec3;
+
+use wgray_scene::{Camera, Geometry, Light, Scene};
+
+/// A point near what the camera looks at: on the grid whose cells are at least as large as their distance, a power of 2.
+/// So what is near the origin of the scene file keeps its coordinates, and no coordinate gets more digits.
+pub fn origin(camera: &Camera) -> DVec3 {
+    let cell = camera.position.distance(camera.look_at).log2().ceil().exp2();
+    (camera.look_at / cell).round() * cell
+}
+
+/// A scene by coordinates from another origin.
+pub fn seen_from(scene: &Scene, origin: DVec3) -> Cow<'_, Scene> {
+    if origin == DVec3::ZERO {
+        return Cow::Borrowed(scene);
+    }
+    let mut scene = scene.clone();
+    for light in &mut scene.lights {
+        match light {
+            Light::Rectangle { rectangle, .. } => rectangle.center -= origin,
+            Light::Point { position, .. } | Light::Spot { position, .. } => *position -= origin,
+            Light::Directional { .. } => {}
+        }
+    }
+    for shape in &mut scene.shapes {
+        match &mut shape.geometry {
+            Geometry::Rectangle(shape) | Geometry::Disk(shape) => shape.center -= origin,
+            Geometry::Ellipsoid { center, .. } => *center -= origin,
+            Geometry::Triangles(triangles) => triangles.iter_mut().flatten().for_each(|v| *v -= origin),
+            Geometry::Mesh { to_world, .. } => to_world.translation -= origin,
+            Geometry::Plane { point, .. } => *point -= origin,
+        }
+    }
+    Cow::Owned(scene)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgray_scene::Description;
+
+    fn camera(position: [f64; 3], look_at: [f64; 3]) -> Camera {
+        let text = format!(
+            "[image]\nwidth = 1\nheight = 1\n[camera]\nposition = {position:?}\nlook_at = {look_at:?}\nfov = 40\n"
+        );
+        let description = Description::parse(&text, "test").expect("a scene");
+        description.validate().expect("a sound scene").camera
+    }
+
+    #[test]
+    fn a_scene_around_the_origin_keeps_its_coordinates() {
+        assert_eq!(origin(&camera([0.0, -3.0, 1.3], [0.0, 0.0, 1.0])), DVec3::ZERO);
+        assert_eq!(origin(&camera([1e9, 0.0, 0.0], [0.0, 1.0, 0.0])), DVec3::ZERO);
+    }
+
+    #[test]
+    fn the_origin_is_no_farther_from_what_is_seen_than_the_camera() {
+        for (position, look_at) in [
+            ([2000.0, 1997.0, 2001.3], [2000.0, 2000.0, 2001.0]),
+            ([-1e9, 1e9, 0.0], [-1e9 + 1e-3, 1e9, 1e-3]),
+            ([5.0, 7.0, 0.1], [-40.0, 7.0, 0.0]),
+        ] {
+            let camera = camera(position, look_at);
+            let distance = camera.position.distance(camera.look_at);
+            let away = (origin(&camera) - camera.look_at).abs().max_element();
+            assert!(away <= distance, "{position:?}: {away}");
+        }
+    }
+}

@@ -1,0 +1,558 @@
+//! The environment map, as texels and the tables by which samples of its light are taken.
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{BACKGROUND, ENVIRONMENT_BLOCKS, Environment, IMAGE_AROUND, NORMAL_BINS, UNSEEN_AROUND};
+use wgray_scene::halves::linear;
+use wgray_scene::{self as scene, EnvironmentImage, Scene};
+
+/// Darker surroundings count as black: what the densities of samples are made of would be beside the normal numbers.
+const DARKEST: f64 = 1e-25;
+/// A block darker than this share of the map has no samples of light: rays that happen to go there find it.
+const DARKEST_SHARE: f64 = 1e-12;
+/// Parts of a block along a side, of each of which the light's mean direction counts.
+const PARTS: usize = 4;
+/// Half the width of a bin of normals, about, as an angle.
+const BIN_RADIUS: f64 = 0.06;
+
+/// The location of the environment map among the texels, if the scene has one.
+#[derive(Default)]
+pub struct Surroundings(Option<Around>);
+
+struct Around {
+    rows: [Vec3; 3],
+    width: u32,
+    height: u32,
+    texels: usize,
+    cells: usize,
+    blocks: usize,
+    shifts: u32,
+    /// The integral over all directions of the mean of the colours' components, as the cells have it.
+    sum: f64,
+}
+
+impl Surroundings {
+    /// Adds the image's texels and its cells' table to the scene's texels.
+    pub fn of(scene: &Scene, texels: &mut Vec<u32>) -> Surroundings {
+        let image = scene
+            .environment
+            .as_ref()
+            .and_then(|environment| environment.image.as_ref());
+        Surroundings(image.and_then(|image| around(image, texels)))
+    }
+
+    /// Returns the integral of the radiance over all directions.
+    pub fn sum(&self) -> Option<f64> {
+        self.0.as_ref().map(|around| around.sum)
+    }
+
+    /// Returns the flags that kernels have as constants.
+    pub fn bits(&self, scene: &Scene) -> u32 {
+        let any = |test: fn(&scene::Environment) -> bool| scene.environment.as_ref().is_some_and(test);
+        let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
+        bit(self.0.is_some(), IMAGE_AROUND)
+            | bit(any(|environment| !environment.visible), UNSEEN_AROUND)
+            | bit(any(|environment| environment.background.is_some()), BACKGROUND)
+    }
+
+    /// Its part of the record, where so large a share of all samples of light is of it.
+    pub fn record(&self, share: f64) -> Environment {
+        let Some(around) = &self.0 else {
+            return bytemuck::Zeroable::zeroed();
+        };
+        let [x, y, z] = around.rows;
+        Environment {
+            x,
+            texels: around.texels as u32,
+            y,
+            width: around.width,
+            z,
+            height: around.height,
+            cells: around.cells as u32,
+            // Of the sum of four corners' three components.
+            density: (share / 12.0) as f32,
+            blocks: around.blocks as u32,
+            shifts: around.shifts,
+            ..bytemuck::Zeroable::zeroed()
+        }
+    }
+}
+
+fn around(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<Around> {
+    let image = &*around.image;
+    let (width, height) = (image.width as usize, image.height as usize);
+    let start = texels.len();
+    let cells = start + 3 * width * (height + 2);
+    let blocks = cells + 2 * width * (height + 1);
+    let grid = Grid::of(width, height);
+    texels.reserve_exact(blocks + grid.words() - start);
+    let texel = linear(image);
+    let color = |i: usize| texel(i) * around.scale;
+    let pole = |row: usize| (0..width).map(|column| color(row * width + column)).sum::<DVec3>() / width as f64;
+    let mut add = |color: DVec3| texels.extend(color.as_vec3().to_array().map(f32::to_bits));
+    (0..width).for_each(|_| add(pole(0)));
+    (0..width * height).for_each(|i| add(color(i)));
+    (0..width).for_each(|_| add(pole(height - 1)));
+    let weights = weights(&texels[start..], width, height);
+    let sum: f64 = weights.iter().sum();
+    if !(sum >= DARKEST) {
+        texels.truncate(start);
+        return None;
+    }
+    let axes = [around.to_world.x_axis, around.to_world.y_axis, around.to_world.z_axis];
+    grid.write_cells(&weights, texels);
+    grid.write_distributions(&weights, axes, sum, texels);
+    Some(Around {
+        rows: axes.map(|axis| axis.as_vec3()),
+        width: image.width,
+        height: image.height,
+        texels: start,
+        cells,
+        blocks,
+        shifts: (grid.along | grid.down << 8) as u32,
+        sum,
+    })
+}
+
+/// A division of a map's cells into at most [`ENVIRONMENT_BLOCKS`] x [`ENVIRONMENT_BLOCKS`] blocks. Their sides are powers of two, except at the
+/// right and the lower edge.
+struct Grid {
+    /// Width of the map in cells.
+    width: usize,
+    /// Height of the map in cells.
+    height: usize,
+    /// Binary logarithm of the width of a block in cells.
+    along: usize,
+    /// Binary logarithm of the height of a block in cells.
+    down: usize,
+}
+
+/// The light of a part of a block.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    /// The integral of the directions, times their radiance.
+    vector: DVec3,
+    /// The integral of the radiance.
+    power: f64,
+}
+
+impl Grid {
+    /// Returns the blocks of a map of this size in texels.
+    fn of(width: usize, height: usize) -> Grid {
+        let most = ENVIRONMENT_BLOCKS as usize;
+        let shift = |count: usize| (0..).find(|shift| (count - 1) >> shift < most).unwrap_or(0);
+        Grid {
+            width,
+            height: height + 1,
+            along: shift(width),
+            down: shift(height + 1),
+        }
+    }
+
+    /// Columns of blocks.
+    fn columns(&self) -> usize {
+        ((self.width - 1) >> self.along) + 1
+    }
+
+    /// Rows of blocks.
+    fn rows(&self) -> usize {
+        ((self.height - 1) >> self.down) + 1
+    }
+
+    /// 32-bit words of the blocks' tables.
+    fn words(&self) -> usize {
+        let (side, bins) = (ENVIRONMENT_BLOCKS as usize, (NORMAL_BINS * NORMAL_BINS) as usize + 1);
+        self.rows() * side + bins * (self.rows() + 1) * (side + 1)
+    }
+
+    /// The blocks row by row, each as its columns and rows of cells.
+    fn blocks(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+        let columns = move |i: usize| i << self.along..((i + 1) << self.along).min(self.width);
+        let rows = move |i: usize| i << self.down..((i + 1) << self.down).min(self.height);
+        (0..self.rows()).flat_map(move |row| (0..self.columns()).map(move |column| (columns(column), rows(row))))
+    }
+
+    /// Writes the tables by which the cells of each block are chosen.
+    fn write_cells(&self, weights: &[f64], words: &mut Vec<u32>) {
+        let table = |(columns, rows): (Range<usize>, Range<usize>)| {
+            let places: Vec<(usize, usize)> = rows
+                .flat_map(|row| columns.clone().map(move |column| (row, column)))
+                .collect();
+            let rest: Vec<f64> = places
+                .iter()
+                .map(|(row, column)| weights[row * self.width + column])
+                .collect();
+            let mean = rest.iter().sum::<f64>() / rest.len() as f64;
+            let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
+            let mut words = Vec::with_capacity(2 * rest.len());
+            write_table(rest.into_iter().map(|weight| weight * scale).collect(), &mut words);
+            for pair in words.chunks_mut(2) {
+                let (row, column) = places[pair[1] as usize];
+                pair[1] = (row << 16 | column) as u32;
+            }
+            words
+        };
+        // A row of blocks at a time, which bounds the memory.
+        let blocks: Vec<_> = self.blocks().collect();
+        for blocks in blocks.chunks(self.columns()) {
+            let tables: Vec<Vec<u32>> = blocks.par_iter().cloned().map(table).collect();
+            tables.iter().for_each(|table| words.extend_from_slice(table));
+        }
+    }
+
+    /// Writes the inverses of the blocks' light, and their distributions for each bin of normals.
+    fn write_distributions(&self, weights: &[f64], axes: [DVec3; 3], sum: f64, words: &mut Vec<u32>) {
+        let side = ENVIRONMENT_BLOCKS as usize;
+        let mut powers = vec![0.0; self.rows() * side];
+        let mut parts: Vec<(usize, Part)> = Vec::new();
+        let angles = |count: usize, turn: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+            (0..count).map(|i| turn(i).sin_cos()).collect()
+        };
+        let azimuths = angles(self.width, &|i| PI - TAU * (i + 1) as f64 / self.width as f64);
+        let image_rows = (self.height - 1) as f64;
+        let polar = angles(self.height, &|row| {
+            let border = |row: f64| row.clamp(0.0, image_rows) / image_rows * PI;
+            0.5 * (border(row as f64 - 0.5) + border(row as f64 + 0.5))
+        });
+        for (i, (columns, rows)) in self.blocks().enumerate() {
+            let block = i / self.columns() * side + i % self.columns();
+            let mut inside = [Part::default(); PARTS * PARTS];
+            for row in rows.clone() {
+                for column in columns.clone() {
+                    let weight = weights[row * self.width + column];
+                    let ((sine, cosine), (y, x)) = (polar[row], azimuths[column]);
+                    let place = |i: usize, range: &Range<usize>| (i - range.start) * PARTS / range.len();
+                    let part = &mut inside[place(row, &rows) * PARTS + place(column, &columns)];
+                    part.power += weight;
+                    part.vector += weight * DVec3::new(sine * x, sine * y, cosine);
+                }
+            }
+            let power: f64 = inside.iter().map(|part| part.power).sum();
+            if power > DARKEST_SHARE * sum {
+                powers[block] = power;
+                parts.extend(
+                    inside
+                        .into_iter()
+                        .filter(|part| part.power > 0.0)
+                        .map(|part| (block, part)),
+                );
+            }
+        }
+        let inverse = |power: &f64| if *power > 0.0 { (1.0 / power) as f32 } else { 0.0 };
+        words.extend(powers.iter().map(inverse).map(f32::to_bits));
+        // What one cell, or a bin of normals, spreads over.
+        let cell = ((PI / self.width as f64).powi(2) + (PI / 2.0 / image_rows).powi(2)).sqrt();
+        let lobes: Vec<(usize, DVec3, f64, f64)> = (parts.iter())
+            .map(|(block, Part { vector, power })| {
+                let mean = *vector / *power;
+                let spread = (1.0 - mean.length_squared()).max(0.0).sqrt() + cell.min(1.0) + BIN_RADIUS;
+                let [x, y, z] = axes;
+                (*block, x * mean.x + y * mean.y + z * mean.z, *power, spread.min(1.0))
+            })
+            .collect();
+        let bins = (0..NORMAL_BINS * NORMAL_BINS).into_par_iter().map(|bin| {
+            let normal = bin_normal(bin);
+            let mut cosines = vec![0.0; powers.len()];
+            for (block, mean, power, spread) in &lobes {
+                cosines[*block] += power * mean_cosine(normal.dot(*mean), *spread);
+            }
+            // Of light from behind alone no sample counts.
+            let any = cosines.iter().any(|weight| *weight > 0.0);
+            let mut words = Vec::new();
+            write_bin(if any { &cosines } else { &powers }, &mut words);
+            words
+        });
+        let bins: Vec<Vec<u32>> = bins.collect();
+        bins.iter().for_each(|bin| words.extend_from_slice(bin));
+        write_bin(&powers, words);
+    }
+}
+
+/// The normal in the middle of a bin, as `normal_bin` has them.
+fn bin_normal(bin: u32) -> DVec3 {
+    let at = |i: u32| f64::from(i) / f64::from(NORMAL_BINS - 1) * 2.0 - 1.0;
+    let (x, y) = (at(bin % NORMAL_BINS), at(bin / NORMAL_BINS));
+    let z = 1.0 - x.abs() - y.abs();
+    let folded = |a: f64, b: f64| if z < 0.0 { (1.0 - b.abs()).copysign(a) } else { a };
+    DVec3::new(folded(x, y), folded(y, x), z).normalize()
+}
+
+/// The mean of the clamped cosine to directions whose cosines are evenly spread from m - r to m + r; larger where few of them are above 0, so
+/// that light which just rises above the horizon is not too rare.
+fn mean_cosine(m: f64, r: f64) -> f64 {
+    if m >= r {
+        m
+    } else if m <= -r {
+        0.0
+    } else {
+        (m + r) * 0.25 * ((m + r) / r).max(1.0)
+    }
+}
+
+/// Writes the cumulative distributions of the rows, and of each row's blocks.
+fn write_bin(weights: &[f64], words: &mut Vec<u32>) {
+    let rows: Vec<&[f64]> = weights.chunks(ENVIRONMENT_BLOCKS as usize).collect();
+    let sums: Vec<f64> = rows.iter().map(|row| row.iter().sum()).collect();
+    write_distribution(&sums, words);
+    rows.iter().for_each(|row| write_distribution(row, words));
+}
+
+/// Writes where the intervals of up to [`ENVIRONMENT_BLOCKS`] weights begin, and the end of the last: multiples of 2^-24, so that differences
+/// are exact. What has no weight has no width.
+fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
+    let total: f64 = weights.iter().sum();
+    let mut sum = 0.0;
+    let last = weights.iter().rposition(|weight| *weight > 0.0);
+    for i in 0..=ENVIRONMENT_BLOCKS as usize {
+        let bound = match last {
+            Some(last) if i > last => 1.0,
+            None => 1.0_f64.min(i as f64),
+            _ => (sum / total * 16_777_216.0).round() / 16_777_216.0,
+        };
+        words.push((bound as f32).to_bits());
+        sum += weights.get(i).copied().unwrap_or(0.0);
+    }
+}
+
+/// Returns the weight of each cell: the mean of its corners times its solid angle.
+fn weights(texels: &[u32], width: usize, height: usize) -> Vec<f64> {
+    let value = |i: usize| {
+        let parts = &texels[3 * i..3 * i + 3];
+        parts.iter().map(|bits| f64::from(f32::from_bits(*bits))).sum::<f64>() / 3.0
+    };
+    let mut weights = Vec::with_capacity(width * (height + 1));
+    let mut upper: Vec<f64> = (0..width).map(value).collect();
+    for row in 0..=height {
+        let lower: Vec<f64> = (0..width).map(|column| value((row + 1) * width + column)).collect();
+        let angle = solid_angle(row, width, height) / 4.0;
+        for column in 0..width {
+            let next = (column + 1) % width;
+            weights.push((upper[column] + upper[next] + lower[column] + lower[next]) * angle);
+        }
+        upper = lower;
+    }
+    weights
+}
+
+/// The solid angle of each cell of a row.
+fn solid_angle(row: usize, width: usize, height: usize) -> f64 {
+    let border = |row: f64| (row - 0.5).clamp(0.0, height as f64) / height as f64 * std::f64::consts::PI;
+    let (above, below) = (border(row as f64), border(row as f64 + 1.0));
+    // cos a - cos b, where both may be nearly 1.
+    let zone = 2.0 * ((above + below) / 2.0).sin() * ((below - above) / 2.0).sin();
+    std::f64::consts::TAU / width as f64 * zone
+}
+
+/// The table by which one of the weights' indices is chosen, of weights whose mean is 1: Vose, "A Linear Algorithm for Generating Random Numbers with
+/// a Given Distribution", IEEE TSE 17(9), 1991, without lists of the small and of the large ones, which would take as much memory as the
+/// table. What is small is filled up by the first large one that is left.
+fn write_table(mut rest: Vec<f64>, words: &mut Vec<u32>) {
+    let start = words.len();
+    words.extend((0..rest.len() as u32).flat_map(|i| [u32::MAX, i]));
+    let next_large = |rest: &[f64], from: usize| (from..rest.len()).find(|i| rest[*i] >= 1.0);
+    let mut large = next_large(&rest, 0);
+    for i in 0..rest.len() {
+        let mut small = i;
+        // One that has become small behind `i` is filled up at once; those before it are met later.
+        while let Some(filling) = large
+            && rest[small] < 1.0
+        {
+            // None that has any weight is never chosen.
+            words[start + 2 * small] = (rest[small] * 4_294_967_296.0).ceil() as u32;
+            words[start + 2 * small + 1] = filling as u32;
+            rest[filling] -= 1.0 - rest[small];
+            if rest[filling] >= 1.0 {
+                break;
+            }
+            large = next_large(&rest, filling + 1);
+            if filling > i {
+                break;
+            }
+            small = filling;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::surroundings::normal_bin;
+
+    /// The probabilities that a table gives.
+    fn probabilities(words: &[u32]) -> Vec<f64> {
+        let count = words.len() / 2;
+        let mut out = vec![0.0; count];
+        for (i, pair) in words.chunks(2).enumerate() {
+            let own = if pair[1] as usize == i {
+                1.0
+            } else {
+                f64::from(pair[0]) / 4_294_967_296.0
+            };
+            out[i] += own / count as f64;
+            out[pair[1] as usize] += (1.0 - own) / count as f64;
+        }
+        out
+    }
+
+    #[test]
+    fn a_table_gives_the_weights_that_it_was_made_of() {
+        let random = |i: usize| ((i as f64 * 0.618_033_988_749) % 1.0).powi(9);
+        for weights in [
+            vec![1.0],
+            vec![2.0, 0.0],
+            vec![0.0, 2.0],
+            vec![0.0, 0.0, 3.0, 1.0],
+            vec![3.0, 0.5, 0.5, 0.0],
+            vec![1.5, 0.4, 1.6, 0.5],
+            vec![1e-12, 1.0, 1e6],
+            (0..1000).map(random).collect(),
+            (0..1000).rev().map(random).collect(),
+        ] {
+            let sum: f64 = weights.iter().sum();
+            let mean = sum / weights.len() as f64;
+            let mut words = vec![7, 7];
+            write_table(weights.iter().map(|weight| weight / mean).collect(), &mut words);
+            for (found, weight) in probabilities(&words[2..]).into_iter().zip(&weights) {
+                assert!((found - weight / sum).abs() < 1e-9, "{found} for {weight} of {sum}");
+                assert!((found > 0.0) == (*weight > 0.0), "{found} for {weight} of {sum}");
+            }
+        }
+    }
+
+    /// A cumulative distribution as the widths of its intervals.
+    fn widths(words: &[u32]) -> Vec<f64> {
+        let bounds: Vec<f64> = words.iter().map(|bits| f64::from(f32::from_bits(*bits))).collect();
+        assert_eq!((bounds[0], bounds[bounds.len() - 1]), (0.0, 1.0));
+        bounds.windows(2).map(|pair| pair[1] - pair[0]).collect()
+    }
+
+    #[test]
+    fn a_distribution_has_the_widths_of_its_weights() {
+        for weights in [
+            vec![1.0],
+            vec![0.0, 3.0, 0.0],
+            vec![1e-30, 1.0, 1e6, 0.0],
+            vec![0.0],
+            (0..32).map(|i| f64::from(i % 5)).collect(),
+        ] {
+            let mut words = Vec::new();
+            write_distribution(&weights, &mut words);
+            assert_eq!(words.len(), 33);
+            let sum: f64 = weights.iter().sum();
+            let widths = widths(&words);
+            for (i, width) in widths.iter().enumerate() {
+                let weight = weights.get(i).copied().unwrap_or(0.0);
+                if sum > 0.0 {
+                    assert!((width - weight / sum).abs() < 1.3e-7, "{weights:?}: {width} at {i}");
+                    assert!(weight > 0.0 || *width == 0.0, "{weights:?}: {width} at {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bin_holds_the_normal_in_its_middle() {
+        for bin in 0..NORMAL_BINS * NORMAL_BINS {
+            // Two points of the map's edge are one normal.
+            let normal = bin_normal(bin);
+            let again = bin_normal(normal_bin(normal.as_vec3()));
+            assert!((normal - again).length() < 1e-6, "{bin}: {normal}, {again}");
+        }
+        assert_eq!(normal_bin(Vec3::ZERO), NORMAL_BINS * NORMAL_BINS);
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z]
+            .into_iter()
+            .flat_map(|axis| [axis, -axis])
+        {
+            let middle = bin_normal(normal_bin(axis.as_vec3()));
+            assert!((middle - axis).length() < 1e-6, "{axis}: {middle}");
+        }
+    }
+
+    #[test]
+    fn the_mean_cosine_is_that_of_evenly_spread_heights() {
+        for r in [0.05, 0.2, 1.0] {
+            for m in [0.0, 0.3 * r, r, 1.7 * r] {
+                let count = 10_000;
+                let at = |i: i32| m - r + 2.0 * r * (f64::from(i) + 0.5) / f64::from(count);
+                let mean = (0..count).map(|i| at(i).max(0.0)).sum::<f64>() / f64::from(count);
+                assert!((mean_cosine(m, r) - mean).abs() < 1e-6 * r, "{m}, {r}: {mean}");
+            }
+            assert_eq!(mean_cosine(-r, r), 0.0);
+            assert!(mean_cosine(-0.99 * r, r) > 0.0);
+        }
+    }
+
+    /// The blocks' probabilities for a normal are about the light that each sends to it, and the cells' those of their light in the block.
+    #[test]
+    fn blocks_have_the_light_that_they_send() {
+        for (width, height) in [(1, 1), (2, 1), (5, 3), (64, 32), (100, 77), (1024, 512)] {
+            let grid = Grid::of(width, height);
+            assert!(grid.columns() <= 32 && grid.rows() <= 32, "{width} x {height}");
+            let weights: Vec<f64> = (0..width * (height + 1))
+                .map(|i| (1.0 + (i * i % 7) as f64) * solid_angle(i / width, width, height))
+                .collect();
+            let sum: f64 = weights.iter().sum();
+            let mut words = Vec::new();
+            grid.write_cells(&weights, &mut words);
+            assert_eq!(words.len(), 2 * weights.len());
+            let cells = std::mem::take(&mut words);
+            grid.write_distributions(&weights, [DVec3::X, DVec3::Y, DVec3::Z], sum, &mut words);
+            assert_eq!(words.len(), grid.words(), "{width} x {height}");
+            let mut first = 0;
+            for (i, (columns, rows)) in grid.blocks().enumerate() {
+                let places: Vec<usize> = rows
+                    .flat_map(|row| columns.clone().map(move |column| row * width + column))
+                    .collect();
+                let power: f64 = places.iter().map(|place| weights[*place]).sum();
+                let block = i / grid.columns() * 32 + i % grid.columns();
+                let inverse = f64::from(f32::from_bits(words[block]));
+                assert!((inverse * power - 1.0).abs() < 1e-6, "{width} x {height}, block {i}");
+                // In the table the others of a cell are rows and columns.
+                let table: Vec<u32> = cells[2 * first..2 * (first + places.len())]
+                    .chunks(2)
+                    .flat_map(|pair| {
+                        let place = (pair[1] >> 16) as usize * width + (pair[1] & 0xffff) as usize;
+                        let at = places.iter().position(|other| *other == place);
+                        [pair[0], at.expect("a cell of the block") as u32]
+                    })
+                    .collect();
+                for (found, place) in probabilities(&table).into_iter().zip(&places) {
+                    assert!(
+                        (found - weights[*place] / power).abs() < 1e-6,
+                        "{width} x {height}, block {i}"
+                    );
+                }
+                first += places.len();
+            }
+            // A white hemisphere's light towards its pole, by its rows: most comes from half way up.
+            let stride = (grid.rows() + 1) * 33;
+            let up = normal_bin(Vec3::new(0.01, 0.01, 1.0)) as usize;
+            let distribution = |bin: usize| widths(&words[grid.rows() * 32 + bin * stride..][..33]);
+            let below: f64 = distribution(up)[grid.rows().div_ceil(2) + 2..].iter().sum();
+            let of_all: f64 = distribution((NORMAL_BINS * NORMAL_BINS) as usize)[grid.rows().div_ceil(2) + 2..]
+                .iter()
+                .sum();
+            if height >= 32 {
+                assert_eq!(below, 0.0, "{width} x {height}: light from behind");
+                assert!(of_all > 0.2, "the control: {of_all}");
+            }
+        }
+    }
+
+    #[test]
+    fn cells_cover_all_directions() {
+        for (width, height) in [(1, 1), (2, 1), (3, 2), (64, 32), (5, 101)] {
+            let all: f64 = (0..=height)
+                .map(|row| width as f64 * solid_angle(row, width, height))
+                .sum();
+            assert!(
+                (all - 4.0 * std::f64::consts::PI).abs() < 1e-12,
+                "{width} x {height}: {all}"
+            );
+        }
+    }
+}

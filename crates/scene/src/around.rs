@@ -1,0 +1,354 @@
+//! Overrides of the environment and of the background that the camera sees.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use glam::DVec3;
+
+use super::error::{At, Problem};
+use super::validate::{color, view};
+use super::{Description, EnvironmentDescription, EnvironmentName, Integrator};
+use wgray_image::color::srgb_to_linear;
+
+/// The background that the camera sees in place of the environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Background {
+    /// Transparency. Only for [`Integrator::Path`].
+    Transparent,
+    /// This radiance, in linear RGB.
+    Color(DVec3),
+    /// The radiance that the scene's view transform and exposure display as this color, 0 to 1 each.
+    Display(DVec3),
+}
+
+/// Replaces the environment. Its visibility to the camera is kept.
+pub(super) fn surround(description: &mut Description, environment: &EnvironmentDescription) {
+    let before = description.environment.take();
+    let (visible, background) = before.map_or((true, None), |before| (before.visible, before.background));
+    description.environment = Some(EnvironmentDescription {
+        visible,
+        background: environment.background.or(background),
+        ..environment.clone()
+    });
+    description.render.background = DVec3::ZERO;
+}
+
+impl Background {
+    /// Shows this to the camera. The light of the scene is not changed.
+    pub(super) fn show(self, description: &mut Description) -> Result<(), Problem> {
+        let seen = match self {
+            Background::Transparent => return transparent(description),
+            Background::Color(seen) => seen,
+            Background::Display(shown) => match view(&description.image) {
+                Ok(view) => DVec3::from_array(view.light_of(shown.to_array())),
+                Err(_) => return Ok(()), // reported when the scene is validated
+            },
+        };
+        let seen = color(seen)?;
+        let is_path = description.integrator() == Integrator::Path;
+        let render = &mut description.render;
+        if !is_path {
+            render.background = seen;
+            return Ok(());
+        }
+        render.alpha = None;
+        let light = &mut render.background;
+        let plain = || EnvironmentDescription::new(std::mem::take(light));
+        let environment = description.environment.get_or_insert_with(plain);
+        environment.background = Some(seen);
+        environment.visible = true;
+        Ok(())
+    }
+}
+
+fn transparent(description: &mut Description) -> Result<(), Problem> {
+    if description.render.integrator == Some(Integrator::Phong) {
+        return Err(Problem::new("none needs integrator = \"path\""));
+    }
+    description.render.alpha = Some(true);
+    if let Some(environment) = &mut description.environment {
+        environment.background = None;
+    }
+    Ok(())
+}
+
+/// Returns a problem of the environment override as one of the option.
+pub(super) fn of_option(problem: &Problem) -> Option<Problem> {
+    let key = problem.key.to_string();
+    let is_of_option = matches!(key.strip_prefix("environment"), Some("" | ".color" | ".file"));
+    is_of_option.then(|| Problem::new(problem.message.as_str()).at("environment"))
+}
+
+impl FromStr for Background {
+    type Err = String;
+
+    /// `none` or `transparent`, or a color.
+    fn from_str(text: &str) -> Result<Background, String> {
+        if text == "none" || text == "transparent" {
+            return Ok(Background::Transparent);
+        }
+        let shown = display_of(text).map(Background::Display);
+        let found = shown.or_else(|| linear_of(text).map(Background::Color));
+        found.ok_or_else(|| format!("must be none or a color, {COLOR}"))
+    }
+}
+
+impl FromStr for EnvironmentDescription {
+    type Err = String;
+
+    /// A built-in environment by its name, a color, or the path of an image, relative to the current folder.
+    fn from_str(text: &str) -> Result<EnvironmentDescription, String> {
+        let own = EnvironmentName::ALL.into_iter().find(|name| name.name() == text);
+        if let Some(name) = own {
+            return Ok(EnvironmentDescription::named(name));
+        }
+        if let Some(color) = color_of(text) {
+            return Ok(EnvironmentDescription::new(color));
+        }
+        let rule = || format!("must be studio, sky, an image file (.hdr, .exr, .png, .jpg) or a color, {COLOR}");
+        let is_path = text.contains(['/', '\\', '.']) || Path::new(text).exists();
+        if text.starts_with('#') || !is_path {
+            return Err(rule());
+        }
+        let path = std::path::absolute(text).map_err(|_| rule())?;
+        let path = path.to_str().ok_or("the current folder's name must be UTF-8")?;
+        Ok(EnvironmentDescription::image(path))
+    }
+}
+
+/// Examples of colors in messages.
+const COLOR: &str = "such as white, #ff8000 or 1,0.2,0 (linear)";
+
+/// Names of colors, and their hexadecimal forms.
+const COLOR_NAMES: [(&str, &str); 4] = [
+    ("black", "#000000"),
+    ("gray", "#808080"),
+    ("grey", "#808080"),
+    ("white", "#ffffff"),
+];
+
+/// Returns the linear RGB of a name or hexadecimal digits, by the curve of sRGB, or of three linear numbers.
+fn color_of(text: &str) -> Option<DVec3> {
+    let linear = |shown: DVec3| DVec3::from_array(shown.to_array().map(srgb_to_linear));
+    display_of(text).map(linear).or_else(|| linear_of(text))
+}
+
+/// Returns the display values, 0 to 1, of a name or of hexadecimal digits: `#rrggbb` or `#rgb`, also without `#`.
+fn display_of(text: &str) -> Option<DVec3> {
+    let named = COLOR_NAMES.into_iter().find(|(name, _)| *name == text);
+    let hex = named.map_or(text, |(_, hex)| hex);
+    let digits = hex.strip_prefix('#').unwrap_or(hex);
+    let (limit, size) = match digits.len() {
+        3 => (15.0, 4),
+        6 => (255.0, 8),
+        _ => return None,
+    };
+    let is_hex = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    let whole = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex)?;
+    let component = |i: u32| f64::from(whole >> (i * size) & ((1 << size) - 1)) / limit;
+    Some(DVec3::new(component(2), component(1), component(0)))
+}
+
+/// Returns three linear numbers.
+fn linear_of(text: &str) -> Option<DVec3> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|number| number.trim().parse().ok())
+        .collect::<Option<_>>()?;
+    Some(DVec3::from_array(numbers.try_into().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Overrides, Scene, SceneError};
+
+    const SCENE: &str = "\
+image = { width = 4, height = 3 }
+camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
+";
+
+    fn load(more: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
+        Scene::parse_with(&format!("{SCENE}{more}"), "s.toml", overrides)
+    }
+
+    #[test]
+    fn colours_are_those_of_displays_or_light() {
+        let shown = |text: &str| color_of(text).unwrap().to_array();
+        assert_eq!(shown("#ffffff"), [1.0; 3]);
+        assert_eq!(shown("#000000"), [0.0; 3]);
+        assert_eq!(shown("1,0.25, 20"), [1.0, 0.25, 20.0]);
+        assert_eq!("#ff0000".parse(), Ok(Background::Display(DVec3::X)));
+        assert_eq!("1,0,0".parse(), Ok(Background::Color(DVec3::X)));
+        // IEC 61966-2-1 by hand: 0x80 is 128 / 255 = 0.50196, and ((0.50196 + 0.055) / 1.055)^2.4 = 0.21586.
+        let [r, g, b] = shown("#8000Ff");
+        assert!((r - 0.21586).abs() < 1e-5 && g == 0.0 && b == 1.0, "{r} {g} {b}");
+        assert_eq!("none".parse(), Ok(Background::Transparent));
+        assert_eq!("transparent".parse(), Ok(Background::Transparent));
+        for green in ["#0f0", "0f0", "00ff00", "#00FF00"] {
+            assert_eq!(green.parse(), Ok(Background::Display(DVec3::Y)), "{green}");
+        }
+        assert_eq!(shown("#842")[0], shown("#884422")[0]);
+        for bad in [
+            "", "#", "#ff", "#ffff", "+12", "##12345", "#12345g", "#+12345", "#1234567", "1,2", "1,2,3,4", "1,2,x",
+            "blue", "None",
+        ] {
+            let told = bad.parse::<Background>().unwrap_err();
+            assert!(
+                told.starts_with("must be none or a color, such as white"),
+                "{bad}: {told}"
+            );
+        }
+    }
+
+    #[test]
+    fn surroundings_are_named_coloured_or_files() {
+        let around = |text: &str| text.parse::<EnvironmentDescription>().unwrap();
+        assert_eq!(around("studio"), EnvironmentDescription::named(EnvironmentName::Studio));
+        assert_eq!(around("sky"), EnvironmentDescription::named(EnvironmentName::Sky));
+        assert_eq!(around("1,2,3"), EnvironmentDescription::new([1.0, 2.0, 3.0]));
+        let here = std::env::current_dir().unwrap();
+        for (text, path) in [("./studio", "studio"), ("a/b.hdr", "a/b.hdr"), ("1,2.5", "1,2.5")] {
+            let file = around(text).file.unwrap();
+            assert_eq!(std::path::Path::new(&file), here.join(path));
+        }
+        for bad in ["", "#ff", "forest", "1,2"] {
+            let told = bad.parse::<EnvironmentDescription>().unwrap_err();
+            assert!(told.starts_with("must be studio, sky, an image file (.hdr"), "{told}");
+        }
+    }
+
+    #[test]
+    fn other_surroundings_light_and_other_backgrounds_are_seen() {
+        let path = "render = { integrator = 'path', alpha = true, background = [1, 2, 3] }\n";
+        let color = |color: [f64; 3]| Some(Background::Color(color.into()));
+        let with = |environment: Option<&str>, background| Overrides {
+            environment: environment.map(|text| text.parse().unwrap()),
+            background,
+            ..Overrides::default()
+        };
+        let found = |more: &str, overrides: &Overrides| {
+            let scene = load(more, overrides).unwrap();
+            let around = scene
+                .environment
+                .map(|around| (around.color.to_array(), around.visible, around.background));
+            (around, scene.render.alpha)
+        };
+        let (light, red) = ([1.0, 2.0, 3.0], [1.0, 0.0, 0.0]);
+        assert_eq!(found(path, &with(None, None)), (Some((light, true, None)), true));
+        let seen = Some(DVec3::from(red));
+        assert_eq!(found(path, &with(None, color(red))), (Some((light, true, seen)), false));
+        let other = Some(([0.5; 3], true, None));
+        assert_eq!(found(path, &with(Some("0.5,0.5,0.5"), None)), (other, true));
+        assert_eq!(
+            found(path, &with(Some("0.5,0.5,0.5"), color(red))),
+            (Some(([0.5; 3], true, seen)), false)
+        );
+        let opaque = path.replace("alpha = true, ", "");
+        let clear = with(None, Some(Background::Transparent));
+        assert_eq!(found(&opaque, &clear), (Some((light, true, None)), true));
+        // A background is seen where nothing lights, and where what lights was not seen.
+        let dark = "render.integrator = 'path'\n";
+        assert_eq!(
+            found(dark, &with(None, color(red))),
+            (Some(([0.0; 3], true, seen)), false)
+        );
+        assert_eq!(found(dark, &with(None, color([0.0; 3]))), (None, false));
+        let unseen = format!("{dark}environment = {{ color = [1, 2, 3], visible = false }}\n");
+        assert_eq!(found(&unseen, &with(None, None)), (Some((light, false, None)), false));
+        assert_eq!(
+            found(&unseen, &with(Some("0.5,0.5,0.5"), None)),
+            (Some(([0.5; 3], false, None)), false)
+        );
+        assert_eq!(
+            found(&unseen, &with(None, color(red))),
+            (Some((light, true, seen)), false)
+        );
+        // Direct light has a background of its own.
+        let scene = load("render.background = [1, 2, 3]\n", &with(None, color(red))).unwrap();
+        assert_eq!((scene.render.background.to_array(), scene.environment), (red, None));
+    }
+
+    #[test]
+    fn a_display_color_is_what_the_view_shows() {
+        for (transform, exposure) in [
+            ("agx", 0.0),
+            ("khronos-pbr-neutral", 1.5),
+            ("srgb", -1.0),
+            ("gamma22", 0.0),
+        ] {
+            for integrator in ["path", "phong"] {
+                let text = SCENE.replace(
+                    "height = 3",
+                    &format!("height = 3, view_transform = '{transform}', exposure = {exposure}"),
+                );
+                for (color, expected) in [("#ffffff", [255; 3]), ("#6480a0", [100, 128, 160])] {
+                    let overrides = Overrides {
+                        background: Some(color.parse().unwrap()),
+                        ..Overrides::default()
+                    };
+                    let text = format!("{text}render.integrator = '{integrator}'\n");
+                    let scene = Scene::parse_with(&text, "s.toml", &overrides).unwrap();
+                    let seen = match &scene.environment {
+                        Some(environment) => environment.background.unwrap(),
+                        None => scene.render.background,
+                    };
+                    assert_eq!(scene.view.rgb8(seen.as_vec3().to_array()), expected, "{text}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bad_surroundings_are_told_as_the_options_that_they_are() {
+        let told = |more: &str, environment: Option<&str>, background: Option<&str>| {
+            let overrides = Overrides {
+                environment: environment.map(|text| text.parse().unwrap()),
+                background: background.map(|text| text.parse().unwrap()),
+                ..Overrides::default()
+            };
+            load(more, &overrides).unwrap_err()
+        };
+        let (path, phong) = ("render.integrator = 'path'\n", "render.integrator = 'phong'\n");
+        for (more, environment, background, wanted) in [
+            (phong, Some("sky"), None, "environment: needs integrator = \"path\""),
+            (
+                phong,
+                None,
+                Some("none"),
+                "background: none needs integrator = \"path\"",
+            ),
+            ("", None, Some("1,2,-1"), "background: -1 must be finite, from 0 to 1e6"),
+            (
+                path,
+                None,
+                Some("nan,2,1"),
+                "background: nan must be finite, from 0 to 1e6",
+            ),
+            (
+                path,
+                Some("1,2e6,0"),
+                None,
+                "environment: 2e6 must be finite, from 0 to 1e6",
+            ),
+            (
+                path,
+                Some("/nowhere/room.hdr"),
+                None,
+                "environment: \"/nowhere/room.hdr\" cannot be read: ",
+            ),
+        ] {
+            let error = told(more, environment, background);
+            assert!(matches!(error, SceneError::Override(_)), "{error}");
+            assert!(error.to_string().starts_with(wanted), "{error}: {wanted}");
+        }
+        // What the file says is its own.
+        let error = told(
+            &format!("{path}materials.a = {{ type = 'glass', ior = 0 }}\n"),
+            Some("sky"),
+            None,
+        );
+        assert!(error.to_string().starts_with("s.toml:4: materials.a.ior"), "{error}");
+    }
+}

@@ -1,0 +1,416 @@
+//! Scene files in JSON, as a course on path tracing has them: `docs/scene-format.md` has their keys. They become a
+//! [`Description`] like any other, with +Z up, where theirs is +Y.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use serde::Deserialize;
+use serde_json::value::RawValue;
+use toml::Value;
+
+use super::define::Defines;
+use super::error::{At, Collector, KeyPath, Problem, Problems, SceneError, Segment, cut};
+use super::validate::{light, point};
+use super::{
+    ColorDescription, ConductorDescription, Description, DiffuseDescription, Integrator, LightDescription,
+    MaterialDescription, MeshDescription, PerspectiveDescription, RectangleLightDescription, RenderDescription,
+    SamplesDescription, Scale, Up, parse,
+};
+
+/// The largest file in bytes: what is made of it takes many times its memory.
+const LARGEST: usize = 4 << 20;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Course {
+    spp: u32,
+    max_depth: u32,
+    image_resolution: [u32; 2],
+    cam_config: Camera,
+    light_config: Light,
+    materials: Vec<Material>,
+    objects: Vec<Object>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Camera {
+    position: DVec3,
+    look_at: DVec3,
+    ref_up: DVec3,
+    vertical_fov: f64,
+    #[serde(default = "one")]
+    focal_length: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Light {
+    position: DVec3,
+    size: [f64; 2],
+    radiance: DVec3,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Material {
+    name: String,
+    #[serde(rename = "type")]
+    kind: Kind,
+    color: DVec3,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Kind {
+    Diffuse,
+    Specular,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Object {
+    obj_file_path: String,
+    material_name: String,
+    #[serde(default)]
+    translate: DVec3,
+    #[serde(default = "one")]
+    scale: f64,
+    /// A hint: every mesh has a tree of boxes.
+    #[serde(default, rename = "has_bvh")]
+    _has_bvh: bool,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Whether a scene of this name is such a file.
+pub fn is_course(name: &Path) -> bool {
+    let ending = name.extension();
+    ending.is_some_and(|ending| ending.eq_ignore_ascii_case("json"))
+}
+
+/// The folder that the files it names must lie in, if nothing else is said: the one that has the scene's own folder, as
+/// they are named `../assets/...`.
+pub fn asset_root(folder: &Path) -> PathBuf {
+    let folder = match folder.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => folder,
+    };
+    let whole = folder.canonicalize().ok();
+    let parent = whole.as_deref().and_then(Path::parent);
+    parent.map_or_else(|| folder.join(".."), Path::to_owned)
+}
+
+/// Reads the text of a file; `origin` is its name in messages.
+pub fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Description, SceneError> {
+    let course = read_json(text, defines).map_err(|broken| match broken {
+        Broken::Values(problems) => {
+            let error = |at, problem: Problem| syntax_error(origin, place(text, at), problem.to_string());
+            match problems.of_define(defines) {
+                Some(error) => error,
+                None => problems.into_error(|problem| begin(text, &problem.key), error),
+            }
+        }
+        Broken::Text(error, key) => text_error(text, origin, error, key),
+        Broken::Large => {
+            let rule = format!("a JSON scene must not be larger than {} MiB", LARGEST >> 20);
+            syntax_error(origin, (1, 1), rule)
+        }
+    })?;
+    let checked = check(&course);
+    checked.map_err(|problems| invalid(text, origin, problems, defines))?;
+    Ok(description(&course))
+}
+
+/// Returns the error of a text whose description has problems, or which has them itself.
+pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) -> SceneError {
+    let problems = problems.map(|problem| Problem {
+        key: key_in_file(text, &problem.key, defines),
+        // The type has another name in the file.
+        message: problem.message.replace("\"conductor\"", "\"specular\""),
+        ..problem
+    });
+    if let Some(error) = problems.of_define(defines) {
+        return error;
+    }
+    let invalid = |at: usize, problem: Problem| SceneError::Invalid {
+        origin: origin.to_owned(),
+        line: place(text, at).0,
+        problem,
+    };
+    problems.into_error(|problem| begin(text, &problem.key), invalid)
+}
+
+/// What is wrong with a text.
+enum Broken {
+    /// With the text as JSON.
+    Text(serde_json::Error, KeyPath),
+    /// With the types of values, or keys.
+    Values(Problems),
+    /// With its length.
+    Large,
+}
+
+/// Returns the error of a text that is not JSON.
+fn text_error(text: &str, origin: &str, error: serde_json::Error, key: KeyPath) -> SceneError {
+    let (line, bytes) = (error.line().max(1), error.column());
+    // It counts bytes.
+    let before = text.lines().nth(line - 1).unwrap_or_default().as_bytes();
+    let before = &before[..bytes.saturating_sub(1).min(before.len())];
+    let column = String::from_utf8_lossy(before).chars().count() + 1;
+    let whole = error.to_string();
+    let message = whole.rsplit_once(" at line ").map_or(&*whole, |(message, _)| message);
+    let message = message
+        .replace(", expected any valid TOML value", "")
+        .replace('`', "\"")
+        .replace(
+            "recursion limit exceeded",
+            "lists and objects must be nested at most 127 levels deep",
+        );
+    let problem = Problem {
+        key,
+        ..Problem::new(message)
+    };
+    syntax_error(origin, (line, column), problem.to_string())
+}
+
+fn syntax_error(origin: &str, (line, column): (usize, usize), message: String) -> SceneError {
+    SceneError::Syntax {
+        origin: origin.to_owned(),
+        line,
+        column,
+        message,
+    }
+}
+
+fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
+    if text.len() > LARGEST {
+        return Err(Broken::Large);
+    }
+    let mut deserializer = serde_json::Deserializer::from_str(text);
+    let value: Value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+        let key = KeyPath(parse::segments(error.path()));
+        Broken::Text(error.into_inner(), key)
+    })?;
+    let end = deserializer.end();
+    end.map_err(|error| Broken::Text(error, KeyPath::default()))?;
+    let Value::Table(mut table) = value else {
+        let message = format!("{} must be an object: {{ \"spp\": ... }}", cut(&one_line(text)));
+        return Err(Broken::Values(Problem::new(message).into()));
+    };
+    defines
+        .put(&[], &mut table, |_| false)
+        .map_err(|problem| Broken::Values(problem.into()))?;
+    let in_json = |problem: Problem| {
+        // It is told in TOML's words.
+        let shown = find(text, &problem.key).filter(|value| value.starts_with('{'));
+        let message = match (problem.message.rsplit_once(" must be "), shown) {
+            (Some((_, rule)), Some(shown)) => format!("{} must be {rule}", cut(&one_line(shown))),
+            _ => problem.message,
+        };
+        let message = message.replace(
+            "must be a list of tables, each under its own [[header]]",
+            "must be a list",
+        );
+        let message = message.replace("must be a table", "must be an object");
+        Problem { message, ..problem }
+    };
+    parse::read_for(table, Integrator::Path).map_err(|problems| Broken::Values(problems.map(in_json)))
+}
+
+/// Checks what is not told in the file's own numbers once it is turned.
+fn check(course: &Course) -> Result<(), Problems> {
+    let Course {
+        cam_config,
+        light_config,
+        materials,
+        objects,
+        ..
+    } = course;
+    // +z, which the file may name, is not the default `up` here.
+    let mut found = Collector::default();
+    found.values(camera(cam_config).validate_frame().map_err(Problems::from).at("camera"));
+    found.value(light(&self::rectangle(light_config).into()).at(0).at("lights"));
+    for (i, object) in objects.iter().enumerate() {
+        found.value(point(object.translate).at("translate").at(i).at("shapes"));
+    }
+    let mut names = BTreeMap::new();
+    for (i, material) in materials.iter().enumerate() {
+        if let Some(first) = names.insert(material.name.as_str(), i) {
+            let message = format!(
+                "{:?} is defined twice, first in materials[{first}]",
+                cut(&material.name)
+            );
+            found.value(Err::<(), _>(Problem::new(message).at("name").at(i).at("materials")));
+        }
+    }
+    found.end(())
+}
+
+/// A camera in the file's coordinates.
+fn camera(camera: &Camera) -> super::CameraDescription {
+    let mut described = PerspectiveDescription::new(camera.position, camera.look_at, camera.vertical_fov);
+    described.up = camera.ref_up;
+    described.focal_length = camera.focal_length;
+    described.into()
+}
+
+/// A light in the file's coordinates.
+fn rectangle(light: &Light) -> RectangleLightDescription {
+    RectangleLightDescription::new(light.position, light.size, DVec3::NEG_Y, DVec3::X, light.radiance)
+}
+
+/// A vector with +Y up as one with +Z up: what [`Up::Y`] does to meshes.
+fn turned(v: DVec3) -> DVec3 {
+    DVec3::new(v.x, -v.z, v.y)
+}
+
+fn description(course: &Course) -> Description {
+    let Course {
+        spp,
+        max_depth,
+        image_resolution: [width, height],
+        cam_config,
+        light_config,
+        materials,
+        objects,
+    } = course;
+    let mut scene = Description::new(
+        *width,
+        *height,
+        camera(&Camera {
+            position: turned(cam_config.position),
+            look_at: turned(cam_config.look_at),
+            ref_up: turned(cam_config.ref_up),
+            ..*cam_config
+        }),
+    )
+    .with_render(RenderDescription {
+        integrator: Some(Integrator::Path),
+        max_depth: *max_depth,
+        pixel_samples: SamplesDescription::new(*spp),
+        ..RenderDescription::default()
+    })
+    .with_light(LightDescription::from(RectangleLightDescription {
+        center: turned(light_config.position),
+        normal: turned(DVec3::NEG_Y),
+        ..rectangle(light_config)
+    }));
+    for Material { name, kind, color } in materials {
+        let color = ColorDescription::Plain(*color);
+        let material = match kind {
+            Kind::Diffuse => MaterialDescription::from(DiffuseDescription::new(color)),
+            Kind::Specular => MaterialDescription::from(ConductorDescription::new(color)),
+        };
+        scene = scene.with_material(name, material);
+    }
+    for object in objects {
+        scene = scene.with_shape(MeshDescription {
+            up: Up::Y,
+            translate: Some(turned(object.translate)),
+            scale: Some(Scale::All(object.scale)),
+            ..MeshDescription::new(&object.material_name, &object.obj_file_path)
+        });
+    }
+    scene
+}
+
+/// The path in the file of a value that is at a path of its description. A path of the file stays.
+fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
+    let renamed = |segment: &Segment| match segment {
+        Segment::Key(key) => Segment::from(match key.as_str() {
+            "up" => "ref_up",
+            "fov" => "vertical_fov",
+            "center" => "position",
+            "file" => "obj_file_path",
+            "material" => "material_name",
+            other => other,
+        }),
+        Segment::Index(index) => Segment::Index(*index),
+    };
+    let first = match key.0.first() {
+        Some(Segment::Key(first)) => first.as_str(),
+        _ => return key.clone(),
+    };
+    let rest = &key.0[1..];
+    KeyPath(match (first, rest) {
+        ("image", [Segment::Key(side), ..]) => {
+            vec!["image_resolution".into(), usize::from(side == "height").into()]
+        }
+        ("render", [Segment::Key(key), ..]) if key == "pixel_samples" => vec!["spp".into()],
+        ("render", [Segment::Key(key), ..]) => vec![key.as_str().into()],
+        ("camera", rest) => [Segment::from("cam_config")]
+            .into_iter()
+            .chain(rest.iter().map(renamed))
+            .collect(),
+        ("lights", [_, rest @ ..]) => {
+            let renamed = |segment| match renamed(segment) {
+                Segment::Key(key) if key == "color" => "radiance".into(),
+                other => other,
+            };
+            [Segment::from("light_config")]
+                .into_iter()
+                .chain(rest.iter().map(renamed))
+                .collect()
+        }
+        ("materials", [Segment::Key(name), rest @ ..]) => {
+            let course = read_json(text, &mut defines.anew()).ok();
+            let index = course.and_then(|course| course.materials.iter().position(|material| material.name == *name));
+            let key = match rest {
+                [Segment::Key(key)] if key == "type" => "type",
+                _ => "color",
+            };
+            vec!["materials".into(), index.unwrap_or_default().into(), key.into()]
+        }
+        ("shapes", rest) => [Segment::from("objects")]
+            .into_iter()
+            .chain(rest.iter().map(renamed))
+            .collect(),
+        _ => return key.clone(),
+    })
+}
+
+/// The text of the value at a path; of the innermost one that is there if it is not.
+fn find<'a>(text: &'a str, path: &KeyPath) -> Option<&'a str> {
+    let whole: &RawValue = serde_json::from_str(text).ok()?;
+    let mut value = whole.get();
+    for segment in &path.0 {
+        let inner: Option<&RawValue> = match segment {
+            Segment::Key(key) => {
+                let table: Option<BTreeMap<String, &RawValue>> = serde_json::from_str(value).ok();
+                table.and_then(|table| table.get(key).copied())
+            }
+            Segment::Index(index) => {
+                let list: Option<Vec<&RawValue>> = serde_json::from_str(value).ok();
+                list.and_then(|list| list.get(*index).copied())
+            }
+        };
+        match inner {
+            Some(inner) => value = inner.get(),
+            None => break,
+        }
+    }
+    Some(value)
+}
+
+/// The byte where the value at a path begins.
+fn begin(text: &str, path: &KeyPath) -> usize {
+    find(text, path).map_or(0, |value| value.as_ptr() as usize - text.as_ptr() as usize)
+}
+
+/// Line and column, counted from 1, of a byte.
+fn place(text: &str, at: usize) -> (usize, usize) {
+    let before = text.get(..at).unwrap_or_default();
+    let line = before.rsplit('\n').next().unwrap_or_default();
+    (before.matches('\n').count() + 1, line.chars().count() + 1)
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests;

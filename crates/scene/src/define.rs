@@ -1,0 +1,667 @@
+//! Values in place of those of a scene file, by the keys that the file has: `shapes[2].radius=0.5`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use toml::{Table, Value};
+use toml_parser::Source;
+use toml_parser::lexer::TokenKind;
+
+use super::error::{At as _, KeyPath, Problem, Problems, SceneError, Segment, cut};
+use super::parse::list;
+use super::suggest;
+
+/// A value for a key of a scene file: `KEY=VALUE`.
+///
+/// `KEY` is a path from the top of the file, `render.seed`, `materials."dark red".color`, `shapes[2].radius` or
+/// `shapes.2.radius`; elements of lists are counted from 0. `VALUE` is TOML; what is none is a text, so that it needs no quotes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Define {
+    key: KeyPath,
+    value: Value,
+}
+
+impl Define {
+    /// A value for a key.
+    ///
+    /// # Errors
+    ///
+    /// A key that is no path, no value, and values that begin as TOML but are none.
+    pub fn new(key: &str, value: &str) -> Result<Define, Problem> {
+        let (path, rest) = read_key(key, unreadable)?;
+        match rest {
+            "" => Ok(Define {
+                value: read_value(value).map_err(|message| about(&path, message))?,
+                key: path,
+            }),
+            _ => Err(unreadable(key)),
+        }
+    }
+}
+
+impl FromStr for Define {
+    type Err = Problem;
+
+    fn from_str(text: &str) -> Result<Define, Problem> {
+        let (path, rest) = read_key(text, unreadable)?;
+        let Some(value) = rest.strip_prefix('=') else {
+            return Err(unreadable(text));
+        };
+        Ok(Define {
+            value: read_value(value).map_err(|message| about(&path, message))?,
+            key: path,
+        })
+    }
+}
+
+impl Define {
+    /// Whether the value stands in for that of a key of the file, for a part of it or for what it is a part of.
+    pub(super) fn stands_in_for(&self, key: &KeyPath) -> bool {
+        self.key.0.iter().zip(&key.0).all(|(own, step)| is_step(own, step))
+    }
+}
+
+impl fmt::Display for Define {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.key, self.value)
+    }
+}
+
+fn about(key: &KeyPath, message: String) -> Problem {
+    let key = key.clone();
+    Problem {
+        key,
+        ..Problem::new(message)
+    }
+}
+
+fn unreadable(text: &str) -> Problem {
+    let rule = "must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5";
+    Problem::new(format!("{} {rule}", cut(text)))
+}
+
+impl Problems {
+    /// Returns the error of the first value that a define brought.
+    pub(super) fn of_define(&self, defines: &Defines) -> Option<SceneError> {
+        let problem = self.iter().find(|problem| defines.brought(&problem.key))?;
+        Some(SceneError::Override(problem.clone().at("define")))
+    }
+}
+
+impl FromStr for KeyPath {
+    type Err = Problem;
+
+    /// A path as a scene file has it: `materials."dark red".color`, `shapes[2].radius`.
+    fn from_str(text: &str) -> Result<KeyPath, Problem> {
+        match read_key(text, no_path)? {
+            (path, "") => Ok(path),
+            _ => Err(no_path(text)),
+        }
+    }
+}
+
+fn no_path(text: &str) -> Problem {
+    Problem::new(format!("{} must be a path, such as shapes[2].radius", cut(text)))
+}
+
+/// Maximum number of segments of a path, which is the nesting limit of a file.
+const MAX_SEGMENTS: usize = 80;
+
+fn too_deep(text: &str) -> Problem {
+    Problem::new(format!("{} must have at most {MAX_SEGMENTS} steps", cut(text)))
+}
+
+/// The path at the start of a text, and what is behind it: nothing, or what begins with `=`. What is told of another text is
+/// `unreadable`.
+fn read_key(text: &str, unreadable: fn(&str) -> Problem) -> Result<(KeyPath, &str), Problem> {
+    let mut path = Vec::new();
+    // What may come next: a name, and what stands between names.
+    let (mut name, mut between) = (true, false);
+    let mut rest = "";
+    let mut tokens = Source::new(text).lex();
+    while let Some(token) = tokens.next() {
+        let (start, end) = (token.span().start(), token.span().end());
+        let written = text.get(start..end).unwrap_or_default();
+        match token.kind() {
+            TokenKind::Whitespace | TokenKind::Eof => {}
+            TokenKind::Equals => {
+                rest = text.get(start..).unwrap_or_default();
+                break;
+            }
+            TokenKind::Atom if name => {
+                path.push(Segment::from(written));
+                (name, between) = (false, true);
+            }
+            TokenKind::BasicString | TokenKind::LiteralString if name => {
+                let quoted = format!("key = {written}").parse::<Table>().ok();
+                let quoted = quoted.as_ref().and_then(|table| table.get("key")?.as_str());
+                path.push(Segment::from(quoted.ok_or_else(|| unreadable(text))?));
+                (name, between) = (false, true);
+            }
+            TokenKind::Dot if between => (name, between) = (true, false),
+            TokenKind::LeftSquareBracket if between => {
+                let inner = tokens.next().zip(tokens.next());
+                let (number, _) = inner
+                    .filter(|(number, end)| {
+                        (number.kind(), end.kind()) == (TokenKind::Atom, TokenKind::RightSquareBracket)
+                    })
+                    .ok_or_else(|| unreadable(text))?;
+                let number = text.get(number.span().start()..number.span().end()).and_then(index);
+                path.push(Segment::Index(number.ok_or_else(|| unreadable(text))?));
+            }
+            _ => return Err(unreadable(text)),
+        }
+    }
+    match between && !path.is_empty() {
+        true if path.len() > MAX_SEGMENTS => Err(too_deep(text)),
+        true => Ok((KeyPath(path), rest)),
+        false => Err(unreadable(text)),
+    }
+}
+
+fn index(text: &str) -> Option<usize> {
+    let digits = text.bytes().all(|byte| byte.is_ascii_digit());
+    text.parse().ok().filter(|_| digits)
+}
+
+/// Parses a TOML value, or a string without quotes. A text that starts like a list, table or quoted string must be one.
+fn read_value(text: &str) -> Result<Value, String> {
+    let text = text.trim();
+    if text.is_empty() {
+        return Err("has no value after the =; \"\" is an empty string".to_owned());
+    }
+    let read = format!("value = {text}").parse::<Table>();
+    let error = match read {
+        Ok(mut table) => match table.remove("value") {
+            Some(value) if table.is_empty() => return Ok(value),
+            _ => "there is text after the value".to_owned(),
+        },
+        Err(error) => error.message().replace('`', "'"),
+    };
+    match text.starts_with(['[', '{', '"', '\'']) || text.contains('\n') {
+        true => Err(format!("{} must be TOML: {error}", cut(&text.replace('\n', " ")))),
+        false => Ok(Value::from(text)),
+    }
+}
+
+/// Defined values that are inserted while a file is parsed. Their paths are kept, so that messages attribute errors to them.
+pub(super) struct Defines<'a> {
+    given: &'a [Define],
+    /// Those that have been put, or could not be.
+    put: Vec<Put>,
+}
+
+struct Put {
+    /// Index among the given values.
+    number: usize,
+    /// The key, with numbers where lists are.
+    path: Vec<Segment>,
+    /// How much of the key is not the file's: what is behind it was made for it.
+    own: usize,
+}
+
+impl<'a> Defines<'a> {
+    pub fn new(given: &'a [Define]) -> Defines<'a> {
+        Defines { given, put: Vec::new() }
+    }
+
+    /// The same values, none of them put.
+    pub fn anew(&self) -> Defines<'a> {
+        Defines::new(self.given)
+    }
+
+    /// Forgets what was put: the file is read once more.
+    pub fn restart(&mut self) {
+        self.put.clear();
+    }
+
+    /// Returns true if the value of this key, or of a table around it, was defined.
+    pub fn brought(&self, key: &KeyPath) -> bool {
+        let key = key.0.as_slice();
+        self.put.iter().any(|put| {
+            let is_below = put.path.get(..put.own).is_some_and(|own| key.starts_with(own));
+            let rest = put.path.strip_prefix(key);
+            is_below || rest.is_some_and(|rest| rest.iter().all(|step| matches!(step, Segment::Index(_))))
+        })
+    }
+
+    /// Puts all values into a table that is at a path of the file, of those that belong there: with an empty path those that no
+    /// part takes.
+    pub fn put(
+        &mut self,
+        at: &[Segment],
+        whole: &mut Table,
+        is_elsewhere: impl Fn(&str) -> bool,
+    ) -> Result<(), Problem> {
+        let belongs = |define: &Define| match (define.key.0.first(), at) {
+            (Some(Segment::Key(first)), []) => !is_elsewhere(first),
+            (_, []) => true,
+            _ => define.key.0.len() >= at.len() && define.key.0.iter().zip(at).all(|(a, b)| is_step(a, b)),
+        };
+        let (given, mut value) = (self.given, Value::Table(std::mem::take(whole)));
+        for (number, define) in given.iter().enumerate().filter(|(_, define)| belongs(define)) {
+            let mut path = at.to_vec();
+            let put = put(&mut value, &mut path, &define.key.0[at.len()..], &define.value);
+            let own = match &put {
+                Ok(own) => *own,
+                Err(_) => path.len(),
+            };
+            let key = KeyPath(path.clone());
+            self.put.push(Put { number, path, own });
+            put.map_err(|message| about(&key, message))?;
+        }
+        match value {
+            Value::Table(table) => *whole = table,
+            other => {
+                let message = format!("{} must be a table", cut(&other.to_string()));
+                return Err(about(&KeyPath(at.to_vec()), message));
+            }
+        }
+        Ok(())
+    }
+
+    /// The problem of a key that leads to nothing.
+    pub fn not_there(&mut self, key: &KeyPath) -> Problem {
+        self.put.push(Put {
+            number: self.given.len(),
+            path: key.0.clone(),
+            own: key.0.len(),
+        });
+        about(key, "does not exist".to_owned())
+    }
+
+    /// A key that no table of the file took.
+    pub fn left(&self) -> Option<&'a KeyPath> {
+        let is_put = |number: usize| self.put.iter().any(|put| put.number == number);
+        let mut left = self.given.iter().enumerate().filter(|(number, _)| !is_put(*number));
+        left.next().map(|(_, define)| &define.key)
+    }
+}
+
+/// Returns true if a segment of a key is this one; an index may be written as a name.
+fn is_step(written: &Segment, step: &Segment) -> bool {
+    match (written, step) {
+        (Segment::Key(name), Segment::Index(number)) => index(name) == Some(*number),
+        _ => written == step,
+    }
+}
+
+/// Returns true if the value at a path is a number of samples, which stands for a table.
+fn is_samples(path: &[Segment]) -> bool {
+    let names = ["pixel_samples", "light_samples"];
+    matches!(path, [Segment::Key(section), Segment::Key(key)] if section == "render" && names.contains(&key.as_str()))
+}
+
+/// Puts a value into a tree. Tables on the way are made where there are none, but for what has names of its own. Adds to `path`
+/// where it went, or how far; gives how much of that is no table that was there.
+fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
+    let mut own = None;
+    let mut value = root;
+    for (i, step) in key.iter().enumerate() {
+        let is_last = i + 1 == key.len();
+        let is_named = matches!(path.as_slice(), [Segment::Key(kind)] if ["textures", "materials", "meshes"].contains(&kind.as_str()));
+        if let (Value::Integer(count), true) = (&*value, is_samples(path)) {
+            *value = Value::Table(Table::from_iter([("count".to_owned(), Value::from(*count))]));
+        }
+        let kind = kind_of(value);
+        let next = match (value, step) {
+            (Value::Table(table), Segment::Key(name)) => {
+                path.push(step.clone());
+                if !table.contains_key(name) {
+                    if is_named && !is_last {
+                        return Err(match table.is_empty() {
+                            true => "does not exist; the scene has none".to_owned(),
+                            false => match suggest::hint(name, table.keys().map(String::as_str)) {
+                                hint if hint.is_empty() => {
+                                    format!("does not exist; the scene has {}", list(table.keys()))
+                                }
+                                hint => format!("does not exist{hint}"),
+                            },
+                        });
+                    }
+                    if let Some(Segment::Index(_)) = key.get(i + 1) {
+                        return Err("does not exist, so it has no elements".to_owned());
+                    }
+                    own.get_or_insert(path.len());
+                    table.insert(name.clone(), Value::Table(Table::new()));
+                }
+                table.get_mut(name)
+            }
+            (Value::Array(list), step) => {
+                let number = match step {
+                    Segment::Index(number) => Some(*number),
+                    Segment::Key(name) => index(name),
+                };
+                let Some(number) = number else {
+                    return Err("is a list; add the index of an element, such as [0]".to_owned());
+                };
+                path.push(Segment::Index(number));
+                let count = list.len();
+                match list.get_mut(number) {
+                    None => return Err(format!("does not exist; the list has {count} elements, counted from 0")),
+                    found => found,
+                }
+            }
+            _ => {
+                return Err(format!(
+                    "is {kind} and has no {step}",
+                    step = KeyPath(vec![step.clone()])
+                ));
+            }
+        };
+        match next {
+            Some(next) => value = next,
+            None => return Err("does not exist".to_owned()),
+        }
+    }
+    *value = new.clone();
+    Ok(own.unwrap_or(path.len()))
+}
+
+fn kind_of(value: &Value) -> &'static str {
+    match value {
+        Value::Table(_) => "a table",
+        Value::Array(_) => "a list",
+        Value::String(_) => "a text",
+        Value::Integer(_) | Value::Float(_) => "a number",
+        Value::Boolean(_) => "true or false",
+        Value::Datetime(_) => "a time",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Overrides, Scene, SceneError};
+
+    const SCENE: &str = "\
+image = { width = 4, height = 3 }
+camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
+[materials.red]
+type = 'phong'
+color = [1, 0, 0]
+[materials.\"dark red\"]
+type = 'phong'
+color = [0.5, 0, 0]
+[[shapes]]
+type = 'sphere'
+material = 'red'
+center = [0, 0, 0]
+radius = 1
+[[shapes]]
+type = 'sphere'
+material = 'dark red'
+center = [0, 0, 1]
+radius = 0.5
+";
+
+    fn parse(text: &str, defines: &[&str]) -> Result<Scene, SceneError> {
+        let overrides = Overrides {
+            define: defines.iter().map(|define| define.parse().unwrap()).collect(),
+            ..Overrides::default()
+        };
+        Scene::parse_with(text, "s.toml", &overrides)
+    }
+
+    fn told(define: &str) -> String {
+        parse(SCENE, &[define]).unwrap_err().to_string()
+    }
+
+    /// The scene with another text in place of one that is there once.
+    fn edited(from: &str, to: &str) -> Scene {
+        assert_eq!(SCENE.matches(from).count(), 1, "{from}");
+        parse(&SCENE.replace(from, to), &[]).unwrap()
+    }
+
+    #[test]
+    fn a_defined_scene_is_that_of_an_edited_file() {
+        for (define, from, to) in [
+            ("image.width=7", "width = 4", "width = 7"),
+            ("camera.fov=50.5", "fov = 40", "fov = 50.5"),
+            ("camera.position=[0, -9, 1]", "[0, -4, 0]", "[0, -9, 1]"),
+            ("camera.position[1]=-9", "[0, -4, 0]", "[0, -9, 0]"),
+            ("shapes[1].radius=0.25", "radius = 0.5", "radius = 0.25"),
+            ("shapes.1.radius = 0.25", "radius = 0.5", "radius = 0.25"),
+            ("shapes . 01 . radius=0.25", "radius = 0.5", "radius = 0.25"),
+            ("shapes[1].material=red", "'dark red'", "'red'"),
+            ("materials.\"dark red\".color=[0, 0, 1]", "[0.5, 0, 0]", "[0, 0, 1]"),
+            ("materials.'dark red'.color[2]=1", "[0.5, 0, 0]", "[0.5, 0, 1]"),
+            (
+                "materials.\"dark red\"={ type = \"mirror\" }",
+                "type = 'phong'\ncolor = [0.5, 0, 0]",
+                "type = 'mirror'",
+            ),
+            (
+                "render.seed=3",
+                "[materials.red]",
+                "[render]\nseed = 3\n[materials.red]",
+            ),
+            (
+                "render.filter.type=gaussian",
+                "[materials.red]",
+                "[render]\nfilter.type = 'gaussian'\n[materials.red]",
+            ),
+            (
+                "materials.new={type=\"mirror\"}",
+                "[materials.red]",
+                "[materials.new]\ntype = 'mirror'\n[materials.red]",
+            ),
+            (
+                "shapes[0]={type=\"sphere\", material=\"red\", center=[0,0,0], radius=2}",
+                "radius = 1\n",
+                "radius = 2\n",
+            ),
+        ] {
+            let wanted = edited(from, to);
+            assert_ne!(wanted, parse(SCENE, &[]).unwrap(), "{define}");
+            assert_eq!(parse(SCENE, &[define]).unwrap(), wanted, "{define}");
+        }
+        assert_eq!(parse(SCENE, &["shapes=[]"]).unwrap().shapes, []);
+    }
+
+    #[test]
+    fn later_ones_go_before_and_options_before_all() {
+        let scene = parse(SCENE, &["render.seed=3", "image.width=9", "render={}", "render.seed=5"]).unwrap();
+        assert_eq!((scene.render.seed, scene.width), (5, 9));
+        let overrides = Overrides {
+            define: vec!["render.seed=3".parse().unwrap()],
+            seed: Some(8),
+            ..Overrides::default()
+        };
+        assert_eq!(Scene::parse_with(SCENE, "s.toml", &overrides).unwrap().render.seed, 8);
+        // A material may be made, then used.
+        let made = parse(SCENE, &["materials.new={type=\"mirror\"}", "shapes[0].material=new"]).unwrap();
+        assert_eq!(made.material_names[made.shapes[0].material], "new");
+    }
+
+    #[test]
+    fn a_bad_value_is_told_as_the_options_own() {
+        for (define, message) in [
+            ("camera.fov=x", "camera.fov: \"x\" must be a number"),
+            ("camera.fov=180", "camera.fov: 180 must be from 0.001 to 179.999"),
+            ("camera.position[0]=1e10", "camera.position: 1e10 must be finite"),
+            (
+                "camera.position[3]=1",
+                "camera.position[3]: does not exist; the list has 3 elements, counted from 0",
+            ),
+            (
+                "camera.position.x=1",
+                "camera.position: is a list; add the index of an element",
+            ),
+            ("camera.fov.x=1", "camera.fov: is a number and has no x"),
+            ("camera[0]=1", "camera: is a table and has no [0]"),
+            (
+                "shapes[2].radius=1",
+                "shapes[2]: does not exist; the list has 2 elements, counted from 0",
+            ),
+            (
+                "shapes[1].size=1",
+                "shapes[1].size: unknown key; expected one of \"type\"",
+            ),
+            ("shapes.x=1", "shapes: is a list; add the index of an element"),
+            (
+                "shapes[1].material=blue",
+                "shapes[1].material: there is no material \"blue\"",
+            ),
+            ("shapes[1]=3", "shapes[1]: 3 must be a table"),
+            (
+                "lights[0].color=[1,1,1]",
+                "lights: does not exist, so it has no elements",
+            ),
+            (
+                "materials.blue.color=[0,0,1]",
+                "materials.blue: does not exist; the scene has \"dark red\", \"red\"",
+            ),
+            (
+                "textures.a.file=a.png",
+                "textures.a: does not exist; the scene has none",
+            ),
+            ("materials.blue={}", "materials.blue.type is missing"),
+            ("render.sed=1", "render.sed: unknown key"),
+            ("rendr.seed=1", "rendr: unknown key; did you mean \"render\"?"),
+            ("seed=1", "seed: unknown key; did you mean render.seed?"),
+            ("spp=16", "spp: unknown key; did you mean render.pixel_samples?"),
+            ("fov=40", "fov: unknown key; did you mean camera.fov?"),
+            ("width=40", "width: unknown key; did you mean image.width?"),
+            ("sed=1", "sed: unknown key; expected one of"),
+            ("render.adaptive.max_samples=9", "render.adaptive.error is missing"),
+            ("image={width=4}", "image.height is missing"),
+        ] {
+            assert!(
+                told(define).starts_with(&format!("define.{message}")),
+                "{define}: {}",
+                told(define)
+            );
+        }
+        // What the file brings is the file's.
+        let bad = SCENE.replace("radius = 0.5", "radius = -1");
+        let message = parse(&bad, &["shapes[0].radius=2", "camera.fov=50"])
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.starts_with("s.toml:18: shapes[1].radius: -1 must be"),
+            "{message}"
+        );
+        assert!(parse(&bad, &["shapes[1].radius=1"]).is_ok());
+    }
+
+    #[test]
+    fn what_is_no_key_or_no_value_is_told() {
+        let rule = "must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5";
+        for text in [
+            "",
+            "=",
+            "=3",
+            "render",
+            "render.",
+            "render.=3",
+            ".render=3",
+            "a..b=3",
+            "a b=3",
+            "a[=3",
+            "a[]=3",
+            "a[x]=3",
+            "a[1=3",
+            "a[-1]=3",
+            "a[1.5]=3",
+            "[0]=3",
+            "a]=3",
+            "a{}=3",
+            "\"a=3",
+            "a#=3",
+            "a\n=3",
+            "a[99999999999999999999]=3",
+            "a.[0]=3",
+        ] {
+            let message = text.parse::<Define>().unwrap_err().to_string();
+            assert!(message.ends_with(rule), "{text}: {message}");
+        }
+        for (text, message) in [
+            ("a=", "a: has no value after the =; \"\" is an empty string"),
+            ("a.b= ", "a.b: has no value after the ="),
+            ("a=[1, 2", "a: [1, 2 must be TOML: unclosed array"),
+            ("a={x=1", "a: {x=1 must be TOML: "),
+            ("a=\"x", "a: \"x must be TOML: "),
+            ("a=[1] x", "a: [1] x must be TOML: "),
+            ("a=1\nb=2", "a: 1 b=2 must be TOML: there is text after the value"),
+        ] {
+            let told = text.parse::<Define>().unwrap_err().to_string();
+            assert!(told.starts_with(message), "{text}: {told}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_value_of_toml_is_a_text() {
+        for (text, wanted) in [
+            ("3", Value::Integer(3)),
+            ("-0.5", Value::Float(-0.5)),
+            ("1e3", Value::Float(1000.0)),
+            ("true", Value::Boolean(true)),
+            ("True", Value::from("True")),
+            ("sobol", Value::from("sobol")),
+            ("\"3\"", Value::from("3")),
+            ("dark red", Value::from("dark red")),
+            ("a=b", Value::from("a=b")),
+            ("2k/wood.png", Value::from("2k/wood.png")),
+            (".5", Value::from(".5")),
+            ("#fff", Value::from("#fff")),
+            ("[1, 2]", Value::from(vec![1, 2])),
+        ] {
+            let parsed: Define = format!("key={text}").parse().unwrap();
+            assert_eq!(parsed.value, wanted, "{text}");
+            assert_eq!(Define::new("key", text).unwrap(), parsed);
+        }
+        assert!(Define::new("a=b", "1").is_err());
+    }
+
+    #[test]
+    fn a_path_is_no_deeper_than_a_file() {
+        let path = |steps: usize| format!("{}=1", vec!["a"; steps].join("."));
+        assert!(path(MAX_SEGMENTS).parse::<Define>().is_ok());
+        for steps in [MAX_SEGMENTS + 1, 100_000] {
+            let told = path(steps).parse::<Define>().unwrap_err().to_string();
+            assert!(told.ends_with(".a=1 must have at most 80 steps"), "{told}");
+            assert!(told.len() < 100, "{told}");
+        }
+        let numbers = format!("a{}=1", "[0]".repeat(MAX_SEGMENTS));
+        assert!(numbers.parse::<Define>().is_err());
+    }
+
+    #[test]
+    fn a_large_file_takes_values_part_by_part() {
+        let shape = "[[shapes]]\ntype = 'sphere'\nmaterial = 'red'\ncenter = [0, 0, 9]\nradius = 0.125\n";
+        let large = format!("{SCENE}{}", shape.repeat((5 << 20) / shape.len()));
+        assert!(large.len() > 4 << 20);
+        let scene = parse(
+            &large,
+            &["shapes[3].radius=0.5", "materials.red.color[1]=1", "render.seed=4"],
+        )
+        .unwrap();
+        assert_eq!(scene.render.seed, 4);
+        assert_eq!(
+            scene.shapes[3],
+            parse(
+                &large.replacen("radius = 0.125", "radius = 0.25", 1),
+                &["shapes.3.radius=0.5"]
+            )
+            .unwrap()
+            .shapes[3]
+        );
+        assert_ne!(scene.shapes[3].geometry, scene.shapes[4].geometry);
+        for (define, message) in [
+            (
+                "shapes[999999].radius=1",
+                "define.shapes[999999].radius: does not exist",
+            ),
+            (
+                "materials.blue.color=[1, 1, 1]",
+                "define.materials.blue.color: does not exist",
+            ),
+            ("shapes[3].radius=-1", "define.shapes[3].radius: -1 must be"),
+            ("shapes[3].size=-1", "define.shapes[3].size: unknown key"),
+        ] {
+            let told = parse(&large, &[define]).unwrap_err().to_string();
+            assert!(told.starts_with(message), "{define}: {told}");
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! What a scene file says of meshes.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use schemars::JsonSchema;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use toml::Table;
+
+use crate::mesh::Normals;
+use crate::schema::kinds::{Angles, Degrees, Factor, Factor3, Matrix, Point, Vector};
+
+/// A mesh file, and how it is read.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshFileDescription {
+    /// The file, relative to the scene file's folder.
+    #[schemars(length(min = 1))]
+    pub file: String,
+    /// The normals that it is shaded by. If absent, the file's if it has any, else flat ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normals: Option<Normals>,
+    /// Which axis of the file is up.
+    #[serde(default)]
+    pub up: Up,
+}
+
+impl MeshFileDescription {
+    /// A mesh file, relative to the scene file's folder.
+    pub fn new(file: impl Into<String>) -> Self {
+        Self {
+            file: file.into(),
+            normals: None,
+            up: Up::default(),
+        }
+    }
+}
+
+/// A mesh.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
+pub struct MeshDescription {
+    /// The file, relative to the scene file's folder.
+    #[schemars(length(min = 1))]
+    pub file: String,
+    /// The normals that it is shaded by. If absent, the file's if it has any, else flat ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normals: Option<Normals>,
+    /// Which axis of the file is up.
+    #[serde(default)]
+    pub up: Up,
+    /// Name of the material of all groups that `materials` does not name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
+    /// Names of materials by the names of the file's groups, or of its own materials.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub materials: BTreeMap<String, String>,
+    /// Added to its coordinates, after all else.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
+    pub translate: Option<DVec3>,
+    /// How it is turned, after it was scaled: by three angles about x, y and z, or by one about an axis, each from -360 to 360 degrees. If
+    /// absent, not at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<Rotation>,
+    /// Factors of its coordinates, one or three, each from 1e-6 to 1e6 or negative.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("default" = 1))]
+    pub scale: Option<Scale>,
+    /// The rows of an affine map, in place of `scale`, `rotate` and `translate`. None if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Matrix>")]
+    pub matrix: Option<Vec<[f64; 4]>>,
+}
+
+impl MeshDescription {
+    /// A mesh file, relative to the scene file's folder, of one material, where the file has it.
+    pub fn new(material: impl Into<String>, file: impl Into<String>) -> Self {
+        Self {
+            file: file.into(),
+            normals: None,
+            up: Up::default(),
+            material: Some(material.into()),
+            materials: BTreeMap::new(),
+            translate: None,
+            rotate: None,
+            scale: None,
+            matrix: None,
+        }
+    }
+}
+
+/// A mesh of `[meshes.NAME]`, at a place of its own.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
+pub struct InstanceDescription {
+    /// The mesh's name.
+    pub mesh: String,
+    /// Name of the material of all groups that `materials` does not name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
+    /// Names of materials by the names of the mesh's groups, or of its file's own materials.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub materials: BTreeMap<String, String>,
+    /// Added to its coordinates, after all else.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
+    pub translate: Option<DVec3>,
+    /// How it is turned, after it was scaled: by three angles about x, y and z, or by one about an axis, each from -360 to 360 degrees. If
+    /// absent, not at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<Rotation>,
+    /// Factors of its coordinates, one or three, each from 1e-6 to 1e6 or negative.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("default" = 1))]
+    pub scale: Option<Scale>,
+    /// The rows of an affine map, in place of `scale`, `rotate` and `translate`. None if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Matrix>")]
+    pub matrix: Option<Vec<[f64; 4]>>,
+}
+
+impl InstanceDescription {
+    /// The mesh of this name, of one material, where its file has it.
+    pub fn new(material: impl Into<String>, mesh: impl Into<String>) -> Self {
+        Self {
+            mesh: mesh.into(),
+            material: Some(material.into()),
+            materials: BTreeMap::new(),
+            translate: None,
+            rotate: None,
+            scale: None,
+            matrix: None,
+        }
+    }
+}
+
+/// Which axis of a file becomes the scene's z axis; the others follow in their order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Up {
+    /// (x, y, z) becomes (y, z, x).
+    X,
+    /// (x, y, z) becomes (x, -z, y).
+    Y,
+    /// Coordinates as they are.
+    #[default]
+    Z,
+}
+
+/// A rotation, counter-clockwise as seen against its axis, in degrees.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "must be a list of 3 angles in degrees or a table such as { axis = [0, 0, 1], degrees = 90 }"
+)]
+pub enum Rotation {
+    /// About the x axis, then about the y axis, then about the z axis.
+    Angles(#[schemars(with = "Angles")] DVec3),
+    /// About one axis.
+    About(#[serde(deserialize_with = "table")] RotationAbout),
+}
+
+/// Reads a table. Within an untagged enum serde takes a list of its values too.
+fn table<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RotationAbout, D::Error> {
+    Table::deserialize(deserializer)?.try_into().map_err(D::Error::custom)
+}
+
+/// A rotation about an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RotationAbout {
+    /// The axis; any length.
+    #[schemars(with = "Vector")]
+    pub axis: DVec3,
+    /// The angle.
+    #[schemars(with = "Degrees")]
+    pub degrees: f64,
+}
+
+/// Factors of coordinates, not 0.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged, expecting = "must be a number or a list of 3 numbers")]
+pub enum Scale {
+    /// The same for all.
+    All(#[schemars(with = "Factor")] f64),
+    /// One for each axis.
+    Each(#[schemars(with = "Factor3")] DVec3),
+}

@@ -1,0 +1,83 @@
+//! Reads descriptions from the tables of a scene file, as serde does, but that what is a table must be one there: serde takes a list of
+//! its values in their order too.
+
+use serde::de::value::{MapDeserializer, SeqDeserializer};
+use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Unexpected, Visitor};
+use serde::forward_to_deserialize_any;
+use toml::de::Error;
+use toml::{Table, Value};
+
+/// An error of serde with the path that leads to it.
+pub(crate) type ReadError = serde_path_to_error::Error<Error>;
+
+/// What a table describes.
+pub(crate) fn read<T: DeserializeOwned>(table: Table) -> Result<T, ReadError> {
+    serde_path_to_error::deserialize(Read(Value::Table(table)))
+}
+
+struct Read(Value);
+
+impl IntoDeserializer<'_, Error> for Read {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+impl<'de> Deserializer<'de> for Read {
+    type Error = Error;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        match self.0 {
+            Value::Array(list) => {
+                let length = list.len();
+                let mut values = SeqDeserializer::new(list.into_iter().map(Read));
+                let read = visitor.visit_seq(&mut values)?;
+                let end = values.end();
+                end.map_err(|_: Error| Error::invalid_length(length, &"fewer elements in array"))?;
+                Ok(read)
+            }
+            Value::Table(table) => {
+                let pairs = table.into_iter().map(|(key, value)| (key, Read(value)));
+                visitor.visit_map(MapDeserializer::new(pairs))
+            }
+            plain => plain.deserialize_any(visitor),
+        }
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        match self.0 {
+            Value::Array(_) => Err(Error::invalid_type(Unexpected::Seq, &visitor)),
+            _ => self.deserialize_any(visitor),
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    /// Enums of a scene file have names alone.
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        self.0.deserialize_enum(name, variants, visitor)
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple tuple_struct map
+        identifier ignored_any
+    }
+}

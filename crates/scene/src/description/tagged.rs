@@ -1,0 +1,62 @@
+//! Tables of a scene file that their key `type` tells apart.
+
+use toml::Table;
+
+use super::tables::ReadError;
+
+/// An enum whose variants a file tells apart by the key `type`.
+pub(crate) trait Tagged: Sized {
+    /// The values that `type` may have.
+    const TYPES: &'static [&'static str];
+
+    /// Reads the table without its `type`, which is `tag`; `None` if there is no such type.
+    fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>>;
+}
+
+/// Defines a [`Tagged`] enum. It is not left to serde's `tag` alone because that forgets, while reading, in
+/// which key of the table an error is.
+macro_rules! tagged {
+    ($(#[$doc:meta])* $name:ident {
+        $($(#[doc = $variant_doc:literal])* $tag:literal => $variant:ident($body:ident),)+
+    }) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Serialize)]
+        #[serde(tag = "type")]
+                #[allow(clippy::large_enum_variant, reason = "a scene has few of them")]
+        pub enum $name {
+            $($(#[doc = $variant_doc])* #[serde(rename = $tag)] $variant($body),)+
+        }
+
+        $(
+            impl From<$body> for $name {
+                fn from(body: $body) -> Self {
+                    Self::$variant(body)
+                }
+            }
+        )+
+
+        impl Tagged for $name {
+            const TYPES: &'static [&'static str] = &[$($tag),+];
+
+            fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>> {
+                match tag {
+                    $($tag => Some(crate::description::tables::read(body).map(Self::$variant)),)+
+                    _ => None,
+                }
+            }
+        }
+
+        impl schemars::JsonSchema for $name {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                let types = vec![$(($tag, concat!($($variant_doc),*), generator.subschema_for::<$body>()),)+];
+                crate::schema::tagged(generator, stringify!($name), types)
+            }
+        }
+    };
+}
+
+pub(super) use tagged;

@@ -1,0 +1,418 @@
+//! What a scene file says of textures, and of the colours that may come from them.
+
+use std::fmt;
+
+use glam::DVec3;
+use schemars::JsonSchema;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use super::tables::ReadError;
+use super::tagged::{Tagged, tagged};
+use crate::schema::kinds::{
+    Anisotropy, Degrees, Factors, LineWidth, Rgb, Share, Strength, UvOffset, UvScale, UvSet, tell_plain,
+};
+use crate::{Channel, Encoding, TextureFilter, Wrap};
+
+/// A colour of a material: `[r, g, b]` or `{ texture = "NAME" }`.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+#[schemars(transform = tell_plain)]
+pub enum ColorDescription {
+    /// Linear RGB.
+    Plain(#[schemars(with = "Rgb")] DVec3),
+    /// From a texture.
+    Texture(TextureReference),
+}
+
+impl Default for ColorDescription {
+    fn default() -> Self {
+        Self::Plain(DVec3::ONE)
+    }
+}
+
+impl From<[f64; 3]> for ColorDescription {
+    /// Linear RGB.
+    fn from(color: [f64; 3]) -> Self {
+        Self::Plain(color.into())
+    }
+}
+
+impl ColorDescription {
+    /// The colours of a texture, by its name.
+    pub fn texture(name: impl Into<String>) -> Self {
+        Self::Texture(TextureReference { texture: name.into() })
+    }
+}
+
+// By hand: serde's untagged enums lose the place and the reason of an error.
+impl<'de> Deserialize<'de> for ColorDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ColorVisitor;
+
+        impl<'de> Visitor<'de> for ColorVisitor {
+            type Value = ColorDescription;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a list of 3 numbers or { texture = NAME }")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+                DVec3::deserialize(SeqAccessDeserializer::new(seq)).map(ColorDescription::Plain)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                TextureReference::deserialize(MapAccessDeserializer::new(map)).map(ColorDescription::Texture)
+            }
+        }
+
+        deserializer.deserialize_any(ColorVisitor)
+    }
+}
+
+/// A number of a material: `0.5` or `{ texture = "NAME", channel = "g" }`.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ValueDescription {
+    /// The same everywhere.
+    Plain(#[schemars(with = "Share")] f64),
+    /// One of a texture's values.
+    Texture(ChannelReference),
+}
+
+impl Default for ValueDescription {
+    /// 0.
+    fn default() -> Self {
+        Self::Plain(0.0)
+    }
+}
+
+impl From<f64> for ValueDescription {
+    fn from(value: f64) -> Self {
+        Self::Plain(value)
+    }
+}
+
+impl ValueDescription {
+    /// The red of a texture, by its name.
+    pub fn texture(name: impl Into<String>) -> Self {
+        Self::channel(name, Channel::default())
+    }
+
+    /// One of the values of a texture, by its name.
+    pub fn channel(name: impl Into<String>, channel: Channel) -> Self {
+        Self::Texture(ChannelReference {
+            texture: name.into(),
+            channel,
+        })
+    }
+}
+
+// By hand, as that of colours.
+impl<'de> Deserialize<'de> for ValueDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ValueVisitor;
+
+        impl<'de> Visitor<'de> for ValueVisitor {
+            type Value = ValueDescription;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a number or { texture = NAME }")
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<Self::Value, E> {
+                Ok(ValueDescription::Plain(value))
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<Self::Value, E> {
+                Ok(ValueDescription::Plain(value as f64))
+            }
+
+            fn visit_u64<E>(self, value: u64) -> Result<Self::Value, E> {
+                Ok(ValueDescription::Plain(value as f64))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                ChannelReference::deserialize(MapAccessDeserializer::new(map)).map(ValueDescription::Texture)
+            }
+        }
+
+        deserializer.deserialize_any(ValueVisitor)
+    }
+}
+
+/// `{ texture = "NAME" }`
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]
+pub struct TextureReference {
+    /// Name of the texture.
+    pub texture: String,
+}
+
+/// `{ texture = "NAME", channel = "r" }`
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a table, such as { texture = \"NAME\", channel = \"g\" }"
+)]
+pub struct ChannelReference {
+    /// Name of the texture.
+    pub texture: String,
+    /// Which of its values.
+    #[serde(default)]
+    pub channel: Channel,
+}
+
+/// `{ texture = "NAME", strength = 1 }`
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]
+pub struct NormalMapDescription {
+    /// Name of the texture.
+    pub texture: String,
+    /// Factor of the slopes.
+    #[serde(default = "one")]
+    #[schemars(with = "Strength")]
+    pub strength: f64,
+}
+
+tagged! {
+    /// `[textures.NAME]`
+    TextureDescription {
+        /// One colour.
+        "constant" => Constant(ConstantDescription),
+        /// Squares of two colours.
+        "checker" => Checker(CheckerDescription),
+        /// Lines.
+        "grid" => Lines(LinesDescription),
+        /// An image file.
+        "image" => Image(ImageTextureDescription),
+    }
+}
+
+/// One colour.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ConstantDescription {
+    /// Linear RGB.
+    #[schemars(with = "Rgb")]
+    pub color: DVec3,
+}
+
+impl ConstantDescription {
+    /// This colour, in linear RGB.
+    pub fn new(color: impl Into<DVec3>) -> Self {
+        Self { color: color.into() }
+    }
+}
+
+/// Squares of two colours, of side 1.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CheckerDescription {
+    /// Of the square from (0, 0) to (1, 1); linear RGB.
+    #[schemars(with = "Rgb")]
+    pub even: DVec3,
+    /// Of its neighbours.
+    #[schemars(with = "Rgb")]
+    pub odd: DVec3,
+    /// Factors of u and v.
+    #[serde(default = "ones")]
+    #[schemars(with = "UvScale")]
+    pub scale: [f64; 2],
+    /// Counter-clockwise, in degrees.
+    #[serde(default)]
+    #[schemars(with = "Degrees")]
+    pub rotate: f64,
+    /// Added to u and v.
+    #[serde(default)]
+    #[schemars(with = "UvOffset")]
+    pub offset: [f64; 2],
+}
+
+impl CheckerDescription {
+    /// Squares of side 1 in these colours, in linear RGB.
+    pub fn new(even: impl Into<DVec3>, odd: impl Into<DVec3>) -> Self {
+        Self {
+            even: even.into(),
+            odd: odd.into(),
+            scale: ones(),
+            rotate: 0.0,
+            offset: [0.0; 2],
+        }
+    }
+}
+
+/// Lines around whole numbers.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LinesDescription {
+    /// Between the lines; linear RGB.
+    #[schemars(with = "Rgb")]
+    pub cell: DVec3,
+    /// On the lines.
+    #[schemars(with = "Rgb")]
+    pub line: DVec3,
+    /// Of the lines; cells with their lines have width 1.
+    #[schemars(with = "LineWidth")]
+    pub line_width: f64,
+    /// Factors of u and v.
+    #[serde(default = "ones")]
+    #[schemars(with = "UvScale")]
+    pub scale: [f64; 2],
+    /// Counter-clockwise, in degrees.
+    #[serde(default)]
+    #[schemars(with = "Degrees")]
+    pub rotate: f64,
+    /// Added to u and v.
+    #[serde(default)]
+    #[schemars(with = "UvOffset")]
+    pub offset: [f64; 2],
+}
+
+impl LinesDescription {
+    /// Lines of this width around cells, in these colours, in linear RGB.
+    pub fn new(cell: impl Into<DVec3>, line: impl Into<DVec3>, line_width: f64) -> Self {
+        Self {
+            cell: cell.into(),
+            line: line.into(),
+            line_width,
+            scale: ones(),
+            rotate: 0.0,
+            offset: [0.0; 2],
+        }
+    }
+}
+
+/// An image file, or an image of [`Assets::images`](crate::Assets::images).
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImageTextureDescription {
+    /// Its path, relative to the scene file.
+    #[schemars(length(min = 1))]
+    pub file: String,
+    /// What its values mean; sRGB if absent, but EXR and HDR files are linear.
+    pub encoding: Option<Encoding>,
+    /// Beyond the edges.
+    #[serde(default)]
+    pub wrap: WrapDescription,
+    /// How its colours are found.
+    #[serde(default)]
+    pub filter: TextureFilter,
+    /// The largest ratio of a footprint's axes.
+    #[serde(default = "sixteen")]
+    #[schemars(with = "Anisotropy")]
+    pub max_anisotropy: f64,
+    /// Factors of u and v.
+    #[serde(default = "ones")]
+    #[schemars(with = "UvScale")]
+    pub scale: [f64; 2],
+    /// Counter-clockwise, in degrees.
+    #[serde(default)]
+    #[schemars(with = "Degrees")]
+    pub rotate: f64,
+    /// Added to u and v.
+    #[serde(default)]
+    #[schemars(with = "UvOffset")]
+    pub offset: [f64; 2],
+    /// Factors of red, green, blue and alpha.
+    #[serde(default = "four_ones")]
+    #[schemars(with = "Factors")]
+    pub factor: [f64; 4],
+    /// Which set of a mesh's texture coordinates it lies by.
+    #[serde(default)]
+    #[schemars(with = "UvSet")]
+    pub uv_set: u32,
+}
+
+impl ImageTextureDescription {
+    /// The image of this name, repeated, and filtered by the elliptical weighted average.
+    pub fn new(file: impl Into<String>) -> Self {
+        Self {
+            file: file.into(),
+            encoding: None,
+            wrap: WrapDescription::default(),
+            filter: TextureFilter::default(),
+            max_anisotropy: sixteen(),
+            scale: ones(),
+            rotate: 0.0,
+            offset: [0.0; 2],
+            factor: four_ones(),
+            uv_set: 0,
+        }
+    }
+}
+
+/// An image beyond its edges: `"repeat"`, or `["repeat", "clamp"]` along u and along v.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum WrapDescription {
+    /// In both directions.
+    Both(Wrap),
+    /// Along u, and along v.
+    Each([Wrap; 2]),
+}
+
+impl Default for WrapDescription {
+    fn default() -> Self {
+        Self::Both(Wrap::default())
+    }
+}
+
+impl From<[Wrap; 2]> for WrapDescription {
+    fn from([u, v]: [Wrap; 2]) -> Self {
+        if u == v { Self::Both(u) } else { Self::Each([u, v]) }
+    }
+}
+
+impl WrapDescription {
+    /// Along u, and along v.
+    pub fn each(self) -> [Wrap; 2] {
+        match self {
+            Self::Both(wrap) => [wrap; 2],
+            Self::Each(each) => each,
+        }
+    }
+}
+
+// By hand, as that of colours.
+impl<'de> Deserialize<'de> for WrapDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WrapVisitor;
+
+        impl<'de> Visitor<'de> for WrapVisitor {
+            type Value = WrapDescription;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a name, or a list of 2 names")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Self::Value, E> {
+                Wrap::deserialize(StrDeserializer::new(name)).map(WrapDescription::Both)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+                <[Wrap; 2]>::deserialize(SeqAccessDeserializer::new(seq)).map(WrapDescription::Each)
+            }
+        }
+
+        deserializer.deserialize_any(WrapVisitor)
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn sixteen() -> f64 {
+    16.0
+}
+
+fn ones() -> [f64; 2] {
+    [1.0, 1.0]
+}
+
+fn four_ones() -> [f64; 4] {
+    [1.0; 4]
+}

@@ -1,0 +1,300 @@
+//! Tests of the automatic camera.
+
+use super::*;
+use crate::{Camera, CameraDescription, Projection};
+
+/// Returns the position of a point in the image, from -1 at the left and lower edges to 1.
+fn seen(camera: &Camera, aspect: f64, point: DVec3) -> [f64; 2] {
+    let Projection::Perspective { fov } = camera.projection else {
+        panic!("a perspective camera")
+    };
+    let to = point - camera.position;
+    let ahead = to.dot(camera.forward);
+    assert!(ahead > 0.0, "{point} is behind the camera");
+    let high = ahead * (fov / 2.0).tan();
+    [to.dot(camera.right) / (high * aspect), to.dot(camera.up) / high]
+}
+
+fn camera(points: &[DVec3], framing: Framing) -> Camera {
+    let description = framed(points.iter().copied(), framing);
+    let text = format!("{framing:?} {description:?}");
+    CameraDescription::from(description)
+        .validate()
+        .unwrap_or_else(|problem| panic!("{problem}: {text}"))
+}
+
+fn corners(low: [f64; 3], top: [f64; 3]) -> Vec<DVec3> {
+    let side = |i: usize, axis: usize| if i >> axis & 1 == 0 { low[axis] } else { top[axis] };
+    (0..8).map(|i| DVec3::new(side(i, 0), side(i, 1), side(i, 2))).collect()
+}
+
+/// Boxes, flat ones, lines, a point, and points that no corner of their box is.
+fn clouds() -> Vec<Vec<DVec3>> {
+    let mut clouds = vec![
+        corners([-1.0; 3], [1.0; 3]),
+        corners([2.0, -3.0, 0.0], [2.5, 4.0, 0.25]),
+        corners([0.0, 0.0, 1.0], [3.0, 3.0, 1.0]),
+        corners([-1.0, 0.0, 0.0], [1.0, 0.0, 7.0]),
+        corners([0.0, -50.0, 0.0], [0.0, 50.0, 0.0]),
+        corners([0.0, 0.0, -1.0], [0.0, 0.0, 1.0]),
+        vec![DVec3::new(3.0, -4.0, 5.0)],
+        vec![
+            DVec3::new(1.0, -1.0, -1.0),
+            DVec3::new(-1.0, 1.0, -1.0),
+            DVec3::new(-1.0, -1.0, 1.0),
+        ],
+        (0..500)
+            .map(|i| {
+                let turn = f64::from(i) * 2.4;
+                DVec3::new(
+                    turn.cos() * f64::from(i),
+                    turn.sin() * f64::from(i),
+                    f64::from(i % 7) * 30.0,
+                )
+            })
+            .collect(),
+    ];
+    let scaled = |factor: f64| {
+        clouds[..4]
+            .iter()
+            .map(move |cloud| cloud.iter().map(|p| *p * factor).collect())
+    };
+    let scaled: Vec<_> = scaled(1e-6).chain(scaled(1e6)).collect();
+    clouds.extend(scaled);
+    clouds
+}
+
+const ASPECTS: [f64; 6] = [1.0, 16.0 / 9.0, 9.0 / 16.0, 6.0, 1.0 / 6.0, 10.0];
+
+#[test]
+fn all_is_in_the_image_and_fills_it() {
+    for points in clouds() {
+        for view in View::ALL {
+            for aspect in ASPECTS {
+                let framing = Framing::new(view, aspect);
+                let camera = camera(&points, framing);
+                let (mut most, mut ends) = (0.0_f64, [[f64::INFINITY, f64::NEG_INFINITY]; 2]);
+                for point in &points {
+                    let at = seen(&camera, aspect, *point);
+                    assert!(
+                        at.iter().all(|x| x.abs() <= INSIDE + 1e-6),
+                        "{framing:?}: {point} at {at:?}"
+                    );
+                    most = most.max(at[0].abs()).max(at[1].abs());
+                    for (ends, x) in ends.iter_mut().zip(at) {
+                        *ends = [ends[0].min(x), ends[1].max(x)];
+                    }
+                }
+                // A pixel of an image of 2000 x 2000 is 1e-3 of its half.
+                let [x, y] = ends.map(|[low, top]| (low + top).abs());
+                assert!(x.max(y) < 1e-6, "{framing:?}: off centre by {x}, {y}");
+                // The margins are reached, unless the camera would be too near.
+                let size = (0..3).map(|i| {
+                    let along = || points.iter().map(|p| p[i]);
+                    along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+                });
+                let size = size.map(|side| side * side).sum::<f64>().sqrt();
+                let depths = || points.iter().map(|p| (*p - camera.position).dot(camera.forward));
+                let (nearest, farthest) = (depths().fold(f64::MAX, f64::min), depths().fold(0.0, f64::max));
+                let near = if size > 0.0 { NEAREST * size } else { 1.0 };
+                if nearest > near * (1.0 + 1e-9) {
+                    assert!((most - INSIDE).abs() < 1e-6, "{framing:?}: {most}");
+                } else {
+                    assert!(nearest > near * (1.0 - 1e-6), "{framing:?}: {nearest}");
+                    assert!(
+                        farthest - nearest >= 0.8 * size,
+                        "only what is long may be farther away"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_turns_stays_in_the_image() {
+    for points in clouds() {
+        for view in View::ALL {
+            for aspect in ASPECTS {
+                let framing = Framing {
+                    turns: true,
+                    ..Framing::new(view, aspect)
+                };
+                let still = camera(&points, framing);
+                let (_, up) = view.direction();
+                let mut most = 0.0_f64;
+                for turn in 0..72 {
+                    let turned = glam::DQuat::from_axis_angle(up, f64::from(turn).to_radians() * 5.0);
+                    for point in &points {
+                        // The points turn, in place of the camera.
+                        let point = still.look_at + turned * (*point - still.look_at);
+                        let at = seen(&still, aspect, point);
+                        assert!(
+                            at.iter().all(|x| x.abs() <= INSIDE + 1e-6),
+                            "{framing:?}: {point} at {at:?}"
+                        );
+                        most = most.max(at[0].abs()).max(at[1].abs());
+                    }
+                }
+                assert!(most > 0.85 || points.len() == 1 || !(most > 0.5), "{framing:?}: {most}");
+            }
+        }
+    }
+}
+
+#[test]
+fn views_show_the_sides_that_they_name() {
+    let points = corners([0.0; 3], [1.0; 3]);
+    let at = |view: View| camera(&points, Framing::new(view, 1.0));
+    for (view, forward, right) in [
+        (View::Front, DVec3::Y, DVec3::X),
+        (View::Back, DVec3::NEG_Y, DVec3::NEG_X),
+        (View::Left, DVec3::X, DVec3::NEG_Y),
+        (View::Right, DVec3::NEG_X, DVec3::Y),
+        (View::Top, DVec3::NEG_Z, DVec3::X),
+        (View::Bottom, DVec3::Z, DVec3::X),
+    ] {
+        let camera = at(view);
+        assert!((camera.forward - forward).length() < 1e-12, "{view:?}: {camera:?}");
+        assert!((camera.right - right).length() < 1e-12, "{view:?}: {camera:?}");
+    }
+    for view in [View::Corner, View::Iso] {
+        let towards = -at(view).forward;
+        assert!(
+            towards.x > 0.0 && towards.y < 0.0 && towards.z > 0.0,
+            "{view:?}: {towards}"
+        );
+        assert!(at(view).up.z > 0.0);
+    }
+    assert!((DVec3::new(1.0, -1.0, 1.0).normalize() + at(View::Iso).forward).length() < 1e-12);
+}
+
+#[test]
+fn the_margins_of_a_leaning_triangle_are_equal() {
+    // Seen from the front: the base, 2 wide and from z = 0, lies at depth d, the tip at (0, -1, 3) one nearer.
+    let points = [-1.0, 1.0].map(|x| DVec3::new(x, 0.0, 0.0)).into_iter();
+    let points: Vec<DVec3> = points.chain([DVec3::new(0.0, -1.0, 3.0)]).collect();
+    for aspect in [0.25, 4.0] {
+        let camera = camera(&points, Framing::new(View::Front, aspect));
+        // The lower end is at depth D + 1 and the upper at D, for a camera at height h: -(0 - h) / (D + 1) = (3 - h) / D.
+        let near = -1.0 - camera.position.y;
+        let height = 3.0 * (near + 1.0) / (2.0 * near + 1.0);
+        assert!(
+            (camera.position.z - height).abs() < 1e-9,
+            "{aspect}: {camera:?}, {height}"
+        );
+        assert!(camera.position.x.abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_turning_model_keeps_equal_margins() {
+    for points in clouds() {
+        for (view, aspect) in [
+            (View::Corner, 0.5),
+            (View::Iso, 1.0),
+            (View::Front, 0.25),
+            (View::Corner, 1.0),
+        ] {
+            let framing = Framing {
+                turns: true,
+                ..Framing::new(view, aspect)
+            };
+            let still = camera(&points, framing);
+            let middle = still.look_at;
+            let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+            for turn in 0..3600 {
+                let turned = glam::DQuat::from_rotation_z(f64::from(turn).to_radians() / 10.0);
+                for point in &points {
+                    let [_, y] = seen(&still, aspect, middle + turned * (*point - middle));
+                    ends = [ends[0].min(y), ends[1].max(y)];
+                }
+            }
+            let off = (ends[0] + ends[1]).abs();
+            assert!(off < 1e-4, "{framing:?}: {ends:?}");
+        }
+    }
+}
+
+#[test]
+fn an_orbit_is_a_direction_in_degrees() {
+    let points = corners([0.0; 3], [1.0; 3]);
+    let from = |azimuth, elevation| {
+        let framing = Framing {
+            orbit: Some(Orbit { azimuth, elevation }),
+            ..Framing::new(View::Back, 1.0)
+        };
+        camera(&points, framing)
+    };
+    for (view, azimuth, elevation) in [
+        (View::Front, 0.0, 0.0),
+        (View::Right, 90.0, 0.0),
+        (View::Left, -90.0, 0.0),
+        (View::Back, 180.0, 0.0),
+        (View::Corner, 30.0, 20.0),
+        (View::Top, 0.0, 90.0),
+        (View::Bottom, 0.0, -90.0),
+        (View::Iso, 45.0, 35.264_389_682_754_654),
+    ] {
+        let (orbit, known) = (from(azimuth, elevation), camera(&points, Framing::new(view, 1.0)));
+        assert!(
+            orbit.position.distance(known.position) < 1e-9,
+            "{view:?}: {orbit:?}, {known:?}"
+        );
+        assert!(orbit.up.distance(known.up) < 1e-9, "{view:?}: {orbit:?}, {known:?}");
+    }
+    for elevation in [-89.95, -89.0, 89.0, 89.95, 90.0] {
+        for azimuth in [-360.0, -45.0, 33.0, 270.0] {
+            from(azimuth, elevation);
+        }
+    }
+    let read = |text: &str| text.parse::<Orbit>();
+    assert_eq!(
+        read("30,-15").unwrap(),
+        Orbit {
+            azimuth: 30.0,
+            elevation: -15.0
+        }
+    );
+    for (text, rule) in [
+        ("30", "must be AZIMUTH,ELEVATION in degrees, such as 30,15"),
+        ("a,b", "must be AZIMUTH,ELEVATION in degrees, such as 30,15"),
+        ("1,2,3", "must be AZIMUTH,ELEVATION in degrees, such as 30,15"),
+        ("nan,0", "the azimuth, NaN, must be from -360 to 360"),
+        ("361,0", "the azimuth, 361, must be from -360 to 360"),
+        ("0,91", "the elevation, 91, must be from -90 to 90"),
+    ] {
+        assert_eq!(read(text).unwrap_err(), rule, "{text}");
+    }
+}
+
+#[test]
+fn a_field_of_view_is_kept() {
+    let points = corners([-1.0; 3], [1.0; 3]);
+    for (fov, aspect) in [(1.0, 1.0), (60.0, 1.0), (60.0, 4.0), (170.0, 0.5)] {
+        let framing = Framing {
+            fov: Some(fov),
+            ..Framing::new(View::Corner, aspect)
+        };
+        let camera = camera(&points, framing);
+        let Projection::Perspective { fov: found } = camera.projection else {
+            panic!("a perspective camera")
+        };
+        assert!((found.to_degrees() - fov).abs() < 1e-9, "{found}");
+        let inside = |p: &DVec3| seen(&camera, aspect, *p).iter().all(|x| x.abs() <= INSIDE + 1e-6);
+        assert!(points.iter().all(inside), "{fov}");
+    }
+}
+
+#[test]
+fn nothing_is_framed_somewhere() {
+    for turns in [false, true] {
+        camera(
+            &[],
+            Framing {
+                turns,
+                ..Framing::new(View::Corner, 1.0)
+            },
+        );
+    }
+}

@@ -1,0 +1,298 @@
+//! What can be wrong with a glTF file, and where.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::ErrorPlace;
+
+/// Why there is no model. Every message begins with the place: `a.gltf: accessors[3]: 9 elements of 12 bytes, 12 apart, from byte
+/// 0 on; bufferViews[1] has 96 bytes`.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GltfError {
+    /// A file cannot be read.
+    // The field is not named `source`: its text is in the message, and must not be printed twice.
+    #[error("{}: cannot be read: {error}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        error: io::Error,
+    },
+    /// The file's JSON is none.
+    #[error("{}:{line}:{column}: {message}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Counted from 1, in the JSON.
+        line: usize,
+        /// In bytes, counted from 1.
+        column: usize,
+        /// What the parser says.
+        message: String,
+    },
+    /// A byte of a binary file breaks a rule.
+    #[error("{}: byte {offset}: {message}", path.display())]
+    Byte {
+        /// The file.
+        path: PathBuf,
+        /// Counted from 0.
+        offset: u64,
+        /// The value and the rule.
+        message: String,
+    },
+    /// A value of the JSON, or what it stands for, breaks a rule.
+    #[error("{}: {key}: {message}", path.display())]
+    Key {
+        /// The file.
+        path: PathBuf,
+        /// The way to the value: `accessors[3].count`.
+        key: String,
+        /// The value and the rule.
+        message: String,
+    },
+    /// The file does not have the chosen scene, animation or variant.
+    #[error("{}: {key}: {message}", path.display())]
+    Choice {
+        /// The file.
+        path: PathBuf,
+        /// The list: `scenes`, `animations` or `variants`.
+        key: &'static str,
+        /// The name of the option: `gltf_scene`, `animation`, `variant` or `time`.
+        option: &'static str,
+        /// The choice, and what the file has.
+        message: String,
+    },
+    /// The file as a whole breaks a rule.
+    #[error("{}: {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The value and the rule.
+        message: String,
+    },
+}
+
+impl GltfError {
+    /// Where it is.
+    pub(crate) fn place(&self) -> ErrorPlace {
+        let mut place = ErrorPlace::default();
+        let path = match self {
+            GltfError::Syntax { path, line, column, .. } => {
+                (place.line, place.column) = (Some(*line), Some(*column));
+                path
+            }
+            GltfError::Key { path, key, .. } => {
+                place.key = Some(key.clone());
+                path
+            }
+            GltfError::Choice { path, key, .. } => {
+                place.key = Some((*key).to_owned());
+                path
+            }
+            GltfError::Read { path, .. } | GltfError::Byte { path, .. } | GltfError::File { path, .. } => path,
+        };
+        place.file = Some(path.display().to_string());
+        place
+    }
+
+    /// Returns the error with another path to the same file.
+    pub(crate) fn at(mut self, other: &Path) -> GltfError {
+        match &mut self {
+            GltfError::Read { path, .. }
+            | GltfError::Syntax { path, .. }
+            | GltfError::Byte { path, .. }
+            | GltfError::Key { path, .. }
+            | GltfError::Choice { path, .. }
+            | GltfError::File { path, .. } => *path = other.to_owned(),
+        }
+        self
+    }
+}
+
+/// An error before it knows its file.
+#[derive(Debug)]
+pub(super) struct Fault {
+    pub place: Place,
+    pub message: String,
+}
+
+/// A place in a file.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// All of it.
+    File,
+    /// A line and a column of the JSON, counted from 1.
+    Line(usize, usize),
+    /// A byte, counted from 0.
+    Byte(u64),
+    /// A value of the JSON.
+    Key(String),
+}
+
+/// The longest message and the longest key, in characters: what a file says may be in them.
+const LONGEST: usize = 1000;
+
+impl Fault {
+    pub fn new(place: Place, message: impl Into<String>) -> Fault {
+        Fault {
+            place,
+            message: cut(message.into()),
+        }
+    }
+
+    /// A fault of a value of the JSON.
+    pub fn key(key: impl Into<String>, message: impl Into<String>) -> Fault {
+        Fault::new(Place::Key(cut(key.into())), message)
+    }
+
+    /// A fault of the whole file.
+    pub fn file(message: impl Into<String>) -> Fault {
+        Fault::new(Place::File, message)
+    }
+
+    pub fn of(self, path: &Path) -> GltfError {
+        let (path, message) = (path.to_owned(), self.message);
+        match self.place {
+            Place::File => GltfError::File { path, message },
+            Place::Line(line, column) => GltfError::Syntax {
+                path,
+                line,
+                column,
+                message,
+            },
+            Place::Byte(offset) => GltfError::Byte { path, offset, message },
+            Place::Key(key) => GltfError::Key { path, key, message },
+        }
+    }
+}
+
+/// A text without its middle where it is long.
+fn cut(text: String) -> String {
+    let count = text.chars().count();
+    if count <= LONGEST {
+        return text;
+    }
+    let start: String = text.chars().take(LONGEST * 2 / 3).collect();
+    let end: String = text.chars().skip(count - LONGEST / 4).collect();
+    format!("{start}...{end}")
+}
+
+/// What the JSON library says of a value of the wrong type, in words of the file.
+pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
+    let message = message.to_string();
+    if let Some((name, _)) = message
+        .strip_prefix("missing field `")
+        .and_then(|rest| rest.split_once('`'))
+    {
+        return format!("{} is required", shown(name));
+    }
+    let starts = ["invalid type: ", "invalid value: ", "invalid length "];
+    let Some((start, rest)) = starts
+        .iter()
+        .find_map(|start| Some((*start, message.strip_prefix(start)?)))
+    else {
+        return message.replace('`', "\"");
+    };
+    // What the file has may have these words too.
+    let Some((found, wanted)) = rest.rsplit_once(", expected ") else {
+        return rest.replace('`', "\"");
+    };
+    let found = match found {
+        "map" => "an object".to_owned(),
+        "sequence" => "a list".to_owned(),
+        "null" | "unit value" => "null".to_owned(),
+        count if start == "invalid length " => format!("a list of {count}"),
+        _ => match (found.strip_prefix("string "), found.split_once('`')) {
+            // It is quoted as it should be.
+            (Some(text), _) if text.chars().count() <= 60 => text.to_owned(),
+            (Some(text), _) => shown(text.trim_matches('"')),
+            (None, Some((_, number))) => number.trim_end_matches('`').to_owned(),
+            (None, None) => found.to_owned(),
+        },
+    };
+    let digits: String = wanted.chars().filter(char::is_ascii_digit).collect();
+    let wanted = match wanted {
+        "f32" | "f64" => "a number".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a non-negative integer".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a string" | "a borrowed string" | "string" => "a string".to_owned(),
+        _ if wanted.starts_with("index into ") => "an index".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        "a map" | "map" => "an object".to_owned(),
+        _ if wanted.starts_with("struct ") => "an object".to_owned(),
+        _ if wanted.starts_with("an array of length ") || wanted.starts_with("a tuple of size ") => {
+            format!("a list of {digits}")
+        }
+        other => other.to_owned(),
+    };
+    format!("expected {wanted}, found {found}")
+}
+
+/// A name that a file gives, for a message: quoted, without its middle where it is long.
+pub(super) fn shown(name: &str) -> String {
+    const LONGEST: usize = 60;
+    let count = name.chars().count();
+    if count <= LONGEST {
+        return format!("{name:?}");
+    }
+    let start: String = name.chars().take(LONGEST * 2 / 3).collect();
+    let end: String = name.chars().skip(count - LONGEST / 4).collect();
+    format!("{:?}", format!("{start}...{end}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::plain;
+
+    #[test]
+    fn wrong_types_are_told_in_words_of_the_file() {
+        #[derive(serde::Deserialize, Debug)]
+        #[expect(dead_code, reason = "it is for its errors")]
+        struct View {
+            name: String,
+            length: u32,
+            place: [f32; 3],
+            list: Vec<f32>,
+            is_on: bool,
+        }
+        let good = json!({ "name": "a", "length": 1, "place": [1, 2, 3], "list": [1], "is_on": true });
+        serde_json::from_value::<View>(good.clone()).unwrap();
+        for (key, value, told) in [
+            ("name", json!(3), "expected a string, found 3"),
+            (
+                "length",
+                json!("\u{1b}[31m"),
+                "expected a non-negative integer, found \"\\u{1b}[31m\"",
+            ),
+            ("length", json!(-1), "expected a non-negative integer, found -1"),
+            ("length", json!(1.5), "expected a non-negative integer, found 1.5"),
+            ("length", json!({}), "expected a non-negative integer, found an object"),
+            ("place", json!([1, 2]), "expected a list of 3, found a list of 2"),
+            ("place", json!({}), "expected a list of 3, found an object"),
+            ("list", json!(null), "expected a list, found null"),
+            (
+                "list",
+                json!(["x, expected y"]),
+                "expected a number, found \"x, expected y\"",
+            ),
+            ("is_on", json!(0), "expected true or false, found 0"),
+        ] {
+            let mut bad = good.clone();
+            bad[key] = value;
+            let error = serde_json::from_value::<View>(bad).unwrap_err();
+            assert_eq!(plain(&error), told, "{error}");
+        }
+        for (value, told) in [
+            (json!([1, 2, 3]), "expected a string, found 1"),
+            (json!([]), "expected an object, found a list of 0"),
+            (json!("x"), "expected an object, found \"x\""),
+            (json!({}), "\"name\" is required"),
+        ] {
+            let error = serde_json::from_value::<View>(value).unwrap_err();
+            assert!(plain(&error).starts_with(told), "{error}");
+        }
+    }
+}

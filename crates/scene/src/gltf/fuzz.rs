@@ -1,0 +1,124 @@
+//! Files with everything in them, changed at random: what is read of them is sound, or there is a message.
+
+use std::collections::BTreeSet;
+
+use super::changed::changed;
+use super::everything::everything;
+use super::{Choice, Imported, import};
+use crate::Selection;
+use crate::gltf::made::container;
+
+/// Random numbers: Marsaglia, "Xorshift RNGs", 2003, of 64 bits, the higher half of each.
+struct Random(u64);
+
+impl Random {
+    fn word(&mut self) -> u32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 32) as u32
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        self.word() as usize % count
+    }
+}
+
+/// What everything behind the importer relies on.
+fn check(imported: &Imported) {
+    let all_flat = |note: &String| note.ends_with("their scale is zero");
+    assert!(!imported.instances.is_empty() || imported.notes.iter().any(all_flat));
+    for mesh in &imported.meshes {
+        let count = mesh.positions.len();
+        assert!(mesh.center.is_finite() && mesh.positions.iter().all(|p| p.is_finite()));
+        assert!(mesh.triangles.iter().flatten().all(|vertex| (*vertex as usize) < count));
+        let fits = |length: usize| length == 0 || length == count;
+        assert!(
+            fits(mesh.normals.len()) && fits(mesh.uvs.len()) && fits(mesh.colors.len()) && fits(mesh.tangents.len())
+        );
+        assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-3));
+        let mut sets = std::iter::once(&mesh.uvs).chain(&mesh.more_uvs);
+        assert!(sets.all(|uvs| fits(uvs.len()) && uvs.iter().all(|uv| uv.is_finite())));
+        let inside = |x: &f32| (0.0..=1.0).contains(x);
+        assert!(mesh.colors.iter().all(|color| color.to_array().iter().all(inside)));
+        assert!(
+            mesh.tangents
+                .iter()
+                .all(|tangent| tangent.is_finite() && tangent.length() < 1.5)
+        );
+    }
+    for placed in &imported.instances {
+        assert!(placed.to_world.is_finite() && placed.mesh < imported.meshes.len());
+        assert!(
+            placed
+                .materials
+                .iter()
+                .all(|material| *material < imported.materials.len())
+        );
+    }
+}
+
+/// Reads a file in each way; how often there was something.
+fn read(bytes: &[u8], path: &std::path::Path) -> usize {
+    std::fs::write(path, bytes).unwrap();
+    let root = path.parent().unwrap();
+    let none = Choice {
+        scene: None,
+        time: None,
+        animation: None,
+        variant: None,
+    };
+    let all = Choice {
+        time: Some(0.7),
+        animation: Some(Selection::Number(0)),
+        variant: Some(Selection::Number(1)),
+        scene: None,
+    };
+    let choices = [none, all];
+    let read = choices
+        .iter()
+        .filter_map(|choice| import(path, root, choice, &mut BTreeSet::new()).ok());
+    read.inspect(check).count()
+}
+
+#[test]
+fn changed_files_are_read_or_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    let (json, binary) = everything();
+    assert_eq!(read(&container(&json, &binary), &path), 2);
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let (mut good, mut bad, mut scenes) = (0, 0, 0);
+    let rounds = std::env::var("WGRAY_TEST_ROUNDS")
+        .ok()
+        .and_then(|rounds| rounds.parse().ok())
+        .unwrap_or(1500);
+    for round in 0..rounds {
+        let (mut json, mut binary) = (json.clone(), binary.clone());
+        for _ in 0..random.below(3) {
+            changed(&mut json, &mut |count| random.below(count));
+        }
+        for _ in 0..random.below(3) {
+            let at = random.below(binary.len() / 4) * 4;
+            let words = [f32::NAN, f32::INFINITY, -3e38, 1e-40, 1e9, 0.0].map(f32::to_bits);
+            let word = match random.below(8) {
+                i @ 0..6 => words[i],
+                _ => random.word(),
+            };
+            binary[at..at + 4].copy_from_slice(&word.to_le_bytes());
+        }
+        match read(&container(&json, &binary), &path) {
+            0 => bad += 1,
+            _ => good += 1,
+        }
+        // The whole way to a scene, at times.
+        if round % 8 == 0 {
+            scenes += usize::from(crate::Scene::load(&path).is_ok());
+        }
+    }
+    // All happen often.
+    assert!(
+        good * 5 > rounds && bad * 10 > rounds && scenes * 50 > rounds,
+        "{good} {bad} {scenes}"
+    );
+}

@@ -1,0 +1,639 @@
+//! Materials: section 3.9 and the extensions KHR_materials_*, as materials of type `principled`, whose parameters have their names.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use ::gltf::json::material::AlphaMode as JsonAlphaMode;
+use ::gltf::json::mesh::Primitive;
+use ::gltf::json::validation::Checked;
+use serde_json::{Map, Value};
+
+use super::ImportedMaterial;
+use super::document::Document;
+use super::error::GltfError;
+use super::light::note;
+use super::texture::{Slot, has_alpha};
+use crate::{
+    AlphaMode, Channel, ColorDescription, Encoding, NormalMapDescription, PrincipledDescription, TextureDescription,
+    TextureReference, ValueDescription, VertexColors,
+};
+
+/// The images of all materials by their names.
+#[derive(Default)]
+pub struct Images {
+    /// Their files.
+    pub read: BTreeMap<String, Arc<[u8]>>,
+    /// Why there is no file.
+    pub absent: BTreeMap<String, String>,
+}
+
+/// A material's textures by their names.
+type Textures = BTreeMap<String, TextureDescription>;
+
+/// The largest radiance of a surface of a scene.
+const BRIGHTEST: f64 = 1e6;
+/// The longest name of a material, in characters: every instance has it.
+const LONGEST_NAME: usize = 200;
+/// Indices of refraction of a scene.
+const IORS: (f64, f64) = (1.0, 100.0);
+
+/// The materials that are in use.
+pub struct Materials<'a> {
+    document: &'a Document,
+    variant: Option<usize>,
+    /// By their number in the file; None for what has none.
+    numbers: BTreeMap<Option<usize>, usize>,
+    used: Vec<Used>,
+}
+
+/// A material in use.
+pub struct Used {
+    /// Its number in the file.
+    index: Option<usize>,
+    /// Whether any mesh with colours has it.
+    is_colored: bool,
+    /// The sets of texture coordinates that it needs.
+    pub sets: BTreeSet<u32>,
+    /// Where its normals are bent, or its facets have a direction: the texture of that.
+    pub tangents: Option<Slot>,
+}
+
+impl<'a> Materials<'a> {
+    pub fn of(document: &'a Document, variant: Option<usize>) -> Materials<'a> {
+        Materials {
+            document,
+            variant,
+            numbers: BTreeMap::new(),
+            used: Vec::new(),
+        }
+    }
+
+    /// The number of a primitive's material, which is in use from here on.
+    pub fn number(&mut self, primitive: &Primitive, place: &str, is_colored: bool) -> Result<usize, GltfError> {
+        let index = self.index(primitive);
+        let count = self.document.json.materials.len();
+        if let Some(index) = index
+            && index >= count
+        {
+            let rule = format!("{index} is out of range; the file has {count} materials");
+            return Err(self.document.fault(format!("{place}.material"), rule));
+        }
+        let number = match self.numbers.get(&index) {
+            Some(number) => *number,
+            None => {
+                self.used.push(Used::of(self.document, index)?);
+                self.numbers.insert(index, self.used.len() - 1);
+                self.used.len() - 1
+            }
+        };
+        self.used[number].is_colored |= is_colored;
+        Ok(number)
+    }
+
+    /// A material in use.
+    pub fn get(&self, number: usize) -> &Used {
+        &self.used[number]
+    }
+
+    /// A primitive's material in the file: that of the variant, if it has one.
+    fn index(&self, primitive: &Primitive) -> Option<usize> {
+        let extension = || primitive.extensions.as_ref()?.others.get("KHR_materials_variants");
+        let mappings = || extension()?.get("mappings")?.as_array();
+        let is_of = |mapping: &&Value, variant: usize| {
+            let variants = mapping.get("variants").and_then(Value::as_array);
+            variants.is_some_and(|all| all.iter().any(|of| of.as_u64() == Some(variant as u64)))
+        };
+        let varied = self.variant.and_then(|variant| {
+            let mapping = mappings()?.iter().find(|mapping| is_of(mapping, variant))?;
+            usize::try_from(mapping.get("material")?.as_u64()?).ok()
+        });
+        varied.or(primitive.material.map(|material| material.value()))
+    }
+
+    /// The materials as a scene has them, and the images that they need.
+    pub fn finish(self, notes: &mut Vec<String>) -> Result<(Vec<ImportedMaterial>, Images), GltfError> {
+        let mut images = Images::default();
+        let mut names = BTreeSet::new();
+        // The number that is tried next for each name.
+        let mut next: BTreeMap<String, usize> = BTreeMap::new();
+        let mut materials = Vec::with_capacity(self.used.len());
+        for used in &self.used {
+            let mut name = match used.index {
+                None => "default".to_owned(),
+                Some(i) => (self.document.json.materials[i].name.clone()).unwrap_or_else(|| format!("material {i}")),
+            };
+            if let Some((end, _)) = name.char_indices().nth(LONGEST_NAME) {
+                name.truncate(end);
+            }
+            let plain = name.clone();
+            while !names.insert(name.clone()) {
+                let number = next.entry(plain.clone()).or_insert(2);
+                name = format!("{plain} ({number})");
+                *number += 1;
+            }
+            let mut maker = Maker {
+                document: self.document,
+                place: String::new(),
+                name: name.clone(),
+                textures: Textures::new(),
+                images: &mut images,
+                notes,
+            };
+            let description = match used.index {
+                None => PrincipledDescription::default(),
+                Some(index) => maker.material(index, used.is_colored)?,
+            };
+            let description = match (used.index, used.is_colored) {
+                (None, true) => PrincipledDescription {
+                    vertex_colors: VertexColors::BaseColor,
+                    ..description
+                },
+                _ => description,
+            };
+            let textures = maker.textures;
+            materials.push(ImportedMaterial {
+                name,
+                description: description.into(),
+                textures,
+            });
+        }
+        Ok((materials, images))
+    }
+}
+
+/// What a texture of an extension is called there, and whether it bends normals or turns facets.
+const EXTENSION_TEXTURES: [(&str, &str); 14] = [
+    ("KHR_materials_transmission", "transmissionTexture"),
+    ("KHR_materials_specular", "specularTexture"),
+    ("KHR_materials_specular", "specularColorTexture"),
+    ("KHR_materials_clearcoat", "clearcoatTexture"),
+    ("KHR_materials_clearcoat", "clearcoatRoughnessTexture"),
+    ("KHR_materials_clearcoat", "clearcoatNormalTexture"),
+    ("KHR_materials_sheen", "sheenColorTexture"),
+    ("KHR_materials_sheen", "sheenRoughnessTexture"),
+    ("KHR_materials_anisotropy", "anisotropyTexture"),
+    ("KHR_materials_iridescence", "iridescenceTexture"),
+    ("KHR_materials_iridescence", "iridescenceThicknessTexture"),
+    ("KHR_materials_pbrSpecularGlossiness", "diffuseTexture"),
+    ("KHR_materials_pbrSpecularGlossiness", "specularGlossinessTexture"),
+    ("KHR_materials_volume", "thicknessTexture"),
+];
+
+impl Used {
+    fn of(document: &Document, index: Option<usize>) -> Result<Used, GltfError> {
+        let mut used = Used {
+            index,
+            is_colored: false,
+            sets: BTreeSet::new(),
+            tangents: None,
+        };
+        let Some(index) = index else {
+            return Ok(used);
+        };
+        let material = &document.json.materials[index];
+        let place = format!("materials[{index}]");
+        let pbr = &material.pbr_metallic_roughness;
+        let infos = [
+            pbr.base_color_texture.as_ref(),
+            pbr.metallic_roughness_texture.as_ref(),
+            material.emissive_texture.as_ref(),
+        ];
+        for info in infos.into_iter().flatten() {
+            let others = info.extensions.as_ref().map(|all| &all.others);
+            let slot = Slot::new(document, &place, (info.index.value(), info.tex_coord), others)?;
+            used.sets.insert(slot.set);
+        }
+        let others = material.extensions.as_ref().map(|all| &all.others);
+        let extension = |name: &str| others.and_then(|all| all.get(name));
+        for (extension, texture) in EXTENSION_TEXTURES.map(|(name, texture)| (extension(name), texture)) {
+            if let Some(value) = extension.and_then(|extension| extension.get(texture)) {
+                let (slot, _) = Slot::of_value(document, &format!("{place}.{texture}"), value)?;
+                used.sets.insert(slot.set);
+                if ["clearcoatNormalTexture", "anisotropyTexture"].contains(&texture) {
+                    used.tangents = Some(slot);
+                }
+            }
+        }
+        let strength = extension("KHR_materials_anisotropy").and_then(|of| of.get("anisotropyStrength")?.as_f64());
+        if used.tangents.is_none() && strength.is_some_and(|strength| strength != 0.0) {
+            used.sets.insert(0);
+            used.tangents = Some(Slot {
+                texture: 0,
+                set: 0,
+                transform: Default::default(),
+            });
+        }
+        if let Some(normal) = &material.normal_texture {
+            let others = normal.extensions.as_ref().map(|all| &all.others);
+            let slot = Slot::new(document, &place, (normal.index.value(), normal.tex_coord), others)?;
+            used.sets.insert(slot.set);
+            used.tangents = Some(slot);
+        }
+        Ok(used)
+    }
+}
+
+/// Makes one material.
+struct Maker<'a> {
+    document: &'a Document,
+    /// Where in the file it is.
+    place: String,
+    name: String,
+    textures: Textures,
+    images: &'a mut Images,
+    notes: &'a mut Vec<String>,
+}
+
+/// A channel that textures of materials have their numbers in.
+const R: Channel = Channel::R;
+const G: Channel = Channel::G;
+const B: Channel = Channel::B;
+const A: Channel = Channel::A;
+
+impl Maker<'_> {
+    fn material(&mut self, index: usize, is_colored: bool) -> Result<PrincipledDescription, GltfError> {
+        self.place = format!("materials[{index}]");
+        let json = &self.document.json.materials[index];
+        let others = json.extensions.as_ref().map(|all| &all.others);
+        let extension = |name: &str| others.and_then(|all| all.get(name)).and_then(Value::as_object);
+        let pbr = &json.pbr_metallic_roughness;
+        let mut of = PrincipledDescription {
+            double_sided: json.double_sided,
+            vertex_colors: if is_colored {
+                VertexColors::BaseColor
+            } else {
+                VertexColors::None
+            },
+            ..PrincipledDescription::default()
+        };
+        let [r, g, b, a] = pbr.base_color_factor.0.map(f64::from);
+        let mut base = (
+            self.shares("baseColorFactor", [r, g, b])?,
+            self.share("baseColorFactor", a)?,
+        );
+        let mut base_texture = (pbr.base_color_texture.as_ref())
+            .map(|info| {
+                let others = info.extensions.as_ref().map(|all| &all.others);
+                Slot::new(self.document, &self.place, (info.index.value(), info.tex_coord), others)
+            })
+            .transpose()?;
+        let metal = self.share("metallicFactor", pbr.metallic_factor.0.into())?;
+        let rough = self.share("roughnessFactor", pbr.roughness_factor.0.into())?;
+        match &pbr.metallic_roughness_texture {
+            None => (of.metallic, of.roughness) = (metal.into(), rough.into()),
+            Some(info) => {
+                let others = info.extensions.as_ref().map(|all| &all.others);
+                let slot = Slot::new(self.document, &self.place, (info.index.value(), info.tex_coord), others)?;
+                let name = self.texture(&slot, Encoding::Linear, [1.0, rough, metal, 1.0])?;
+                of.metallic = ValueDescription::channel(&name, B);
+                of.roughness = ValueDescription::channel(&name, G);
+            }
+        }
+        if let Some(normal) = &json.normal_texture {
+            let others = normal.extensions.as_ref().map(|all| &all.others);
+            let slot = Slot::new(
+                self.document,
+                &self.place,
+                (normal.index.value(), normal.tex_coord),
+                others,
+            )?;
+            of.normal_map = Some(self.normal_map(&slot, normal.scale.into())?);
+        }
+        if json.occlusion_texture.is_some() {
+            let rule = "occlusion textures are ignored: the path tracer computes occlusion";
+            note(self.notes, rule.to_owned());
+        }
+        let strength = extension("KHR_materials_emissive_strength").and_then(|of| of.get("emissiveStrength")?.as_f64());
+        let emission = json.emissive_factor.0.map(|x| f64::from(x) * strength.unwrap_or(1.0));
+        if emission != [0.0; 3] {
+            let slot = (json.emissive_texture.as_ref())
+                .map(|info| {
+                    let others = info.extensions.as_ref().map(|all| &all.others);
+                    Slot::new(self.document, &self.place, (info.index.value(), info.tex_coord), others)
+                })
+                .transpose()?;
+            let emission = self.colors("emissiveFactor times emissiveStrength", emission, BRIGHTEST)?;
+            of.emission = Some(self.color(slot.as_ref(), emission)?);
+        }
+        if let Some(ior) = extension("KHR_materials_ior") {
+            self.ior(self.number(ior, "ior", 1.5)?, &mut of)?;
+        }
+        if let Some(all) = extension("KHR_materials_transmission") {
+            of.transmission = self.value(all, "transmissionFactor", 0.0, "transmissionTexture", R)?;
+        }
+        if let Some(all) = extension("KHR_materials_volume") {
+            self.volume(all, &mut of)?;
+        }
+        if let Some(all) = extension("KHR_materials_specular") {
+            of.specular = self.value(all, "specularFactor", 1.0, "specularTexture", A)?;
+            let factor = self.triple(all, "specularColorFactor", [1.0; 3])?;
+            let factor = self.colors("specularColorFactor", factor, BRIGHTEST)?;
+            of.specular_color = self.extension_color(all, factor, "specularColorTexture")?;
+        }
+        if let Some(all) = extension("KHR_materials_clearcoat") {
+            of.clearcoat = self.value(all, "clearcoatFactor", 0.0, "clearcoatTexture", R)?;
+            of.clearcoat_roughness =
+                self.value(all, "clearcoatRoughnessFactor", 0.0, "clearcoatRoughnessTexture", G)?;
+            if let Some(map) = all.get("clearcoatNormalTexture") {
+                let (slot, scale) = Slot::of_value(self.document, &self.place, map)?;
+                of.clearcoat_normal_map = Some(self.normal_map(&slot, scale)?);
+            }
+        }
+        if let Some(all) = extension("KHR_materials_sheen") {
+            let factor = self.triple(all, "sheenColorFactor", [0.0; 3])?;
+            let factor = self.shares("sheenColorFactor", factor)?;
+            of.sheen_color = self.extension_color(all, factor, "sheenColorTexture")?;
+            of.sheen_roughness = self.value(all, "sheenRoughnessFactor", 0.0, "sheenRoughnessTexture", A)?;
+        }
+        if let Some(all) = extension("KHR_materials_anisotropy") {
+            self.anisotropy(all, &mut of)?;
+        }
+        if let Some(all) = extension("KHR_materials_pbrSpecularGlossiness") {
+            (base, base_texture) = self.specular_glossiness(all, &mut of)?;
+        }
+        let ([r, g, b], a) = base;
+        let name = (base_texture.as_ref())
+            .map(|slot| self.texture(slot, Encoding::Srgb, [r, g, b, a]))
+            .transpose()?;
+        of.base_color = match &name {
+            None => ColorDescription::Plain([r, g, b].into()),
+            Some(name) => ColorDescription::texture(name),
+        };
+        let is_veiled = match &base_texture {
+            None => false,
+            Some(slot) => self.has_alpha(slot)?,
+        };
+        of.alpha_mode = match json.alpha_mode {
+            Checked::Valid(JsonAlphaMode::Mask) => AlphaMode::Mask,
+            Checked::Valid(JsonAlphaMode::Blend) => AlphaMode::Blend,
+            _ => AlphaMode::Opaque,
+        };
+        if of.alpha_mode == AlphaMode::Blend && a == 1.0 && !is_veiled && !is_colored {
+            of.alpha_mode = AlphaMode::Opaque; // as exporters write it of what is opaque
+        }
+        if of.alpha_mode != AlphaMode::Opaque {
+            of.alpha = match name {
+                Some(name) if is_veiled => ValueDescription::channel(name, A),
+                _ => a.into(),
+            };
+            let cutoff = json.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0.into());
+            if cutoff > 1.0 {
+                // Nothing of it is there.
+                of.alpha = 0.0.into();
+            }
+            of.alpha_cutoff = f64::clamp(cutoff, 0.0, 1.0);
+        }
+        if extension("KHR_materials_unlit").is_some() {
+            return Ok(self.unlit(of));
+        }
+        Ok(of)
+    }
+
+    /// What is seen in its colour whatever light falls on it: KHR_materials_unlit.
+    fn unlit(&mut self, of: PrincipledDescription) -> PrincipledDescription {
+        PrincipledDescription {
+            emission: Some(of.base_color),
+            base_color: [0.0; 3].into(),
+            metallic: 0.0.into(),
+            roughness: 1.0.into(),
+            specular: 0.0.into(),
+            alpha: of.alpha,
+            alpha_mode: of.alpha_mode,
+            alpha_cutoff: of.alpha_cutoff,
+            double_sided: of.double_sided,
+            vertex_colors: match of.vertex_colors {
+                VertexColors::None => VertexColors::None,
+                _ => VertexColors::Emission,
+            },
+            ..PrincipledDescription::default()
+        }
+    }
+
+    fn ior(&mut self, ior: f64, of: &mut PrincipledDescription) -> Result<(), GltfError> {
+        if ior == 0.0 {
+            // By the extension, what is 0 reflects all that comes.
+            of.ior = IORS.1;
+            of.specular_color = [(101.0_f64 / 99.0).powi(2); 3].into();
+            return Ok(());
+        }
+        of.ior = ior.clamp(IORS.0, IORS.1);
+        if of.ior != ior {
+            let rule = format!(
+                "ior: {ior} must be 0 or from {} to {}; {} stands for it",
+                IORS.0, IORS.1, of.ior
+            );
+            note(self.notes, format!("{}: {rule}", self.told()));
+        }
+        Ok(())
+    }
+
+    /// KHR_materials_volume. How thick it is is found by tracing; that it is not 0 makes it a volume.
+    fn volume(&mut self, all: &Map<String, Value>, of: &mut PrincipledDescription) -> Result<(), GltfError> {
+        let thickness = self.number(all, "thicknessFactor", 0.0)?;
+        let color = self.triple(all, "attenuationColor", [1.0; 3])?;
+        let color = self.shares("attenuationColor", color)?;
+        let distance = self.number(all, "attenuationDistance", f64::INFINITY)?;
+        if thickness <= 0.0 {
+            return Ok(()); // a thin sheet
+        }
+        of.thickness = thickness.min(1e9);
+        of.double_sided = true; // by the extension: what has an inside is seen from there
+        if color != [1.0; 3] && distance.is_finite() && distance > 0.0 {
+            of.attenuation_color = color.into();
+            of.attenuation_distance = Some(distance.clamp(1e-6, 1e9));
+        }
+        Ok(())
+    }
+
+    fn anisotropy(&mut self, all: &Map<String, Value>, of: &mut PrincipledDescription) -> Result<(), GltfError> {
+        let strength = self.share("anisotropyStrength", self.number(all, "anisotropyStrength", 0.0)?)?;
+        of.anisotropy = strength.into();
+        of.anisotropy_rotation = self.number(all, "anisotropyRotation", 0.0)?.to_degrees() % 360.0;
+        if let Some(texture) = all.get("anisotropyTexture") {
+            let (slot, _) = Slot::of_value(self.document, &self.place, texture)?;
+            let name = self.texture(&slot, Encoding::Linear, [1.0, 1.0, strength, 1.0])?;
+            of.anisotropy = ValueDescription::channel(&name, B);
+            of.anisotropy_direction = Some(TextureReference { texture: name });
+        }
+        Ok(())
+    }
+
+    /// KHR_materials_pbrSpecularGlossiness, which older files have: its diffuse colour, and what stands for its gloss.
+    #[allow(clippy::type_complexity, reason = "the two are taken apart at once")]
+    fn specular_glossiness(
+        &mut self,
+        all: &Map<String, Value>,
+        of: &mut PrincipledDescription,
+    ) -> Result<(([f64; 3], f64), Option<Slot>), GltfError> {
+        let factor: [f64; 4] = self.numbers(all, "diffuseFactor", [1.0; 4])?;
+        let [r, g, b, a] = factor;
+        let base = (
+            self.shares("diffuseFactor", [r, g, b])?,
+            self.share("diffuseFactor", a)?,
+        );
+        let specular = self.triple(all, "specularFactor", [1.0; 3])?;
+        let specular = self.shares("specularFactor", specular)?;
+        let gloss = self.share("glossinessFactor", self.number(all, "glossinessFactor", 1.0)?)?;
+        of.metallic = 0.0.into();
+        of.roughness = (1.0 - gloss).into();
+        // An index of refraction of 1.5 reflects 0.04.
+        of.specular_color = specular.map(|x| x / 0.04).into();
+        if let Some(texture) = all.get("specularGlossinessTexture") {
+            let (slot, _) = Slot::of_value(self.document, &self.place, texture)?;
+            let [r, g, b] = specular.map(|x| x / 0.04);
+            let name = self.texture(&slot, Encoding::Srgb, [r, g, b, 1.0])?;
+            of.specular_color = ColorDescription::texture(name);
+            let rule = "KHR_materials_pbrSpecularGlossiness: the glossiness of its textures is ignored";
+            note(self.notes, rule.to_owned());
+        }
+        let slot = (all.get("diffuseTexture"))
+            .map(|texture| Slot::of_value(self.document, &self.place, texture))
+            .transpose()?;
+        Ok((base, slot.map(|(slot, _)| slot)))
+    }
+
+    /// A number from 0 to 1 of an extension, from a texture's channel too.
+    fn value(
+        &mut self,
+        all: &Map<String, Value>,
+        factor: &str,
+        default: f64,
+        texture: &str,
+        channel: Channel,
+    ) -> Result<ValueDescription, GltfError> {
+        let plain = self.share(factor, self.number(all, factor, default)?)?;
+        let Some(texture) = all.get(texture) else {
+            return Ok(plain.into());
+        };
+        let (slot, _) = Slot::of_value(self.document, &self.place, texture)?;
+        if plain == 0.0 || channel == A && !self.has_alpha(&slot)? {
+            return Ok(plain.into());
+        }
+        let name = self.texture(&slot, Encoding::Linear, [plain; 4])?;
+        Ok(ValueDescription::channel(name, channel))
+    }
+
+    fn extension_color(
+        &mut self,
+        all: &Map<String, Value>,
+        factor: [f64; 3],
+        texture: &str,
+    ) -> Result<ColorDescription, GltfError> {
+        let slot = (all.get(texture))
+            .map(|texture| Slot::of_value(self.document, &self.place, texture))
+            .transpose()?;
+        self.color(slot.map(|(slot, _)| slot).as_ref(), factor)
+    }
+
+    fn color(&mut self, slot: Option<&Slot>, [r, g, b]: [f64; 3]) -> Result<ColorDescription, GltfError> {
+        Ok(match slot {
+            None => ColorDescription::Plain([r, g, b].into()),
+            Some(slot) => ColorDescription::texture(self.texture(slot, Encoding::Srgb, [r, g, b, 1.0])?),
+        })
+    }
+
+    fn normal_map(&mut self, slot: &Slot, scale: f64) -> Result<NormalMapDescription, GltfError> {
+        let strength = scale.clamp(-100.0, 100.0);
+        Ok(NormalMapDescription {
+            texture: self.texture(slot, Encoding::Linear, [1.0; 4])?,
+            strength: if strength.is_nan() { 1.0 } else { strength },
+        })
+    }
+
+    /// The name of the texture of a slot, multiplied by factors.
+    fn texture(&mut self, slot: &Slot, encoding: Encoding, factor: [f64; 4]) -> Result<String, GltfError> {
+        let file = self.image(slot)?;
+        let mut lookup = self.document.lookup(slot, &self.place, &file, encoding)?;
+        lookup.factor = factor;
+        let description = TextureDescription::Image(lookup);
+        let known = self.textures.iter().find(|(_, known)| **known == description);
+        if let Some((name, _)) = known {
+            return Ok(name.clone());
+        }
+        let name = format!("{}/{}", self.name, self.textures.len());
+        self.textures.insert(name.clone(), description);
+        Ok(name)
+    }
+
+    /// The name of the image of a slot, which is read.
+    fn image(&mut self, slot: &Slot) -> Result<String, GltfError> {
+        let image = self.document.image_of(slot.texture)?;
+        let name = format!("images[{image}]");
+        if self.images.read.contains_key(&name) || self.images.absent.contains_key(&name) {
+            return Ok(name);
+        }
+        match self.document.image_bytes(image)? {
+            Ok(bytes) => _ = self.images.read.insert(name.clone(), bytes),
+            Err(why) => _ = self.images.absent.insert(name.clone(), why),
+        }
+        Ok(name)
+    }
+
+    fn has_alpha(&mut self, slot: &Slot) -> Result<bool, GltfError> {
+        let name = self.image(slot)?;
+        Ok(self.images.read.get(&name).is_some_and(|bytes| has_alpha(bytes)))
+    }
+
+    /// Numbers of an extension's list.
+    fn numbers<const N: usize>(
+        &self,
+        all: &Map<String, Value>,
+        key: &str,
+        default: [f64; N],
+    ) -> Result<[f64; N], GltfError> {
+        let Some(value) = all.get(key) else {
+            return Ok(default);
+        };
+        let list = value
+            .as_array()
+            .map(|list| list.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>());
+        let numbers = list.flatten().and_then(|list| <[f64; N]>::try_from(list).ok());
+        let rule = || {
+            self.document
+                .fault(&self.place, format!("{key}: {value} must be a list of {N} numbers"))
+        };
+        numbers.filter(|all| all.iter().all(|x| x.is_finite())).ok_or_else(rule)
+    }
+
+    fn triple(&self, all: &Map<String, Value>, key: &str, default: [f64; 3]) -> Result<[f64; 3], GltfError> {
+        self.numbers(all, key, default)
+    }
+
+    fn number(&self, all: &Map<String, Value>, key: &str, default: f64) -> Result<f64, GltfError> {
+        let Some(value) = all.get(key) else {
+            return Ok(default);
+        };
+        let number = value.as_f64().filter(|x| x.is_finite());
+        number.ok_or_else(|| {
+            self.document
+                .fault(&self.place, format!("{key}: {value} must be a number"))
+        })
+    }
+
+    /// What must be from 0 to 1, moved there.
+    fn share(&mut self, key: &str, x: f64) -> Result<f64, GltfError> {
+        let [x, _, _] = self.colors(key, [x, 0.0, 0.0], 1.0)?;
+        Ok(x)
+    }
+
+    fn shares(&mut self, key: &str, color: [f64; 3]) -> Result<[f64; 3], GltfError> {
+        self.colors(key, color, 1.0)
+    }
+
+    /// What must be from 0 to a limit, moved there.
+    fn colors(&mut self, key: &str, color: [f64; 3], most: f64) -> Result<[f64; 3], GltfError> {
+        if color.iter().any(|x| x.is_nan()) {
+            return Err(self.document.fault(&self.place, format!("{key}: must be finite")));
+        }
+        let inside = color.map(|x| x.clamp(0.0, most));
+        if inside != color {
+            let rule = format!("{key} must be from 0 to {most}; it is clamped");
+            note(self.notes, format!("{}: {rule}", self.told()));
+        }
+        Ok(inside)
+    }
+
+    fn told(&self) -> String {
+        format!("{} ({:?})", self.place, self.name)
+    }
+}

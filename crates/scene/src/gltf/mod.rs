@@ -1,0 +1,421 @@
+//! glTF 2.0 files: what is in one, as parts of a scene. Coordinates become those of scenes, with +Z up: (x, y, z) becomes
+//! (x, -z, y). Section numbers are those of the
+//! specification (Khronos Group, "glTF 2.0 Specification", 2.0.1; ISO/IEC 12113:2022).
+
+mod accessor;
+mod animation;
+mod budget;
+mod buffer;
+mod camera;
+#[cfg(test)]
+mod changed;
+mod contents;
+mod document;
+mod error;
+#[cfg(test)]
+mod everything;
+mod extension;
+#[cfg(test)]
+mod fuzz;
+mod glb;
+#[cfg(test)]
+mod hostile;
+mod instancing;
+mod json;
+mod light;
+#[cfg(test)]
+mod made;
+mod material;
+mod mesh;
+mod meshopt;
+mod node;
+mod skin;
+mod tangent;
+mod texture;
+mod uri;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::SystemTime;
+
+use glam::{DAffine3, DMat3, DVec3};
+use rayon::prelude::*;
+
+use self::budget::Thing;
+use self::document::Document;
+use self::material::Materials;
+use self::mesh::{Key, Meshes};
+use self::node::{Nodes, Pose};
+use crate::limits::TIMES;
+use crate::mesh::Mesh;
+use crate::{
+    CameraDescription, GltfDescription, LightDescription, MaterialDescription, Problem, Selection, TextureDescription,
+};
+
+pub use self::contents::ModelContents;
+pub use self::error::GltfError;
+
+/// The most instances of meshes, and the most groups of all instances together: each takes more than a kilobyte in a scene.
+const MOST_INSTANCES: usize = 1 << 20;
+
+/// The longest axis of an instance's transform.
+const LONGEST_AXIS: f64 = 1e6;
+
+/// The message about a time of a file without animations.
+const STILL: &str = "the file has no animations";
+
+/// The rotation from the file's coordinates to the scene's: +Y becomes +Z.
+pub const UPRIGHT: DAffine3 = DAffine3 {
+    matrix3: DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
+    translation: DVec3::ZERO,
+};
+
+/// What is taken of a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choice {
+    scene: Option<Selection>,
+    time: Option<f64>,
+    animation: Option<Selection>,
+    variant: Option<Selection>,
+}
+
+impl Choice {
+    /// What a shape says.
+    pub fn of(shape: &GltfDescription) -> Result<Choice, Problem> {
+        if let Some(time) = shape.time
+            && !(TIMES.0..=TIMES.1).contains(&time)
+        {
+            return Err(Problem::of("time", format!("{time} must be from 0 to 1e9 seconds")));
+        }
+        Ok(Choice {
+            scene: shape.scene.clone(),
+            time: shape.time,
+            animation: shape.animation.clone(),
+            variant: shape.variant.clone(),
+        })
+    }
+}
+
+/// What is in a file, with +Z up.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Imported {
+    /// The meshes.
+    pub meshes: Vec<Arc<Mesh>>,
+    /// Their instances.
+    pub instances: Vec<Placed>,
+    /// Image files by the names that textures have for them.
+    pub images: BTreeMap<String, Arc<[u8]>>,
+    /// Why image files are missing, by the names that textures have for them.
+    pub absent: BTreeMap<String, String>,
+    /// The materials.
+    pub materials: Vec<ImportedMaterial>,
+    /// The lights.
+    pub lights: Vec<LightDescription>,
+    /// The cameras.
+    pub cameras: Vec<ImportedCamera>,
+    /// Names of its parts.
+    pub contents: ModelContents,
+    /// How many animations it has.
+    pub animations: usize,
+    /// What a user should know of it.
+    pub notes: Vec<String>,
+    /// Damaged parts.
+    pub damage: Vec<Damage>,
+    /// The files that it is made of.
+    files: BTreeSet<PathBuf>,
+}
+
+/// A damaged part of a file, for which a stand-in is rendered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Damage {
+    /// The place and what is wrong with it.
+    pub what: String,
+    /// What is rendered instead.
+    pub stand_in: &'static str,
+}
+
+/// A mesh in the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// Its number among the meshes.
+    pub mesh: usize,
+    /// The transform from the space of the mesh.
+    pub to_world: DAffine3,
+    /// For each of its groups the number of a material.
+    pub materials: Vec<usize>,
+}
+
+/// A material, and the textures that it names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedMaterial {
+    /// Another one for each.
+    pub name: String,
+    /// Its description.
+    pub description: MaterialDescription,
+    /// The textures, by the names that the description has for them.
+    pub textures: BTreeMap<String, TextureDescription>,
+}
+
+/// A camera in the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedCamera {
+    /// Its name, if it has one.
+    pub name: Option<String>,
+    /// Its description.
+    pub description: CameraDescription,
+    /// Width over height of its picture, if the file says so.
+    pub aspect: Option<f64>,
+}
+
+impl Imported {
+    /// Points such that what holds them holds all that is there: the vertices, or corners of boxes where those are many.
+    pub fn points(&self) -> Vec<DVec3> {
+        const MOST: usize = 1 << 21;
+        let vertices = self
+            .instances
+            .iter()
+            .map(|placed| self.meshes[placed.mesh].positions.len());
+        if vertices.sum::<usize>() > MOST {
+            return self.corners();
+        }
+        let points = self.instances.iter().flat_map(|placed| {
+            let mesh = &self.meshes[placed.mesh];
+            let points = mesh.positions.iter().map(|p| p.as_dvec3() + mesh.center);
+            points.map(|p| placed.to_world.transform_point3(p))
+        });
+        points.collect()
+    }
+
+    /// Corners of boxes around all that is there.
+    fn corners(&self) -> Vec<DVec3> {
+        let corners = self.instances.par_iter().map(|placed| {
+            let corners = self.meshes[placed.mesh].corners();
+            corners
+                .map(|corner| placed.to_world.transform_point3(corner))
+                .collect::<Vec<_>>()
+        });
+        corners.flatten_iter().collect()
+    }
+}
+
+/// Returns the message about a name or number that the file does not have, with those that it has.
+pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String {
+    const MOST: usize = 20;
+    let told = |(i, name): (usize, &Option<&str>)| match name {
+        Some(name) => format!("{i} ({name:?})"),
+        None => i.to_string(),
+    };
+    let mut all: Vec<String> = names.iter().enumerate().take(MOST).map(told).collect();
+    if names.len() > MOST {
+        all.push(format!("{} more", names.len() - MOST));
+    }
+    match all.is_empty() {
+        true => format!("the file has no {what} {wanted}; it has none"),
+        false => format!(
+            "the file has no {what} {wanted}; it has {}: {}",
+            names.len(),
+            all.join(", ")
+        ),
+    }
+}
+
+/// Reads a file, unless it is in use with the same choice and none of its files has changed.
+pub fn load(
+    path: &Path,
+    root: &Path,
+    choice: &Choice,
+    files: &mut BTreeSet<PathBuf>,
+) -> Result<Arc<Imported>, GltfError> {
+    static IN_USE: Mutex<Vec<Known>> = Mutex::new(Vec::new());
+    let same = |known: &Known| known.path == path && known.root == root && known.choice == *choice;
+    {
+        let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+        in_use.retain(|known| known.imported.strong_count() > 0);
+        let known = in_use.iter().find(|known| same(known) && known.is_fresh());
+        if let Some(imported) = known.and_then(|known| known.imported.upgrade()) {
+            files.extend(imported.files.iter().cloned());
+            return Ok(imported);
+        }
+    }
+    let _span = tracing::debug_span!("gltf", path = %path.display()).entered();
+    // The stamp is taken first: a file that changes while it is read is read again.
+    let before = stamp(path);
+    let mut own = BTreeSet::new();
+    let read = import(path, root, choice, &mut own);
+    files.extend(own.iter().cloned());
+    let mut imported = read?;
+    let stamps = own.iter().map(|file| (file.clone(), stamp(file)));
+    let stamps = stamps.chain([(path.to_owned(), before)]).collect();
+    imported.files = own;
+    let imported = Arc::new(imported);
+    let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+    in_use.retain(|known| !same(known));
+    in_use.push(Known {
+        path: path.to_owned(),
+        root: root.to_owned(),
+        choice: choice.clone(),
+        stamps,
+        imported: Arc::downgrade(&imported),
+    });
+    Ok(imported)
+}
+
+/// Length and time of change of a file, if it is there.
+type Stamp = Option<(u64, SystemTime)>;
+
+/// A file that was read.
+struct Known {
+    path: PathBuf,
+    root: PathBuf,
+    choice: Choice,
+    stamps: Vec<(PathBuf, Stamp)>,
+    imported: Weak<Imported>,
+}
+
+impl Known {
+    fn is_fresh(&self) -> bool {
+        self.stamps
+            .iter()
+            .all(|(path, known)| known.is_some() && stamp(path) == *known)
+    }
+}
+
+fn stamp(path: &Path) -> Stamp {
+    let data = fs::metadata(path).ok()?;
+    Some((data.len(), data.modified().ok()?))
+}
+
+/// Reads a file.
+fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBuf>) -> Result<Imported, GltfError> {
+    let document = Document::open(path, root, files)?;
+    let animations = document.animations(choice)?;
+    let mut poses: Vec<Pose> = document.json.nodes.iter().map(Pose::of).collect();
+    let mut notes = Vec::new();
+    for animation in document.compatible(animations, &mut notes) {
+        document.animate(&mut poses, animation, choice.time.unwrap_or(0.0), &mut notes)?;
+    }
+    let nodes = Nodes::of(&document, &poses)?;
+    let shown = nodes.of_scene(&document, document.scene(choice)?)?;
+    let mut placed = Vec::new();
+    let mut numbers: HashMap<Key, usize> = HashMap::new();
+    let mut keys = Vec::new();
+    let (mut flat, mut total) = (0, 0_usize);
+    for &number in &shown {
+        let node = &document.json.nodes[number];
+        let Some(mesh) = node.mesh else { continue };
+        let key = Key::of(&document, number, mesh.value(), &poses[number]);
+        let global = match key.skin {
+            Some(_) => DAffine3::IDENTITY, // a skin has its own place
+            None => nodes.globals[number],
+        };
+        let mut own_key = None;
+        let own_maps = document.instances(number)?;
+        let room = document.budget.take(Thing::Instances, own_maps.len() as u64);
+        room.map_err(|rule| document.fault(format!("nodes[{number}]"), rule))?;
+        for own in own_maps {
+            let to_world = UPRIGHT * global * own;
+            total += 1;
+            if !to_world.is_finite() {
+                flat += 1;
+                continue;
+            }
+            if !is_placeable(&to_world) {
+                let key = key.at(&to_world);
+                let number = *numbers.entry(key.clone()).or_insert_with(|| {
+                    keys.push(key);
+                    keys.len() - 1
+                });
+                placed.push((number, DAffine3::IDENTITY));
+                continue;
+            }
+            let own_key = own_key.get_or_insert_with(|| {
+                *numbers.entry(key.clone()).or_insert_with(|| {
+                    keys.push(key.clone());
+                    keys.len() - 1
+                })
+            });
+            placed.push((*own_key, to_world));
+        }
+    }
+    let mut materials = Materials::of(&document, document.variant(choice)?);
+    let meshes = Meshes::of(&document, &mut materials, keys.iter())?;
+    let built = keys.par_iter().map(|key| meshes.build(key, &nodes, &materials));
+    let built: Vec<Option<mesh::Built>> = built.collect::<Result<_, GltfError>>()?;
+    let mut places = vec![None; keys.len()];
+    let mut imported = Imported {
+        contents: ModelContents::of(&document),
+        animations: document.json.animations.len(),
+        ..Imported::default()
+    };
+    let mut groups = Vec::new();
+    for ((place, built), key) in places.iter_mut().zip(built).zip(&keys) {
+        if let Some(built) = built {
+            *place = Some(imported.meshes.len());
+            let mut mesh = built.mesh;
+            for note in mesh.notes.drain(..) {
+                tracing::debug!(mesh = key.mesh, "{note}"); // meshes are many, and open by their nature
+            }
+            imported.meshes.push(Arc::new(mesh));
+            groups.push(built.materials);
+        }
+    }
+    let mut count = 0;
+    for (key, to_world) in placed {
+        flat += usize::from(places[key].is_none() && keys[key].is_flat());
+        if let Some(mesh) = places[key] {
+            let materials: Vec<usize> = groups[mesh].clone();
+            count += materials.len();
+            if count > MOST_INSTANCES {
+                let rule = format!("all instances of meshes together must have at most {MOST_INSTANCES} primitives");
+                return Err(document.fault("nodes", rule));
+            }
+            imported.instances.push(Placed {
+                mesh,
+                to_world,
+                materials,
+            });
+        }
+    }
+    if flat > 0 {
+        notes.push(format!(
+            "{flat} of {total} instances of meshes are left out: their scale is zero"
+        ));
+    }
+    notes.extend(meshes.notes());
+    imported.damage = meshes.damage();
+    // What is scaled to nothing may be so at this moment of an animation alone.
+    if imported.instances.is_empty() && flat == 0 {
+        return Err(document.fault("scene", meshes.nothing()));
+    }
+    let corners = imported.corners();
+    let first = corners.first().copied().unwrap_or_default();
+    let low = corners.iter().copied().fold(first, DVec3::min);
+    let high = corners.iter().copied().fold(first, DVec3::max);
+    for &number in &shown {
+        imported
+            .lights
+            .extend(document.light(number, &nodes.globals[number], &mut notes)?);
+        imported
+            .cameras
+            .extend(document.camera(number, &nodes.globals[number], (low, high), &mut notes)?);
+    }
+    notes.extend(light::brightness(&imported.lights, (low + high) / 2.0));
+    imported.contents.cameras = imported.cameras.iter().map(|camera| camera.name.clone()).collect();
+    let (materials, images) = materials.finish(&mut notes)?;
+    imported.materials = materials;
+    imported.images = images.read;
+    imported.absent = images.absent;
+    notes.splice(0..0, document.notes.iter().cloned());
+    imported.notes = notes;
+    Ok(imported)
+}
+
+/// Returns whether an instance of a scene may have this transform. Where it may not, the transform is applied to the vertices.
+fn is_placeable(map: &DAffine3) -> bool {
+    let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
+    let lengths = [x, y, z].map(DVec3::length);
+    let volume = x.cross(y).dot(z).abs() / (lengths[0] * lengths[1] * lengths[2]);
+    map.is_finite() && lengths.iter().all(|length| (1e-6..=LONGEST_AXIS).contains(length)) && volume > 1e-6
+}

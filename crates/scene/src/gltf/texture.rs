@@ -1,0 +1,180 @@
+//! Textures: images, how they are looked up, and where. Section 3.8; KHR_texture_basisu, KHR_texture_transform,
+//! EXT_texture_webp.
+
+use std::io::Cursor;
+
+use ::gltf::json::texture::{MagFilter, WrappingMode};
+use ::gltf::json::validation::Checked;
+use image::{ImageDecoder as _, ImageReader};
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+use super::document::Document;
+use super::error::{GltfError, plain};
+use crate::ktx2;
+use crate::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
+
+/// The smallest factor of a texture coordinate, and the largest factor and addend.
+const FACTORS: (f64, f64) = (1e-6, 1e6);
+
+/// The last set of texture coordinates that may be named.
+pub(super) const LAST_SET: u32 = 7;
+
+/// Where a material names a texture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slot {
+    pub texture: usize,
+    /// Which of a mesh's sets of texture coordinates.
+    pub set: u32,
+    pub transform: Transform,
+}
+
+/// KHR_texture_transform.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub struct Transform {
+    offset: [f64; 2],
+    rotation: f64,
+    scale: [f64; 2],
+    tex_coord: Option<u32>,
+}
+
+impl Default for Transform {
+    fn default() -> Self {
+        Transform {
+            offset: [0.0; 2],
+            rotation: 0.0,
+            scale: [1.0; 2],
+            tex_coord: None,
+        }
+    }
+}
+
+/// A texture as an extension names it.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Info {
+    index: usize,
+    #[serde(default)]
+    tex_coord: u32,
+    #[serde(default)]
+    extensions: Map<String, Value>,
+    scale: Option<f64>,
+}
+
+impl Slot {
+    /// What a material of the core specification names.
+    pub fn new(
+        document: &Document,
+        place: &str,
+        (texture, set): (usize, u32),
+        extensions: Option<&Map<String, Value>>,
+    ) -> Result<Slot, GltfError> {
+        let transform = match extensions.and_then(|all| all.get("KHR_texture_transform")) {
+            None => Transform::default(),
+            Some(transform) => {
+                let read = Transform::deserialize(transform);
+                read.map_err(|error| {
+                    document.fault(format!("{place}.extensions.KHR_texture_transform"), plain(&error))
+                })?
+            }
+        };
+        let count = document.json.textures.len();
+        if texture >= count {
+            return Err(document.fault(
+                format!("{place}.index"),
+                format!("{texture} is out of range; the file has {count} textures"),
+            ));
+        }
+        let set = transform.tex_coord.unwrap_or(set);
+        if set > LAST_SET {
+            let rule = format!("{set} must be from 0 to {LAST_SET}");
+            return Err(document.fault(format!("{place}.texCoord"), rule));
+        }
+        Ok(Slot {
+            texture,
+            set,
+            transform,
+        })
+    }
+
+    /// What an extension names, with its `scale` if it is a normal map.
+    pub fn of_value(document: &Document, place: &str, value: &Value) -> Result<(Slot, f64), GltfError> {
+        let info = Info::deserialize(value).map_err(|error| document.fault(place, plain(&error)))?;
+        let slot = Slot::new(document, place, (info.index, info.tex_coord), Some(&info.extensions))?;
+        Ok((slot, info.scale.unwrap_or(1.0)))
+    }
+
+    /// The second row of the linear part of the texture's map, and the sign of its determinant.
+    pub fn second_row(&self) -> ([f64; 2], f64) {
+        let Transform { rotation, scale, .. } = self.transform;
+        let (sin, cos) = rotation.sin_cos();
+        ([sin * scale[0], cos * scale[1]], scale[0] * scale[1])
+    }
+
+    /// Whether it is turned or mirrored.
+    pub fn is_turned(&self) -> bool {
+        let Transform { rotation, scale, .. } = self.transform;
+        rotation != 0.0 || scale.iter().any(|scale| *scale < 0.0)
+    }
+}
+
+impl Document {
+    /// How a texture's image is looked up. An image of glTF has its first row at v = 0, one of a scene at v = 1; so both its
+    /// coordinates and the mesh's are turned upside down.
+    pub(super) fn lookup(
+        &self,
+        slot: &Slot,
+        place: &str,
+        file: &str,
+        encoding: Encoding,
+    ) -> Result<ImageTextureDescription, GltfError> {
+        let texture = &self.json.textures[slot.texture];
+        let sampler = texture
+            .sampler
+            .and_then(|sampler| self.json.samplers.get(sampler.value()));
+        let wrap = |of: Option<&Checked<WrappingMode>>| match of {
+            Some(Checked::Valid(WrappingMode::ClampToEdge)) => Wrap::Clamp,
+            Some(Checked::Valid(WrappingMode::MirroredRepeat)) => Wrap::Mirror,
+            _ => Wrap::Repeat,
+        };
+        let is_coarse = sampler.is_some_and(|of| of.mag_filter == Some(Checked::Valid(MagFilter::Nearest)));
+        let Transform {
+            offset,
+            rotation,
+            scale,
+            ..
+        } = slot.transform;
+        let fine = |x: f64| x.is_finite() && x.abs() <= FACTORS.1;
+        if !(offset.into_iter().chain(scale).all(fine) && rotation.is_finite()) {
+            let rule = "offset, rotation and scale must be finite, offset and scale from -1e6 to 1e6".to_owned();
+            return Err(self.fault(format!("{place}.extensions.KHR_texture_transform"), rule));
+        }
+        let scale = scale.map(|of| if of.abs() < FACTORS.0 { FACTORS.0 } else { of });
+        let (sin, cos) = rotation.sin_cos();
+        Ok(ImageTextureDescription {
+            encoding: Some(encoding),
+            wrap: [wrap(sampler.map(|of| &of.wrap_s)), wrap(sampler.map(|of| &of.wrap_t))].into(),
+            filter: if is_coarse {
+                TextureFilter::Nearest
+            } else {
+                TextureFilter::default()
+            },
+            scale,
+            rotate: rotation.to_degrees() % 360.0,
+            offset: [offset[0] + sin * scale[1], 1.0 - cos * scale[1] - offset[1]],
+            uv_set: slot.set,
+            ..ImageTextureDescription::new(file)
+        })
+    }
+}
+
+/// Whether an image file has an alpha channel; no, if it cannot be read, which is told when it is decoded.
+pub(super) fn has_alpha(bytes: &[u8]) -> bool {
+    if let Some(has_alpha) = ktx2::has_alpha(bytes) {
+        return has_alpha;
+    }
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let decoder = reader.ok().and_then(|reader| reader.into_decoder().ok());
+    decoder.is_some_and(|decoder| decoder.color_type().has_alpha())
+}

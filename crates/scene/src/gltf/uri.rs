@@ -1,0 +1,280 @@
+//! URIs in glTF files: data URIs (RFC 2397), and relative paths of files inside the asset root (specification, section 2.8).
+
+use std::borrow::Cow;
+use std::fs::{self, File};
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+
+use base64::Engine as _;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use percent_encoding::percent_decode_str;
+
+use super::error::shown;
+use wgray_image::memory::fallible;
+
+/// Base64 as writers have it, with padding or without.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &base64::alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
+
+/// Whether the data are in the URI.
+pub(super) fn is_data(uri: &str) -> bool {
+    uri.get(..5).is_some_and(|start| start.eq_ignore_ascii_case("data:"))
+}
+
+/// The bytes of a data URI. The error is the rule that it breaks.
+pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
+    let rule = "a data URI must be data:[type][;base64],data";
+    let (head, body) = uri.get(5..).and_then(|rest| rest.split_once(',')).ok_or(rule)?;
+    let body: Cow<[u8]> = percent_decode_str(body).into();
+    let is_base64 = head.rsplit(';').next().is_some_and(|last| {
+        let last = last.trim();
+        last.eq_ignore_ascii_case("base64")
+    });
+    match is_base64 {
+        false => Ok(body.into_owned()),
+        true => BASE64
+            .decode(&body)
+            .map_err(|error| format!("the data URI must be base64: {error}")),
+    }
+}
+
+/// Why a file that a URI names is not read. The text is the value with the rule.
+#[derive(Debug)]
+pub(super) enum Unfound {
+    /// It cannot be found.
+    Absent(String),
+    /// Its name or its place breaks a rule.
+    Refused(String),
+}
+
+impl From<String> for Unfound {
+    fn from(rule: String) -> Self {
+        Unfound::Refused(rule)
+    }
+}
+
+impl From<Unfound> for String {
+    fn from(unfound: Unfound) -> Self {
+        match unfound {
+            Unfound::Absent(why) | Unfound::Refused(why) => why,
+        }
+    }
+}
+
+/// Where the files that a model names are.
+#[derive(Clone, Debug)]
+pub(super) struct Folder {
+    /// The folder that names are relative to, that of the model.
+    pub folder: PathBuf,
+    /// The folder that files must lie in.
+    pub root: PathBuf,
+}
+
+impl Folder {
+    /// Finds a file that a URI names; the path is without links.
+    pub fn find(&self, uri: &str) -> Result<PathBuf, Unfound> {
+        if let Some(scheme) = scheme(uri) {
+            let rule = "it must be a relative path, or a data URI";
+            return Err(format!("{} begins with \"{scheme}:\"; {rule}", shown(uri)).into());
+        }
+        let decoded = percent_decode_str(uri)
+            .decode_utf8()
+            .map_err(|_| format!("{} must be UTF-8 where it is percent-encoded", shown(uri)))?;
+        // Some writers do not encode the percent signs of names, and some have the backslashes of Windows.
+        let turned = decoded.replace('\\', "/");
+        let names = [&*decoded, uri, &turned];
+        for name in names {
+            if name.starts_with(['/', '\\']) || Path::new(name).has_root() || Path::new(name).is_absolute() {
+                return Err(format!("{} must be a relative path", shown(uri)).into());
+            }
+        }
+        if decoded.is_empty() {
+            return Err("\"\" must be the path of a file".to_owned().into());
+        }
+        let mut found = names.iter().map(|name| self.folder.join(name).canonicalize());
+        let first = found.next().unwrap_or_else(|| Err(io::ErrorKind::NotFound.into()));
+        let path = match first {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => found.find_map(Result::ok).ok_or(error),
+            first => first,
+        };
+        let path = path.map_err(|error| Unfound::Absent(format!("{} cannot be read: {error}", shown(uri))))?;
+        let root = self.root.canonicalize().map_err(|error| {
+            let root = self.root.display();
+            format!("{} must lie in {root}, which cannot be found: {error}", shown(uri))
+        })?;
+        if !path.starts_with(&root) {
+            let root = self.root.display();
+            return Err(format!("{} must not leave the folder {root}", shown(uri)).into());
+        }
+        if !path.is_file() {
+            return Err(format!("{} must be a file", shown(uri)).into());
+        }
+        Ok(path)
+    }
+}
+
+/// What stands before a colon, if it is a URI's scheme (RFC 3986, section 3.1).
+fn scheme(uri: &str) -> Option<&str> {
+    let (scheme, _) = uri.split_once(':')?;
+    let is_scheme = scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+        && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+    is_scheme.then_some(scheme)
+}
+
+/// Reads a file that has at most so many bytes. Pipes and folders are none.
+pub(super) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    // Asked first, since opening a pipe waits for a writer.
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it must be a file"));
+    }
+    let file = File::open(path)?;
+    let data = file.metadata()?;
+    let too_large = || io::Error::new(io::ErrorKind::FileTooLarge, format!("it is larger than {most} bytes"));
+    if !data.is_file() || data.len() > most {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::new();
+    fallible(|| bytes.try_reserve_exact(data.len() as usize))?;
+    file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > most {
+        true => Err(too_large()),
+        false => Ok(bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn data_uris_are_base64_or_percent_encoded() {
+        for (uri, bytes) in [
+            ("data:application/octet-stream;base64,AAECA/8=", &[0, 1, 2, 3, 255][..]),
+            ("data:application/gltf-buffer;base64,AAECA/8", &[0, 1, 2, 3, 255]),
+            ("DATA:;BASE64,AAECA%2F8%3D", &[0, 1, 2, 3, 255]),
+            ("data:;base64,", &[]),
+            ("data:,a%20b%00", b"a b\0"),
+            ("data:text/plain;charset=utf-8,a,b", b"a,b"),
+        ] {
+            assert!(is_data(uri));
+            assert_eq!(data(uri).unwrap(), bytes, "{uri}");
+        }
+        for uri in [
+            "data:",
+            "data:;base64",
+            "data:;base64,A",
+            "data:;base64,AA*A",
+            "data:;base64,é",
+        ] {
+            assert!(data(uri).is_err(), "{uri}");
+        }
+        assert!(!is_data("daté"));
+        assert!(!is_data("file.bin"));
+    }
+
+    #[test]
+    fn files_lie_inside_the_root() {
+        let outer = tempfile::tempdir().unwrap();
+        let root = outer.path().join("model");
+        fs::create_dir_all(root.join("sub dir")).unwrap();
+        fs::write(outer.path().join("secret.bin"), b"no").unwrap();
+        for name in ["a b.bin", "100%.bin", "sub dir/c.bin"] {
+            fs::write(root.join(name), b"yes").unwrap();
+        }
+        let folder = Folder {
+            folder: root.clone(),
+            root: root.clone(),
+        };
+        for uri in [
+            "a%20b.bin",
+            "a b.bin",
+            "./a%20b.bin",
+            "100%.bin",
+            "100%25.bin",
+            "sub%20dir/c.bin",
+            "sub dir\\c.bin",
+            "sub%20dir/../a%20b.bin",
+            "../model/a b.bin",
+        ] {
+            let path = folder.find(uri).unwrap();
+            assert_eq!(read(&path, 3).unwrap(), b"yes", "{uri}");
+        }
+        let told = |uri: &str| String::from(folder.find(uri).unwrap_err());
+        let outside = "must not leave the folder";
+        for uri in [
+            "../secret.bin",
+            "..%2fsecret.bin",
+            "%2e%2e/secret.bin",
+            "sub dir/../../secret.bin",
+            "..\\secret.bin",
+        ] {
+            assert!(told(uri).contains(outside), "{uri}: {}", told(uri));
+        }
+        for uri in [
+            "/etc/passwd",
+            "%2fetc/passwd",
+            "//host/file",
+            "\\\\host\\file",
+            "\\file",
+        ] {
+            assert!(told(uri).ends_with("must be a relative path"), "{uri}: {}", told(uri));
+        }
+        for uri in [
+            "file:///etc/passwd",
+            "http://host/a.bin",
+            "HTTPS://host/a.bin",
+            "c:\\a.bin",
+            "blob:x",
+        ] {
+            assert!(told(uri).contains("begins with"), "{uri}: {}", told(uri));
+        }
+        for uri in ["none.bin", "a\0b", "a b.bin/x", "%00"] {
+            assert!(told(uri).contains("cannot be read"), "{uri}: {}", told(uri));
+        }
+        assert!(told("%ff").contains("UTF-8"));
+        assert!(told("").contains("path of a file"));
+        assert!(told("sub%20dir").ends_with("must be a file"));
+        assert!(told(".").ends_with("must be a file"));
+        assert!(read(&root.join("a b.bin"), 2).is_err());
+        assert!(read(&root, 9).is_err());
+        // A wider root allows more.
+        let wide = Folder {
+            folder: root,
+            root: outer.path().to_owned(),
+        };
+        assert!(wide.find("../secret.bin").is_ok());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_pipes_are_seen_through() {
+        let outer = tempfile::tempdir().unwrap();
+        let root = outer.path().join("model");
+        fs::create_dir(&root).unwrap();
+        fs::write(outer.path().join("secret.bin"), b"no").unwrap();
+        fs::write(root.join("a.bin"), b"yes").unwrap();
+        std::os::unix::fs::symlink("../secret.bin", root.join("out.bin")).unwrap();
+        std::os::unix::fs::symlink("a.bin", root.join("in.bin")).unwrap();
+        std::os::unix::fs::symlink("..", root.join("up")).unwrap();
+        let folder = Folder {
+            folder: root.clone(),
+            root: root.clone(),
+        };
+        assert!(folder.find("in.bin").is_ok());
+        for uri in ["out.bin", "up/secret.bin"] {
+            assert!(
+                String::from(folder.find(uri).unwrap_err()).contains("must not leave"),
+                "{uri}"
+            );
+        }
+        let made = std::process::Command::new("mkfifo").arg(root.join("pipe")).status();
+        if made.is_ok_and(|status| status.success()) {
+            assert!(String::from(folder.find("pipe").unwrap_err()).ends_with("must be a file"));
+            assert!(read(&root.join("pipe"), 9).is_err());
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! How large the images of glTF files may be, so that all textures together fit what is there for them.
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::super::decode::{Format, Header, LONGEST_SIDE, decode};
+use super::super::texture::{levels, words};
+use super::super::validate::TEXEL_MEMORY;
+use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
+
+/// The most texels that are decoded of all images together, and how many more for a byte of their files: it takes long, and a small
+/// file may have many.
+const TEXELS: (u64, u64) = (1 << 28, 64);
+/// What is left for other textures and surroundings, in bytes.
+const OTHERS: u64 = 128 << 20;
+
+/// An image, and how many times it is kept: as colours, as numbers, and for its alpha.
+struct Kept {
+    header: Header,
+    /// The bytes of its file.
+    length: u64,
+    times: u64,
+    has_levels: bool,
+}
+
+impl Kept {
+    /// The bytes that it takes where it is halved until no side is longer.
+    fn bytes(&self, longest: u32) -> u64 {
+        let Header { width, height, is_deep } = self.header;
+        let halvings = (0..32).take_while(|i| width.max(height) >> i > longest).count();
+        let (width, height) = ((width >> halvings).max(1), (height >> halvings).max(1));
+        let levels = if self.has_levels { levels(width, height) } else { 1 };
+        4 * self.times * words(width, height, levels, is_deep)
+    }
+}
+
+/// The longest side of images such that they fit, and the bytes that they take as they are; None if they fit as they are. The
+/// error is the rule that they break.
+pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option<(u32, u64)>, String> {
+    let kept = kept(description, assets);
+    let texels = |of: &Kept| u64::from(of.header.width) * u64::from(of.header.height) * of.times;
+    let (texels, bytes) = kept.iter().fold((0_u64, 0_u64), |(texels_before, bytes), image| {
+        (texels_before.saturating_add(texels(image)), bytes + image.length)
+    });
+    let most = TEXELS.0 + bytes * TEXELS.1;
+    if texels > most {
+        return Err(format!(
+            "the images of all glTF files have {texels} texels together; of files of {bytes} bytes they must be at most {most}"
+        ));
+    }
+    let all = |longest: u32| kept.iter().map(|image| image.bytes(longest)).sum::<u64>();
+    let whole = all(LONGEST_SIDE);
+    if whole <= TEXEL_MEMORY - OTHERS {
+        return Ok(None);
+    }
+    let mut longest = LONGEST_SIDE;
+    while longest > 1 && all(longest) > TEXEL_MEMORY - OTHERS {
+        longest /= 2;
+    }
+    Ok(Some((longest, whole)))
+}
+
+fn kept(description: &Description, assets: &Assets) -> Vec<Kept> {
+    let values = description.materials.values().flat_map(MaterialDescription::values);
+    let opaque: BTreeSet<&str> = values
+        .filter_map(|value| match value {
+            ValueDescription::Texture(reference) if reference.channel == Channel::A => Some(reference.texture.as_str()),
+            _ => None,
+        })
+        .collect();
+    // The encodings of each file, and None for its alpha; and whether it is filtered.
+    let mut files: BTreeMap<&str, (BTreeSet<Option<bool>>, bool)> = BTreeMap::new();
+    for (name, texture) in &description.textures {
+        if let TextureDescription::Image(image) = texture {
+            let (parts, has_levels) = files.entry(&image.file).or_default();
+            parts.insert(Some(image.encoding == Some(Encoding::Linear)));
+            if opaque.contains(name.as_str()) {
+                parts.insert(None);
+            }
+            *has_levels |= image.filter.needs_levels();
+        }
+    }
+    let kept = files.into_iter().filter_map(|(file, (parts, has_levels))| {
+        let bytes = assets.encoded.get(file)?;
+        Some(Kept {
+            header: header(bytes)?,
+            length: bytes.len() as u64,
+            times: parts.len() as u64,
+            has_levels,
+        })
+    });
+    kept.collect()
+}
+
+/// What an image's header says. Nothing, if it cannot be read, which is told when it is decoded.
+fn header(bytes: &[u8]) -> Option<Header> {
+    let format = Format::of(bytes)?;
+    let seen = Cell::new(None);
+    // Nothing is decoded of what does not fit.
+    let _ = decode(bytes, format, |header| {
+        seen.set(Some(header));
+        Err(String::new())
+    });
+    seen.take()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ImageTextureDescription, PerspectiveDescription};
+
+    fn png(width: u32, height: u32) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_compression(png::Compression::Fast);
+        let rows = vec![7; (width * height) as usize];
+        encoder.write_header().unwrap().write_image_data(&rows).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn images_are_halved_until_all_fit() {
+        let camera = PerspectiveDescription::new([0.0, -1.0, 0.0], [0.0; 3], 40.0);
+        let mut description = Description::new(1, 1, camera);
+        let mut assets = Assets::default();
+        assets.encoded.insert("large".to_owned(), png(8192, 4096).into());
+        assets.encoded.insert("small".to_owned(), png(64, 64).into());
+        let texture = |file: &str, encoding| {
+            TextureDescription::Image(ImageTextureDescription {
+                encoding: Some(encoding),
+                ..ImageTextureDescription::new(file)
+            })
+        };
+        // A third more for its levels: 180 MB; the same a second time for its other encoding, and not for another texture.
+        for (name, encoding) in [("a", Encoding::Srgb), ("b", Encoding::Linear), ("c", Encoding::Srgb)] {
+            description.textures.insert(name.to_owned(), texture("large", encoding));
+        }
+        description
+            .textures
+            .insert("d".to_owned(), texture("small", Encoding::Srgb));
+        assert_eq!(longest_side(&description, &assets), Ok(None));
+        for i in 0..4 {
+            let name = format!("large {i}");
+            let bytes = assets.encoded["large"].clone();
+            assets.encoded.insert(name.clone(), bytes);
+            description
+                .textures
+                .insert(name.clone(), texture(&name, Encoding::Srgb));
+        }
+        let (longest, bytes) = longest_side(&description, &assets).unwrap().unwrap();
+        assert_eq!(longest, 4096);
+        assert!((1.0e9..1.1e9).contains(&(bytes as f64)), "{bytes}");
+        assets.longest_side = Some(16);
+        let scene = description.validate_with(&assets).unwrap();
+        let sizes = scene.textures.iter().map(|texture| match &texture.kind {
+            crate::TextureKind::Image { image, .. } => (image.width, image.height),
+            _ => (0, 0),
+        });
+        let sizes: BTreeSet<(u32, u32)> = sizes.collect();
+        assert_eq!(sizes, BTreeSet::from([(16, 8), (16, 16)]));
+    }
+}

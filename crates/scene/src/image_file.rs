@@ -1,0 +1,456 @@
+//! Images that textures name: files, found, decoded within limits, and checked; and images in memory.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use image::error::LimitErrorKind;
+use image::{DynamicImage, ImageError, ImageFormat};
+
+use super::Problem;
+use super::decode::{Channels, Format, Header, LONGEST_SIDE, Refused, decode};
+use super::halves::halved;
+use super::parse::list;
+use super::texture::{Encoding, Image, Texels};
+use crate::mesh::{Mesh, in_other_case};
+use wgray_image::color::srgb_to_linear;
+
+/// The largest file, in bytes.
+const LARGEST_FILE: u64 = 512 << 20;
+/// The largest texel, as of any colour.
+const BRIGHTEST: f32 = 1e6;
+
+/// Where the images that a scene names are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assets {
+    /// The folder that images' names are relative to, that of the scene file.
+    pub folder: PathBuf,
+    /// The folder that images must lie in.
+    pub root: PathBuf,
+    /// Files that may lie elsewhere, by the absolute names that the scene has for them.
+    pub elsewhere: BTreeSet<PathBuf>,
+    /// Images in memory by their names: a texture that names one of them as its file has it, and no file is read.
+    pub images: BTreeMap<String, Arc<Image>>,
+    /// Image files in memory, as they would be on a disk, by their names.
+    pub encoded: BTreeMap<String, Arc<[u8]>>,
+    /// The longest side of what is kept of those, in texels: larger ones are halved until they are no longer than it.
+    pub longest_side: Option<u32>,
+    /// Image files that are missing, by the names that textures have for them, with the reason.
+    pub(super) absent: BTreeMap<String, String>,
+    /// Meshes in memory by their names.
+    pub meshes: BTreeMap<String, Arc<Mesh>>,
+    /// Whether damage to a file is an error. Otherwise it is a warning, and a stand-in is rendered.
+    pub strict: bool,
+}
+
+/// A place that an image comes from.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Place {
+    /// A file, without links.
+    File(PathBuf),
+    /// An image of [`Assets::images`].
+    Memory(String),
+    /// A file of [`Assets::encoded`].
+    Encoded(String),
+}
+
+impl Default for Assets {
+    /// Files in the current folder, and no images in memory.
+    fn default() -> Self {
+        Assets::beside(Path::new("."))
+    }
+}
+
+impl Assets {
+    /// Files in a folder, and no images in memory.
+    pub fn beside(folder: &Path) -> Assets {
+        let folder = match folder.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => folder,
+        };
+        Assets {
+            folder: folder.to_owned(),
+            root: folder.to_owned(),
+            elsewhere: BTreeSet::new(),
+            images: BTreeMap::new(),
+            encoded: BTreeMap::new(),
+            longest_side: None,
+            absent: BTreeMap::new(),
+            meshes: BTreeMap::new(),
+            strict: false,
+        }
+    }
+
+    /// Returns the warning about damage to a file, which names the stand-in for what is missing.
+    ///
+    /// # Errors
+    ///
+    /// The damage itself if [`Assets::strict`] is set.
+    pub(super) fn tolerate(&self, damage: Problem, stand_in: &str) -> Result<String, Problem> {
+        match self.strict {
+            true => Err(damage),
+            false => Ok(format!("{}; {stand_in}", damage.message)),
+        }
+    }
+
+    /// Takes an image from memory. `encoding` is what its values should mean, if that is said; `fits` is asked before it is
+    /// looked at. The error is the value with the rule.
+    fn image_in_memory(
+        &self,
+        name: &str,
+        encoding: Option<Encoding>,
+        fits: impl Fn(Header) -> Result<(), String>,
+    ) -> Result<File, String> {
+        let image = self
+            .images
+            .get(name)
+            .ok_or_else(|| format!("there is no image {name:?} in memory"))?;
+        let Image { width, height, texels } = &**image;
+        let (count, default) = match texels {
+            Texels::Bytes(encoding, texels) => (texels.len(), *encoding),
+            Texels::Floats(texels) => (texels.len(), Encoding::Linear),
+        };
+        if *width.max(height) > LONGEST_SIDE {
+            return Err(format!("{name:?} must have at most {LONGEST_SIDE} texels along a side"));
+        }
+        has_texels(name, *width, *height)?;
+        if count as u64 != u64::from(*width) * u64::from(*height) {
+            return Err(format!(
+                "{name:?} has {count} texels; its size, {width} x {height}, must be their number"
+            ));
+        }
+        if encoding.is_some_and(|encoding| encoding != default) {
+            return Err(format!("{name:?} must have the encoding of the image in memory"));
+        }
+        fits(Header::of(image))?;
+        in_range(name, image)?;
+        Ok(File {
+            image: Arc::clone(image),
+            format: None,
+            default,
+            encoding: default,
+            is_alpha: false,
+            damage: None,
+        })
+    }
+
+    /// Reads an image. `encoding` is what its values mean, if that is said; `fits` is asked before anything is decoded. The
+    /// error is the value with the rule.
+    pub(super) fn image(
+        &self,
+        file: &str,
+        place: &Place,
+        part: Part,
+        fits: impl Fn(Header) -> Result<(), String>,
+    ) -> Result<File, Problem> {
+        let encoding = part.encoding();
+        let bytes = match place {
+            Place::Memory(_) if part == Part::Alpha => {
+                return Err(Problem::new(format!(
+                    "{file:?} is an image in memory, which has no alpha channel"
+                )));
+            }
+            Place::Memory(_) => return Ok(self.image_in_memory(file, encoding, fits)?),
+            Place::File(path) => Cow::Owned(read(file, path)?),
+            Place::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
+        };
+        let is_named = matches!(place, Place::File(_));
+        let format = Format::of(&bytes).ok_or_else(|| {
+            Problem::damage(match is_named {
+                true => format!("{file:?} must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
+                false => format!("{file:?} must be a PNG, JPEG, WebP or KTX2 file"),
+            })
+        })?;
+        if is_named {
+            check_name(file, format)?;
+        }
+        let is_float = matches!(format, Format::Image(ImageFormat::OpenExr | ImageFormat::Hdr));
+        if is_float && encoding == Some(Encoding::Srgb) {
+            return Err(Problem::new(format!(
+                "{file:?} must not be \"srgb\": files of type {} are linear",
+                format.name()
+            )));
+        }
+        let longest = self.longest_side.filter(|_| matches!(place, Place::Encoded(_)));
+        let halvings = |width: u32, height: u32| {
+            let sizes = (0..).map(|i| width.max(height) >> i);
+            longest.map_or(0, |longest| sizes.take_while(|size| *size > longest.max(1)).count())
+        };
+        let fits = |header: Header| {
+            let times = halvings(header.width, header.height);
+            fits(Header {
+                width: (header.width >> times).max(1),
+                height: (header.height >> times).max(1),
+                ..header
+            })
+        };
+        let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
+            Refused::Rule(rule) => Problem::new(rule),
+            Refused::Large(rule) => Problem::new(format!("{file:?} {rule}")),
+            Refused::Damaged(rule) => Problem::damage(format!("{file:?} {rule}")),
+            Refused::Channels(channels) => Problem::new(format!("{file:?} {}", refused_channels(&channels))),
+            Refused::Image(error) => Problem {
+                is_damage: !matches!(error, ImageError::Limits(_)),
+                ..Problem::new(format!("{file:?} {}", refused_image(&error)))
+            },
+        })?;
+        drop(bytes);
+        let (width, height) = (decoded.width(), decoded.height());
+        has_texels(file, width, height)?;
+        let default = if is_float { Encoding::Linear } else { Encoding::Srgb };
+        let texels = match part {
+            Part::Colors(_) => texels(decoded, is_float, encoding.unwrap_or(default)),
+            Part::Alpha => alpha(decoded).ok_or_else(|| format!("{file:?} must have an alpha channel"))?,
+        };
+        let mut image = Image { width, height, texels };
+        let damage = clamp(&mut image).map(|damage| format!("{file:?} {damage}"));
+        for _ in 0..halvings(width, height) {
+            image = halved(&image);
+        }
+        Ok(File {
+            image: Arc::new(image),
+            format: Some(format).filter(|_| is_named),
+            default,
+            encoding: encoding.unwrap_or(default),
+            is_alpha: part == Part::Alpha,
+            damage,
+        })
+    }
+
+    /// Returns a file's name for messages: relative to the current folder if it was given on the command line.
+    fn shown<'f>(&self, file: &'f str) -> &'f str {
+        let is_given = self.elsewhere.contains(Path::new(file));
+        let here = std::env::current_dir().ok().filter(|_| is_given);
+        let inside = here.and_then(|here| Path::new(file).strip_prefix(here).ok()?.to_str());
+        inside.unwrap_or(file)
+    }
+
+    /// Where an image is.
+    pub(super) fn find(&self, file: &str) -> Result<Place, Problem> {
+        if let Some(why) = self.absent.get(file) {
+            return Err(Problem::damage(why));
+        }
+        if self.images.contains_key(file) {
+            return Ok(Place::Memory(file.to_owned()));
+        }
+        if self.encoded.contains_key(file) {
+            return Ok(Place::Encoded(file.to_owned()));
+        }
+        let path = self.folder.join(file).canonicalize();
+        let path = path.map_err(|error| {
+            let other = in_other_case(&self.folder, file);
+            let other = other
+                .as_deref()
+                .map(|other| other.strip_prefix(&self.folder).unwrap_or(other));
+            let hint = other.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
+            Problem::damage(unreadable(self.shown(file), &error) + &hint)
+        })?;
+        let root = self.root.canonicalize().map_err(|error| {
+            let root = self.root.display();
+            format!("{file:?} must lie in the asset root, {root}, which cannot be found: {error}; check --asset-root")
+        })?;
+        if !path.starts_with(&root) && !self.elsewhere.contains(Path::new(file)) {
+            let root = self.root.display();
+            return Err(Problem::new(match self.root == self.folder {
+                true => format!(
+                    "{file:?} lies outside of the scene's folder, {root}; pass --asset-root with a folder that contains both"
+                ),
+                false => format!(
+                    "{file:?} is {}, which lies outside of the asset root, {root}; pass another --asset-root",
+                    path.display()
+                ),
+            }));
+        }
+        if !path.is_file() {
+            return Err(Problem::new(format!("{file:?} must be a file")));
+        }
+        Ok(Place::File(path))
+    }
+}
+
+fn has_texels(name: &str, width: u32, height: u32) -> Result<(), String> {
+    if width == 0 || height == 0 {
+        return Err(format!(
+            "{name:?} must have a texel at least; its size is {width} x {height}"
+        ));
+    }
+    Ok(())
+}
+
+fn in_range(name: &str, image: &Image) -> Result<(), String> {
+    if let Texels::Floats(values) = &image.texels {
+        let bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
+        if let Some(i) = values.iter().position(|texel| texel.iter().any(bad)) {
+            let (x, y) = (i as u32 % image.width, i as u32 / image.width);
+            let [r, g, b] = values[i];
+            let rule = "the values of each must be finite, from 0 to 1e6";
+            return Err(format!("{name:?} has the texel [{r}, {g}, {b}] at ({x}, {y}); {rule}"));
+        }
+    }
+    Ok(())
+}
+
+/// Clamps the values of texels that no image has. Returns what was wrong with them, if anything was.
+fn clamp(image: &mut Image) -> Option<String> {
+    let Texels::Floats(values) = &mut image.texels else {
+        return None;
+    };
+    let is_bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
+    let (mut first, mut count) = (0, 0_usize);
+    for (i, texel) in values
+        .iter_mut()
+        .enumerate()
+        .filter(|(_, texel)| texel.iter().any(is_bad))
+    {
+        first = if count == 0 { i } else { first };
+        count += 1;
+        // The comparison is false for NaN, which becomes 0.
+        *texel = texel.map(|x| if x > 0.0 { x.min(BRIGHTEST) } else { 0.0 });
+    }
+    let (x, y) = (first as u32 % image.width, first as u32 / image.width);
+    let rule = "the values of each must be finite, from 0 to 1e6";
+    match count {
+        0 => None,
+        1 => Some(format!("has 1 bad texel, at ({x}, {y}); {rule}")),
+        _ => Some(format!("has {count} bad texels, the first at ({x}, {y}); {rule}")),
+    }
+}
+
+/// A file that was read, or an image that was in memory.
+#[derive(Clone)]
+pub(super) struct File {
+    pub image: Arc<Image>,
+    /// None if its name says none, as in memory.
+    format: Option<Format>,
+    default: Encoding,
+    encoding: Encoding,
+    is_alpha: bool,
+    /// Bad texels of the file, which were clamped.
+    pub damage: Option<String>,
+}
+
+/// What is taken of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Part {
+    /// Its colours, with what their values mean if that is said.
+    Colors(Option<Encoding>),
+    /// Its alpha, as gray.
+    Alpha,
+}
+
+impl Part {
+    fn encoding(self) -> Option<Encoding> {
+        match self {
+            Part::Colors(encoding) => encoding,
+            Part::Alpha => Some(Encoding::Linear),
+        }
+    }
+}
+
+impl File {
+    /// Whether it is this part of what another texture names, by another name perhaps.
+    pub fn is(&self, part: Part) -> bool {
+        self.is_alpha == (part == Part::Alpha) && part.encoding().unwrap_or(self.default) == self.encoding
+    }
+
+    /// Refuses a name that says another format.
+    pub fn check_name(&self, file: &str) -> Result<(), String> {
+        self.format.map_or(Ok(()), |format| check_name(file, format))
+    }
+}
+
+fn check_name(file: &str, format: Format) -> Result<(), String> {
+    match Format::of_name(file) {
+        Some(named) if named != format => Err(format!(
+            "{file:?} must be what its name says; it is a file of type {}",
+            format.name()
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn read(file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
+    let mut bytes = Vec::new();
+    let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
+    // What says so at once is not read.
+    if fs::metadata(path).is_ok_and(|data| data.len() > LARGEST_FILE) {
+        return Err(too_large());
+    }
+    fs::File::open(path)
+        .and_then(|opened| opened.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
+        .map_err(|error| Problem::damage(unreadable(file, &error)))?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(too_large());
+    }
+    Ok(bytes)
+}
+
+fn unreadable(file: &str, error: &io::Error) -> String {
+    format!("{file:?} cannot be read: {error}")
+}
+
+/// What is told of an image that is not decoded, behind its name.
+fn refused_image(error: &ImageError) -> String {
+    match error {
+        ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
+            format!("must have at most {LONGEST_SIDE} texels along a side")
+        }
+        ImageError::Limits(_) => "requires more memory than its header declares".to_string(),
+        ImageError::Unsupported(_) => format!("must be of a kind that can be read: {error}"),
+        _ => format!("is damaged or truncated: {error}"),
+    }
+}
+
+/// What is told of an EXR file that has no channels to be read, behind its name.
+fn refused_channels(channels: &Channels) -> String {
+    match channels.are_deep {
+        true => "must have one value for each pixel and channel; it is deep".to_owned(),
+        false => format!(
+            "must have the channels \"R\", \"G\" and \"B\", or one alone; it has {}",
+            list(&channels.names)
+        ),
+    }
+}
+
+fn texels(image: DynamicImage, is_float: bool, encoding: Encoding) -> Texels {
+    use DynamicImage::{ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgba16};
+    if is_float {
+        return Texels::Floats(image.into_rgb32f().pixels().map(|texel| texel.0).collect());
+    }
+    if matches!(image, ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_)) {
+        let decode = |value: u16| {
+            let value = f64::from(value) / 65_535.0;
+            match encoding {
+                Encoding::Srgb => srgb_to_linear(value) as f32,
+                Encoding::Linear => value as f32,
+            }
+        };
+        return Texels::Floats(image.into_rgb16().pixels().map(|texel| texel.0.map(decode)).collect());
+    }
+    let bytes = match image {
+        DynamicImage::ImageLuma8(gray) => gray.pixels().map(|texel| [texel.0[0]; 3]).collect(),
+        DynamicImage::ImageLumaA8(gray) => gray.pixels().map(|texel| [texel.0[0]; 3]).collect(),
+        DynamicImage::ImageRgba8(colors) => colors
+            .pixels()
+            .map(|texel| [texel.0[0], texel.0[1], texel.0[2]])
+            .collect(),
+        colors => colors.into_rgb8().pixels().map(|texel| texel.0).collect(),
+    };
+    Texels::Bytes(encoding, bytes)
+}
+
+/// The alpha of an image that has it, as gray.
+fn alpha(image: DynamicImage) -> Option<Texels> {
+    if !image.color().has_alpha() {
+        return None;
+    }
+    let bytes = |alpha: Vec<u8>| Texels::Bytes(Encoding::Linear, alpha.into_iter().map(|a| [a; 3]).collect());
+    Some(match image {
+        DynamicImage::ImageLumaA8(gray) => bytes(gray.pixels().map(|texel| texel.0[1]).collect()),
+        DynamicImage::ImageRgba8(colors) => bytes(colors.pixels().map(|texel| texel.0[3]).collect()),
+        deep => Texels::Floats(deep.into_rgba32f().pixels().map(|texel| [texel.0[3]; 3]).collect()),
+    })
+}

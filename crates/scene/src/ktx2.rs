@@ -1,0 +1,208 @@
+//! KTX 2 files with Basis Universal texels, which glTF files reference by `KHR_texture_basisu` (Khronos Group, "KTX File
+//! Format Specification", version 2.0.4). Every length is checked here, because the decoders allocate what a header
+//! declares.
+
+use std::io::Read as _;
+use std::ops::Range;
+
+use basisu::{DecodeFlags, TargetFormat, Transcoder};
+use image::{DynamicImage, ImageBuffer, RgbaImage};
+use ruzstd::decoding::StreamingDecoder;
+
+use wgray_image::contain::catch_panic;
+
+/// First bytes of a file (section 3.1).
+pub(super) const IDENTIFIER: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
+/// Position of the index of levels (section 2); the entry of a level has 24 bytes.
+const INDEX: usize = 80;
+const ENTRY: usize = 24;
+/// Minimum window of a Zstandard frame that is accepted, in bytes (RFC 8878, section 3.1.1.1.2).
+const WINDOW: u64 = 8 << 20;
+
+/// The supercompression schemes (section 3.2).
+const NONE: u32 = 0;
+const BASIS_LZ: u32 = 1;
+const ZSTANDARD: u32 = 2;
+
+/// The color models and channels of the data format descriptor (Khronos Data Format Specification 1.3, sections 5.6.9
+/// and 5.6.10).
+const ETC1S: u8 = 163;
+const UASTC: u8 = 166;
+const RGB: u8 = 0;
+const UASTC_RGBA: u8 = 3;
+const ETC1S_ALPHA: u8 = 15;
+
+/// A file with a valid header.
+#[derive(Debug)]
+pub(crate) struct Ktx2<'a> {
+    bytes: &'a [u8],
+    /// Width of the largest level.
+    pub width: u32,
+    /// Height of the largest level.
+    pub height: u32,
+    /// Set if texels have alpha.
+    pub has_alpha: bool,
+    supercompression: u32,
+    descriptor: Range<usize>,
+    /// The largest level.
+    level: Range<usize>,
+    /// Length of the largest level after Zstandard decompression.
+    inflated: usize,
+}
+
+fn damaged(what: impl std::fmt::Display) -> String {
+    format!("is damaged or truncated: {what}")
+}
+
+fn number<const N: usize>(bytes: &[u8], at: usize) -> Result<[u8; N], String> {
+    let found = bytes.get(at..at + N).and_then(|bytes| bytes.try_into().ok());
+    found.ok_or_else(|| damaged("the KTX2 header ends early"))
+}
+
+fn short(bytes: &[u8], at: usize) -> Result<u32, String> {
+    Ok(u32::from_le_bytes(number(bytes, at)?))
+}
+
+fn long(bytes: &[u8], at: usize) -> Result<u64, String> {
+    Ok(u64::from_le_bytes(number(bytes, at)?))
+}
+
+fn part(bytes: &[u8], what: &str, at: u64, length: u64) -> Result<Range<usize>, String> {
+    let end = at.checked_add(length).filter(|end| *end <= bytes.len() as u64);
+    let end = end.ok_or_else(|| damaged(format!("{what} must lie in the file; it has {length} bytes at {at}")))?;
+    Ok(at as usize..end as usize)
+}
+
+/// Returns whether a file has alpha, or `None` if it is not a KTX 2 file.
+pub(crate) fn has_alpha(bytes: &[u8]) -> Option<bool> {
+    let is_ktx2 = bytes.starts_with(IDENTIFIER);
+    is_ktx2.then(|| Ktx2::parse(bytes).is_ok_and(|file| file.has_alpha))
+}
+
+impl<'a> Ktx2<'a> {
+    /// Checks the header. The error is the rule that it violates, to be printed after the file's name.
+    pub fn parse(bytes: &'a [u8]) -> Result<Ktx2<'a>, String> {
+        let [format, _, width, height, depth, layers, faces, levels, supercompression] = {
+            let mut fields = [0; 9];
+            for (i, field) in fields.iter_mut().enumerate() {
+                *field = short(bytes, IDENTIFIER.len() + 4 * i)?;
+            }
+            fields
+        };
+        if width == 0 || height == 0 || depth != 0 || layers > 1 || faces != 1 {
+            return Err("must contain one 2D image, not an array, a cube map or a volume".to_owned());
+        }
+        let descriptor = part(
+            bytes,
+            "the data format descriptor",
+            short(bytes, 48)?.into(),
+            short(bytes, 52)?.into(),
+        )?;
+        let described = &bytes[descriptor.clone()];
+        let model = described.get(12).copied().unwrap_or(0);
+        let is_known = matches!((model, supercompression), (ETC1S, BASIS_LZ) | (UASTC, NONE | ZSTANDARD));
+        if format != 0 || !is_known {
+            return Err(format!(
+                "must contain ETC1S texels with BasisLZ, or UASTC texels with or without Zstandard; it has \
+                 format {format}, color model {model} and supercompression {supercompression}"
+            ));
+        }
+        // A header of 28 bytes, and 16 for each channel.
+        let channels: Vec<u8> = match described.len() {
+            44 | 60 => (described[28..].chunks(16)).map(|channel| channel[3] & 15).collect(),
+            length => return Err(damaged(format!("the data format descriptor has {length} bytes"))),
+        };
+        let has_alpha = match (model, &channels[..]) {
+            (_, [RGB]) => false,
+            (ETC1S, [RGB, ETC1S_ALPHA]) | (UASTC, [UASTC_RGBA]) => true,
+            _ => return Err(format!("must have the channels RGB or RGBA; it has {channels:?}")),
+        };
+        if !(1..=16).contains(&levels) {
+            return Err(damaged(format!("it has {levels} levels")));
+        }
+        let level = part(bytes, "level 0", long(bytes, INDEX)?, long(bytes, INDEX + 8)?)?;
+        let inflated = long(bytes, INDEX + 16)?;
+        let blocks = u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
+        let needed = blocks.saturating_mul(16);
+        let length = match supercompression {
+            NONE => level.len() as u64,
+            ZSTANDARD => inflated,
+            _ => needed,
+        };
+        if length != needed {
+            let rule = format!("{width} x {height} UASTC texels have {needed} bytes, not {length}");
+            return Err(damaged(rule));
+        }
+        part(bytes, "the global data", long(bytes, 64)?, long(bytes, 72)?)?;
+        Ok(Ktx2 {
+            bytes,
+            width,
+            height,
+            has_alpha,
+            supercompression,
+            descriptor,
+            level,
+            inflated: inflated as usize,
+        })
+    }
+
+    /// Decodes the largest level, to 8 bits per channel. The error is what is wrong, to be printed after the file's name.
+    pub fn decode(&self) -> Result<DynamicImage, String> {
+        let inflated;
+        let bytes = match self.supercompression {
+            ZSTANDARD => {
+                let file = catch_panic(|| self.inflated());
+                inflated = file.and_then(|file| file).map_err(damaged)?;
+                &inflated
+            }
+            _ => self.bytes,
+        };
+        let texels = catch_panic(|| {
+            let file = Transcoder::new(bytes)?;
+            file.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE)
+        });
+        let texels = texels.map_err(damaged)?;
+        let texels = texels.map_err(|_| damaged("its Basis Universal data cannot be decoded"))?;
+        let image: Option<RgbaImage> = ImageBuffer::from_raw(self.width, self.height, texels);
+        let image = DynamicImage::ImageRgba8(image.ok_or_else(|| damaged("it has too few texels"))?);
+        Ok(match self.has_alpha {
+            true => image,
+            false => DynamicImage::ImageRgb8(image.into_rgb8()),
+        })
+    }
+
+    /// Returns the file with its largest level alone, decompressed. The decoder of the crate `basisu` is not used for
+    /// Zstandard: version 0.1.0 depends on ruzstd 0.7, which does not limit the length of a block.
+    fn inflated(&self) -> Result<Vec<u8>, String> {
+        let error = |error: &dyn std::fmt::Display| format!("its Zstandard data cannot be decompressed: {error}");
+        let window = (self.inflated as u64).next_power_of_two().max(WINDOW);
+        let data = &self.bytes[self.level.clone()];
+        let mut data = StreamingDecoder::new_with_max_window_size(data, window).map_err(|why| error(&why))?;
+        let descriptor = &self.bytes[self.descriptor.clone()];
+        let end_of_index = INDEX + ENTRY;
+        let start = (end_of_index + descriptor.len()).next_multiple_of(16);
+        let mut file = vec![0; start + self.inflated];
+        file[..40].copy_from_slice(&self.bytes[..40]);
+        for (at, value) in [
+            (40, 1),
+            (44, NONE),
+            (48, end_of_index as u32),
+            (52, descriptor.len() as u32),
+        ] {
+            file[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        }
+        for (at, value) in [(0, start), (8, self.inflated), (16, self.inflated)] {
+            file[INDEX + at..INDEX + at + 8].copy_from_slice(&(value as u64).to_le_bytes());
+        }
+        file[end_of_index..end_of_index + descriptor.len()].copy_from_slice(descriptor);
+        data.read_exact(&mut file[start..]).map_err(|why| error(&why))?;
+        match data.read(&mut [0]) {
+            Ok(0) => Ok(file),
+            Ok(_) => Err(error(&"it is longer than its header declares")),
+            Err(why) => Err(error(&why)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

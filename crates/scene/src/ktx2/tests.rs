@@ -1,0 +1,206 @@
+//! Files of another program's encoder against what its transcoder decodes them to, and damaged files.
+
+use std::fs;
+use std::path::PathBuf;
+
+use super::*;
+
+/// Output of `tests/textures/ktx2.mjs`.
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/textures/ktx2");
+
+fn path(name: &str, ending: &str) -> PathBuf {
+    PathBuf::from(FOLDER).join(format!("{name}.{ending}"))
+}
+
+fn file(name: &str) -> Vec<u8> {
+    fs::read(path(name, "ktx2")).unwrap()
+}
+
+fn reference(name: &str) -> RgbaImage {
+    image::open(path(name, "png")).unwrap().into_rgba8()
+}
+
+fn names() -> Vec<String> {
+    let files = fs::read_dir(FOLDER).unwrap().map(|entry| entry.unwrap().path());
+    let files = files.filter(|path| path.extension().is_some_and(|ending| ending == "ktx2"));
+    files
+        .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
+        .collect()
+}
+
+fn decoded(bytes: &[u8]) -> Result<DynamicImage, String> {
+    Ktx2::parse(bytes)?.decode()
+}
+
+fn put<const N: usize>(bytes: &mut [u8], at: usize, value: [u8; N]) {
+    bytes[at..at + N].copy_from_slice(&value);
+}
+
+/// Replaces the frame of a file with Zstandard; the file still declares the same texels.
+fn with_frame(frame: &[u8]) -> Vec<u8> {
+    let mut bytes = file("zstandard-48x20");
+    let level = long(&bytes, INDEX).unwrap() as usize;
+    bytes.truncate(level);
+    bytes.extend(frame);
+    put(&mut bytes, INDEX + 8, (frame.len() as u64).to_le_bytes());
+    bytes
+}
+
+#[test]
+fn files_decode_to_what_the_reference_makes_of_them() {
+    let names = names();
+    assert_eq!(names.len(), 12);
+    for name in &names {
+        let image = decoded(&file(name)).unwrap();
+        assert_eq!(image.color().has_alpha(), has_alpha(&file(name)).unwrap(), "{name}");
+        // The only file without "alpha" in its name that has alpha has one texel.
+        let has_alpha = name.contains("alpha") || name == "uastc-1x1";
+        assert_eq!(image.color().has_alpha(), has_alpha, "{name}");
+        assert!(image.into_rgba8() == reference(name), "{name}");
+    }
+    // The comparison can fail.
+    for [a, b] in [["etc1s-48x20", "zstandard-48x20"], ["etc1s-48x20", "etc1s-48x20-alpha"]] {
+        assert!(decoded(&file(a)).unwrap().into_rgba8() != reference(b), "{a} {b}");
+    }
+    assert_eq!(has_alpha(b"\x89PNG"), None);
+}
+
+#[test]
+fn prefixes_are_errors() {
+    for name in names() {
+        let bytes = file(&name);
+        for length in 0..bytes.len() {
+            let error = decoded(&bytes[..length]).unwrap_err();
+            assert!(
+                error.starts_with("is damaged or truncated: "),
+                "{name} {length}: {error}"
+            );
+        }
+    }
+}
+
+#[test]
+fn headers_are_checked() {
+    let kind = "must contain ETC1S texels with BasisLZ, or UASTC texels with or without Zstandard; it has format ";
+    let shape = "must contain one 2D image, not an array, a cube map or a volume";
+    let damaged = "is damaged or truncated: ";
+    for (name, at, value, start) in [
+        ("uastc-5x7-levels", 12, 37, kind),
+        ("uastc-5x7-levels", 20, 0, shape),
+        ("uastc-5x7-levels", 20, 9, damaged),
+        ("uastc-5x7-levels", 20, u32::MAX, damaged),
+        ("uastc-5x7-levels", 24, 0, shape),
+        ("uastc-5x7-levels", 28, 1, shape),
+        ("uastc-5x7-levels", 32, 2, shape),
+        ("uastc-5x7-levels", 36, 6, shape),
+        ("uastc-5x7-levels", 40, 0, damaged),
+        ("uastc-5x7-levels", 40, 17, damaged),
+        ("uastc-5x7-levels", 40, u32::MAX, damaged),
+        ("uastc-5x7-levels", 44, 1, kind),
+        ("uastc-5x7-levels", 44, 2, damaged),
+        ("uastc-5x7-levels", 44, 3, kind),
+        ("uastc-5x7-levels", 48, u32::MAX, damaged),
+        (
+            "uastc-5x7-levels",
+            52,
+            60,
+            "must have the channels RGB or RGBA; it has [",
+        ),
+        ("uastc-5x7-levels", 52, u32::MAX, damaged),
+        ("uastc-5x7-levels", INDEX + 4, u32::MAX, damaged),
+        ("uastc-5x7-levels", INDEX + 8, 0, damaged),
+        ("uastc-5x7-levels", INDEX + 8, u32::MAX, damaged),
+        ("zstandard-48x20", 44, 0, damaged),
+        ("zstandard-48x20", INDEX + 16, u32::MAX, damaged),
+        ("zstandard-48x20", INDEX + 20, u32::MAX, damaged),
+        ("etc1s-48x20", 44, 0, kind),
+        ("etc1s-48x20", 64, u32::MAX, damaged),
+        ("etc1s-48x20", 68, u32::MAX, damaged),
+        ("etc1s-48x20", 72, u32::MAX, damaged),
+        ("etc1s-48x20", 72, 0, ""),
+        ("etc1s-48x20", INDEX + 16, 1, damaged),
+    ] {
+        let mut bytes = file(name);
+        put(&mut bytes, at, value.to_le_bytes());
+        let error = decoded(&bytes).map(|_| String::new()).unwrap_or_else(|error| error);
+        assert!(error.starts_with(start), "{name} {at} {value}: {error}");
+        assert!(!start.is_empty() || error.is_empty(), "{name} {at} {value}: {error}");
+    }
+    // Channels for red and green.
+    let mut bytes = file("etc1s-48x20");
+    let descriptor = short(&bytes, 48).unwrap() as usize;
+    bytes[descriptor + 31] = 3;
+    assert_eq!(
+        decoded(&bytes).unwrap_err(),
+        "must have the channels RGB or RGBA; it has [3]"
+    );
+}
+
+#[test]
+fn zstandard_frames_must_have_the_declared_length() {
+    let texels = 48 * 20;
+    // A frame of blocks that repeat a byte (RFC 8878, section 3.1.1).
+    let frame = |window: u8, lengths: &[u32]| {
+        let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0, window];
+        for (i, length) in lengths.iter().enumerate() {
+            let is_last = u32::from(i + 1 == lengths.len());
+            frame.extend(&(length << 3 | 1 << 1 | is_last).to_le_bytes()[..3]);
+            frame.push(0);
+        }
+        frame
+    };
+    let error = |frame: &[u8]| decoded(&with_frame(frame)).unwrap_err();
+    // Windows of 1 KiB and 8 MiB; below, one of 16 MiB. Zeros are blocks of black texels.
+    for frame in [
+        frame(0, &[texels]),
+        frame(13 << 3, &[texels]),
+        frame(0, &[1, texels - 1]),
+    ] {
+        let image = decoded(&with_frame(&frame)).unwrap();
+        assert!(image.into_rgb8().iter().all(|value| *value == 0));
+    }
+    let not_inflated = "is damaged or truncated: its Zstandard data cannot be decompressed: ";
+    for frame in [
+        frame(14 << 3, &[texels]),
+        frame(0, &[texels - 1]),
+        frame(0, &[texels, 1]),
+        frame(0, &[texels; 1000]),
+        vec![],
+        vec![0; 100],
+    ] {
+        let error = error(&frame);
+        assert!(error.starts_with(not_inflated), "{error}");
+    }
+}
+
+#[test]
+fn changed_files_are_errors_or_images() {
+    let random = |state: &mut u64| {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (*state >> 33) as usize
+    };
+    let (mut images, mut errors) = (0, 0);
+    for name in names() {
+        let sound = file(&name);
+        for seed in 0..500 {
+            let mut state = seed;
+            let mut bytes = sound.clone();
+            for _ in 0..1 + random(&mut state) % 3 {
+                let at = random(&mut state) % bytes.len();
+                bytes[at] = [0, 255, random(&mut state) as u8][random(&mut state) % 3];
+            }
+            let has_room = |file: &Ktx2| file.width.max(file.height) < 1000;
+            match Ktx2::parse(&bytes).and_then(|file| {
+                if has_room(&file) {
+                    file.decode()
+                } else {
+                    Err(String::new())
+                }
+            }) {
+                Ok(_) => images += 1,
+                Err(_) => errors += 1,
+            }
+        }
+    }
+    assert!(images > 500 && errors > 500, "{images} {errors}");
+}

@@ -1,0 +1,206 @@
+//! glTF files as scenes: one is described as a shape of type `gltf`, with a camera and light around it, and rendered as what
+//! that shape stands for.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::{Overrides, folder_of};
+use crate::error::{Problem, SceneError};
+use crate::framing::check_extent;
+use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, ModelContents, UPRIGHT, load};
+use crate::model::{self, SIDE};
+use crate::{CameraDescription, Description, Framing, GltfDescription, Scene, Selection, View, framed};
+
+/// Sine of the smallest angle to +z at which a view is not vertical.
+const VERTICAL: f64 = 1e-6;
+
+/// What is shown of a glTF file, and from where.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GltfChoice {
+    /// Which of its scenes; without, the one that the file names, else the first.
+    pub scene: Option<Selection>,
+    /// Which of its cameras; without, the first, if there is any.
+    pub camera: Option<Selection>,
+    /// From where it is seen as a whole, in place of any camera of its own; if it has none, [`View::Corner`].
+    pub view: Option<View>,
+    /// At which second of an animation.
+    pub time: Option<f64>,
+    /// Which of its animations; without, the first, where a time is said.
+    pub animation: Option<Selection>,
+    /// Which of its variants of materials.
+    pub variant: Option<Selection>,
+}
+
+impl GltfChoice {
+    /// The first thing that is chosen, as a command line calls it.
+    pub(crate) fn first(&self) -> Option<&'static str> {
+        let all = [
+            (self.scene.is_some(), "gltf_scene"),
+            (self.camera.is_some(), "camera"),
+            (self.view.is_some(), "view"),
+            (self.time.is_some(), "time"),
+            (self.animation.is_some(), "animation"),
+            (self.variant.is_some(), "variant"),
+        ];
+        let chosen = all.into_iter().find(|(is_chosen, _)| *is_chosen);
+        chosen.map(|(_, name)| name)
+    }
+
+    /// Returns an error of the file, or of the option that chooses something that it does not have.
+    fn told(&self, error: GltfError) -> SceneError {
+        let given = |option: &str| match option {
+            "gltf_scene" => self.scene.is_some(),
+            "animation" => self.animation.is_some(),
+            "variant" => self.variant.is_some(),
+            _ => self.time.is_some(),
+        };
+        match error {
+            GltfError::Choice { option, message, .. } if given(option) => {
+                SceneError::Override(Problem::of(option, message))
+            }
+            error => SceneError::Gltf(error),
+        }
+    }
+}
+
+/// Whether a file of this name is a glTF file: it ends in `.gltf` or `.glb`.
+pub fn is_gltf(name: &Path) -> bool {
+    let ending = name.extension();
+    ending.is_some_and(|ending| ["gltf", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
+}
+
+impl Scene {
+    /// Whether it has a glTF file with animations, of which [`GltfChoice::time`] shows a moment.
+    pub fn has_animations(&self) -> bool {
+        self.imported.iter().any(|imported| imported.animations > 0)
+    }
+
+    /// Returns the names in each of its glTF files.
+    pub fn models(&self) -> impl Iterator<Item = &ModelContents> {
+        self.imported.iter().map(|imported| &imported.contents)
+    }
+
+    /// Whether it has a glTF file with cameras.
+    pub fn has_model_cameras(&self) -> bool {
+        self.imported.iter().any(|imported| !imported.cameras.is_empty())
+    }
+}
+
+/// A glTF file as a scene of its own, and the file, which is kept until the scene has it.
+pub(crate) fn describe(
+    path: &Path,
+    overrides: &Overrides,
+    files: &mut BTreeSet<PathBuf>,
+) -> Result<(Description, Arc<Imported>), SceneError> {
+    let GltfChoice {
+        scene,
+        camera,
+        view,
+        time,
+        animation,
+        variant,
+    } = overrides.gltf.clone();
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut shape = GltfDescription {
+        scene,
+        time,
+        animation,
+        variant,
+        ..GltfDescription::new(file)
+    };
+    let folder = folder_of(path);
+    let root = overrides.assets(folder, folder).root;
+    let whole = path.canonicalize().map_err(|error| SceneError::Read {
+        path: path.to_owned(),
+        error,
+    })?;
+    let choice = Choice::of(&shape).map_err(SceneError::Override)?;
+    let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.told(error.at(path)))?;
+    let presentation = &overrides.presentation;
+    let camera = match view.is_some() || presentation.orbit.is_some() {
+        true => None,
+        false => chosen(&imported.cameras, camera.as_ref()).map_err(SceneError::Override)?,
+    };
+    let (width, height) = overrides
+        .size
+        .unwrap_or_else(|| size(camera.and_then(|camera| camera.aspect)));
+    if let (Some(_), Some(option)) = (camera, presentation.of_camera()) {
+        let rule = "only applies to the automatic camera, and the file has its own camera; add --view or --orbit";
+        return Err(SceneError::Override(Problem::of(option, rule)));
+    }
+    let upright = |axis: DVec3| UPRIGHT.transform_vector3(axis);
+    let turn = presentation.up.and_then(|up| up.rotation(upright));
+    let mut points = Vec::new();
+    if camera.is_none() || presentation.ground {
+        points = imported.points();
+    }
+    if let Some((rotation, turn)) = turn {
+        shape.rotate = Some(rotation);
+        points.iter_mut().for_each(|point| *point = turn * *point);
+    }
+    let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
+    let framing = Framing {
+        turns: overrides.turntable.is_some(),
+        ..presentation.framing(view, aspect).map_err(SceneError::Override)?
+    };
+    let camera = match camera {
+        Some(camera) => match overrides.turntable {
+            Some(_) => with_horizontal_orbit(camera.description.clone()),
+            None => camera.description.clone(),
+        },
+        None => {
+            check_extent(points.iter().copied()).map_err(|rule| {
+                SceneError::Gltf(GltfError::File {
+                    path: path.to_owned(),
+                    message: rule,
+                })
+            })?;
+            framed(points.iter().copied(), framing).into()
+        }
+    };
+    let mut description = model::scene(overrides, (width, height), camera, shape, &points);
+    if imported.lights.is_empty() {
+        description = description.with_environment(model::studio(overrides)?);
+    }
+    Ok((description, imported))
+}
+
+/// Returns a camera whose orbit is horizontal: `up` is +z, unless the view is vertical. glTF cameras have an `up` across their view.
+fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
+    let (position, look_at, up) = match &mut camera {
+        CameraDescription::Perspective(camera) => (camera.position, camera.look_at, &mut camera.up),
+        CameraDescription::Orthographic(camera) => (camera.position, camera.look_at, &mut camera.up),
+        CameraDescription::Panorama(_) => return camera,
+    };
+    let forward = (look_at - position).normalize_or_zero();
+    if forward.cross(DVec3::Z).length() > VERTICAL {
+        *up = DVec3::Z;
+    }
+    camera
+}
+
+/// The camera that is asked for, or the first.
+fn chosen<'a>(
+    cameras: &'a [ImportedCamera],
+    wanted: Option<&Selection>,
+) -> Result<Option<&'a ImportedCamera>, Problem> {
+    let Some(wanted) = wanted else {
+        return Ok(cameras.first());
+    };
+    let names: Vec<Option<&str>> = cameras.iter().map(|camera| camera.name.as_deref()).collect();
+    let found = wanted.among(&names).and_then(|i| cameras.get(i));
+    let unknown = || Problem::of("camera", crate::gltf::unknown("camera", wanted, &names));
+    found.map(Some).ok_or_else(unknown)
+}
+
+/// A size of this aspect.
+fn size(aspect: Option<f64>) -> (u32, u32) {
+    let side = |ratio: f64| (f64::from(SIDE) * ratio).round().clamp(1.0, f64::from(SIDE)) as u32;
+    match aspect {
+        Some(aspect) if aspect > 0.0 => (side(aspect), side(1.0 / aspect)),
+        _ => (SIDE, SIDE),
+    }
+}

@@ -1,0 +1,71 @@
+//! Values that are computed from a mesh on first use.
+
+use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::sync::{Arc, PoisonError, RwLock, Weak};
+
+use super::Mesh;
+
+/// Values computed from the mesh that contains the cache, one of each type. It takes no part in comparisons, and a clone of the mesh starts
+/// without it.
+#[derive(Debug)]
+pub(super) struct Cache(RwLock<Values>);
+
+#[derive(Debug, Default)]
+struct Values {
+    /// The mesh that they were computed from. While this weak reference exists `Arc::get_mut` fails, and a mesh that is moved out of its `Arc`
+    /// to be edited is at another address afterwards; so the values are current where the addresses agree.
+    mesh: Weak<Mesh>,
+    by_type: HashMap<TypeId, Arc<dyn Any + Send + Sync>>,
+}
+
+impl Values {
+    fn get<T: Any + Send + Sync>(&self, mesh: &Arc<Mesh>) -> Option<Arc<T>> {
+        if self.mesh.as_ptr() != Arc::as_ptr(mesh) {
+            return None;
+        }
+        Arc::clone(self.by_type.get(&TypeId::of::<T>())?).downcast().ok()
+    }
+}
+
+impl Cache {
+    /// Returns the value of this mesh, in which the cache is. No lock is held while it is computed, because the threads that compute it may
+    /// need it as well.
+    pub fn get_or_init<T: Any + Send + Sync>(&self, mesh: &Arc<Mesh>, compute: impl FnOnce() -> T) -> Arc<T> {
+        if let Some(value) = self.0.read().unwrap_or_else(PoisonError::into_inner).get(mesh) {
+            return value;
+        }
+        let computed = Arc::new(compute());
+        let mut values = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        if let Some(value) = values.get(mesh) {
+            return value; // another thread was faster
+        }
+        if values.mesh.as_ptr() != Arc::as_ptr(mesh) {
+            *values = Values {
+                mesh: Arc::downgrade(mesh),
+                by_type: HashMap::new(),
+            };
+        }
+        let value: Arc<dyn Any + Send + Sync> = Arc::<T>::clone(&computed);
+        values.by_type.insert(TypeId::of::<T>(), value);
+        computed
+    }
+}
+
+impl Clone for Cache {
+    fn clone(&self) -> Self {
+        Cache::default()
+    }
+}
+
+impl Default for Cache {
+    fn default() -> Self {
+        Cache(RwLock::default())
+    }
+}
+
+impl PartialEq for Cache {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}

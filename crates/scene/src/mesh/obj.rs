@@ -1,0 +1,378 @@
+//! Wavefront OBJ files: Wavefront Technologies, "Advanced Visualizer Manual", appendix B, 1995.
+//!
+//! Not by `tobj` 4, which joins no lines at a backslash, tells no lines in its errors, and takes 0.6 s for a million
+//! triangles; a whole load takes 0.25 s here. Smoothing groups (`s`) are ignored.
+
+use std::collections::{BTreeMap, HashMap};
+use std::hash::BuildHasher;
+
+use glam::{DVec3, Vec2, Vec3, Vec4};
+use hashbrown::{DefaultHashBuilder, HashTable};
+
+use super::draft::{Draft, coordinate, counted, texture_coordinate, unit};
+use super::error::{Fault, Place, shown};
+use super::words::Words;
+use super::{Group, MOST};
+use super::{damage, words};
+use wgray_image::color::srgb_to_linear;
+
+/// No number of a vertex.
+const NONE: u32 = u32::MAX;
+/// How many unknown keywords are told apart.
+const MOST_KEYWORDS: usize = 100;
+/// How many lines may name files of materials, and how many names of a line are looked at.
+pub(super) const MOST_LIBRARIES: usize = 100;
+
+/// A mesh, and the names of its files of materials.
+pub(super) struct Obj {
+    pub draft: Draft,
+    pub libraries: Vec<String>,
+}
+
+/// Reads a file. Normals are kept if they are wanted.
+pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Obj, Fault> {
+    let mut words = Words::new(bytes);
+    let mut reader = Reader {
+        normals_wanted,
+        ..Reader::default()
+    };
+    while let Some(keyword) = words.anywhere() {
+        reader.statement(keyword, &mut words)?;
+        words.next_line();
+    }
+    Ok(reader.finish())
+}
+
+#[derive(Default)]
+struct Reader {
+    normals_wanted: bool,
+    positions: Vec<DVec3>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+    /// For each position, or empty where no vertex has a color.
+    colors: Vec<Vec4>,
+    vertices: Vertices,
+    /// The corners of the face that is being read.
+    corners: Vec<[u32; 3]>,
+    face: Vec<u32>,
+    draft: Draft,
+    numbers: HashMap<Group, u32>,
+    /// The group of what follows.
+    group: Group,
+    /// Whether `group` is not yet begun.
+    is_new: bool,
+    libraries: Vec<String>,
+    unknown: BTreeMap<String, usize>,
+}
+
+impl Reader {
+    fn statement(&mut self, keyword: &[u8], words: &mut Words) -> Result<(), Fault> {
+        match keyword {
+            b"v" => {
+                let position = position(words).unwrap_or_else(|fault| {
+                    self.draft.damages.add(damage::VERTEX, || fault);
+                    DVec3::NAN
+                });
+                has_room(self.positions.len(), words)?;
+                self.color(words);
+                self.positions.push(position);
+                self.vertices.first.push(NONE);
+            }
+            b"vt" => {
+                let uv = uv(words).unwrap_or_else(|fault| {
+                    self.draft.damages.add(damage::UV, || fault);
+                    Vec2::ZERO
+                });
+                has_room(self.uvs.len(), words)?;
+                self.uvs.push(uv);
+            }
+            b"vn" => {
+                let normal = numbers(words).unwrap_or_else(|fault| {
+                    self.draft.damages.add(damage::NORMAL, || fault);
+                    DVec3::ZERO
+                });
+                has_room(self.normals.len(), words)?;
+                self.normals.push(unit(normal));
+            }
+            b"f" => self.face(words)?,
+            b"g" | b"o" => {
+                self.group.name = words.name();
+                self.is_new = true;
+            }
+            b"usemtl" => {
+                self.group.material = Some(words.name()).filter(|name| !name.is_empty());
+                self.is_new = true;
+            }
+            b"mtllib" => {
+                let names = words.name();
+                if !names.is_empty() && !self.libraries.contains(&names) {
+                    if self.libraries.len() >= MOST_LIBRARIES {
+                        return Err(words.fault(format!("there must be at most {MOST_LIBRARIES} files of materials")));
+                    }
+                    self.libraries.push(names);
+                }
+            }
+            _ => {
+                let name = shown(keyword);
+                if self.unknown.len() < MOST_KEYWORDS || self.unknown.contains_key(&name) {
+                    *self.unknown.entry(name).or_default() += 1;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, words: &mut Words) -> Result<(), Fault> {
+        if self.is_new || self.draft.runs.is_empty() {
+            self.begin();
+        }
+        self.corners.clear();
+        while let Some(word) = words.on_line() {
+            match self.corner(word, words.place()) {
+                Ok(corner) => self.corners.push(corner),
+                Err(message) => {
+                    self.draft.damages.add(damage::FACE, || words.fault(message));
+                    return Ok(());
+                }
+            }
+        }
+        let count = self.corners.len();
+        if count < 3 {
+            let rule = || words.fault(format!("a face must have 3 corners or more; this one has {count}"));
+            self.draft.damages.add(damage::FACE, rule);
+            return Ok(());
+        }
+        let corners = std::mem::take(&mut self.corners);
+        self.face.clear();
+        self.face
+            .extend(corners.iter().map(|corner| self.vertices.number(*corner)));
+        self.corners = corners;
+        self.draft.face(&self.face, words.place())
+    }
+
+    /// Reads the color that follows a position. It is sRGB, as MeshLab and Blender write it.
+    fn color(&mut self, words: &mut Words) {
+        let mut values = [0.0; 3];
+        let mut count = 0;
+        while let Some(word) = words.on_line() {
+            if let Some(value) = values.get_mut(count) {
+                *value = words::number(word).unwrap_or(f64::NAN);
+            }
+            count += 1;
+        }
+        // One number is a weight, and a fourth one behind three is an opacity that no viewer shows.
+        if count < 3 {
+            if !self.colors.is_empty() {
+                self.colors.push(Vec4::ONE);
+            }
+            return;
+        }
+        let mut color = Vec4::ONE;
+        match values.iter().all(|x| x.is_finite()) {
+            true => color = Vec3::from(values.map(|x| srgb_to_linear(x.clamp(0.0, 1.0)) as f32)).extend(1.0),
+            false => {
+                let rule = || words.fault("the color of the vertex must be three finite numbers");
+                self.draft.damages.add(damage::COLOR, rule);
+            }
+        }
+        self.colors.resize(self.positions.len(), Vec4::ONE);
+        self.colors.push(color);
+    }
+
+    /// Begins the group of what follows.
+    fn begin(&mut self) {
+        let next = self.draft.groups.len() as u32;
+        let number = match self.numbers.get(&self.group) {
+            Some(number) => *number,
+            None => {
+                self.numbers.insert(self.group.clone(), next);
+                self.draft.groups.push(self.group.clone());
+                next
+            }
+        };
+        self.draft.begin(number);
+        self.is_new = false;
+    }
+
+    /// Returns the position, texture coordinates and normal of a corner. The error is the value and the rule.
+    #[inline]
+    fn corner(&mut self, word: &[u8], place: Place) -> Result<[u32; 3], String> {
+        let mut parts = [&word[..0]; 3];
+        for (i, part) in word.split(|byte| *byte == b'/').enumerate() {
+            match parts.get_mut(i) {
+                Some(slot) => *slot = part,
+                None => return Err(no_corner(word)),
+            }
+        }
+        let [position, uv, normal] = parts;
+        let index = |part: &[u8], count: usize, what: &str| match part {
+            [] => Ok(NONE),
+            _ => index(part, count, what).unwrap_or_else(|| Err(no_corner(word))),
+        };
+        if position.is_empty() {
+            return Err(no_corner(word));
+        }
+        let position = index(position, self.positions.len(), "vertex")?;
+        let damages = &mut self.draft.damages;
+        let mut or_none = |found: Result<u32, String>, stand_in| {
+            found.unwrap_or_else(|message| {
+                damages.add(stand_in, || place.fault(message));
+                NONE
+            })
+        };
+        let uv = or_none(index(uv, self.uvs.len(), "texture coordinate"), damage::UV);
+        let normal = or_none(index(normal, self.normals.len(), "normal"), damage::NORMAL);
+        Ok([position, uv, if self.normals_wanted { normal } else { NONE }])
+    }
+
+    fn finish(self) -> Obj {
+        for (keyword, count) in &self.unknown {
+            let several = counted(*count, "line is", "lines are");
+            tracing::debug!("{several} not looked at, with the keyword {keyword}");
+        }
+        let corners = &self.vertices.corners;
+        let mut draft = self.draft;
+        draft.without_triangles = match ["\"l\"", "\"p\""]
+            .iter()
+            .any(|keyword| self.unknown.contains_key(*keyword))
+        {
+            true => Some("points and lines are not rendered"),
+            false => (!self.positions.is_empty()).then_some("the file has vertices, but no faces"),
+        };
+        draft.positions = corners.iter().map(|[v, _, _]| self.positions[*v as usize]).collect();
+        if !self.colors.is_empty() {
+            let color = |v: u32| self.colors.get(v as usize).copied().unwrap_or(Vec4::ONE);
+            draft.colors = corners.iter().map(|[v, _, _]| color(*v)).collect();
+        }
+        let missing = corners.iter().filter(|[_, t, _]| *t == NONE).count();
+        if missing < corners.len() {
+            let uv = |i: u32| self.uvs.get(i as usize).copied().unwrap_or_default();
+            draft.uvs = corners.iter().map(|[_, t, _]| uv(*t)).collect();
+            if missing > 0 {
+                draft.notes.push(counted(
+                    missing,
+                    "vertex has no texture coordinates, as others have; it gets (0, 0)",
+                    "vertices have no texture coordinates, as others have; they get (0, 0)",
+                ));
+            }
+        }
+        if corners.iter().any(|[_, _, n]| *n != NONE) {
+            let normal = |i: u32| self.normals.get(i as usize).copied().unwrap_or_default();
+            draft.normals = corners.iter().map(|[_, _, n]| normal(*n)).collect();
+        }
+        Obj {
+            draft,
+            libraries: self.libraries,
+        }
+    }
+}
+
+fn position(words: &mut Words) -> Result<DVec3, Fault> {
+    let mut x = [0.0; 3];
+    for (x, name) in x.iter_mut().zip(["x", "y", "z"]) {
+        let value = words.number(name)?;
+        *x = coordinate(value).map_err(|rule| words.fault(format!("{name}: {rule}")))?;
+    }
+    Ok(x.into())
+}
+
+fn numbers(words: &mut Words) -> Result<DVec3, Fault> {
+    Ok(DVec3::new(words.number("x")?, words.number("y")?, words.number("z")?))
+}
+
+fn uv(words: &mut Words) -> Result<Vec2, Fault> {
+    let u = words.number("u")?;
+    // A texture may be a line, then v is left out.
+    let v = match words.on_line() {
+        Some(word) => words::number(word).ok_or_else(|| words.fault(format!("v: {} must be a number", shown(word))))?,
+        None => 0.0,
+    };
+    let check = |name: &str, x| texture_coordinate(x).map_err(|rule| words.fault(format!("{name}: {rule}")));
+    Ok(Vec2::new(check("u", u)?, check("v", v)?))
+}
+
+fn has_room(count: usize, words: &Words) -> Result<(), Fault> {
+    match count < MOST {
+        true => Ok(()),
+        false => Err(words.fault(format!("there must be at most {MOST} vertices"))),
+    }
+}
+
+/// The number, from 0 on, that a part of a corner is, among `count` lines above; None if it is no number.
+#[inline]
+fn index(part: &[u8], count: usize, what: &str) -> Option<Result<u32, String>> {
+    let (is_negative, digits) = match part {
+        [b'-', digits @ ..] => (true, digits),
+        digits => (false, digits),
+    };
+    if digits.is_empty() {
+        return None;
+    }
+    let mut n: usize = 0;
+    for digit in digits {
+        if !digit.is_ascii_digit() {
+            return None;
+        }
+        n = n.saturating_mul(10).saturating_add(usize::from(digit - b'0'));
+    }
+    // From 1 to `count`, forwards or backwards.
+    let found = n.wrapping_sub(1) < count;
+    Some(match (found, is_negative) {
+        (true, false) => Ok((n - 1) as u32),
+        (true, true) => Ok((count - n) as u32),
+        (false, _) if n == 0 => Err(format!(
+            "{what} 0 of the face: they are counted from 1, or from -1 backwards"
+        )),
+        (false, _) => {
+            let number = String::from_utf8_lossy(&part[..part.len().min(30)]);
+            Err(format!(
+                "{what} {number} of the face does not exist; there are {count} so far"
+            ))
+        }
+    })
+}
+
+#[cold]
+fn no_corner(word: &[u8]) -> String {
+    format!("{} must be a corner of a face: v, v/t, v//n or v/t/n", shown(word))
+}
+
+/// The vertices: one for each different corner.
+#[derive(Default)]
+struct Vertices {
+    corners: Vec<[u32; 3]>,
+    /// For each position, the first vertex there.
+    first: Vec<u32>,
+    /// All other vertices.
+    others: HashTable<u32>,
+    hasher: DefaultHashBuilder,
+}
+
+impl Vertices {
+    /// The number of the vertex with this corner.
+    #[inline]
+    fn number(&mut self, corner: [u32; 3]) -> u32 {
+        let next = self.corners.len() as u32;
+        let first = &mut self.first[corner[0] as usize];
+        if *first == NONE {
+            *first = next;
+            self.corners.push(corner);
+            return next;
+        }
+        if self.corners[*first as usize] == corner {
+            return *first;
+        }
+        let hash = |corner: &[u32; 3]| self.hasher.hash_one(corner);
+        let corners = &self.corners;
+        let entry = self.others.entry(
+            hash(&corner),
+            |vertex| corners[*vertex as usize] == corner,
+            |vertex| hash(&corners[*vertex as usize]),
+        );
+        let number = *entry.or_insert(next).get();
+        if number == next {
+            self.corners.push(corner);
+        }
+        number
+    }
+}

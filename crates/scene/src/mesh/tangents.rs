@@ -1,0 +1,327 @@
+//! The tangents of a smooth mesh's vertices, for its normal maps: along which directions its texture coordinates grow.
+//!
+//! Those of a triangle are the derivatives of its position by u and by v. A vertex has the mean of its triangles', each in the
+//! plane of the vertex's normal, without its length, and weighted by the triangle's angle there: Mikkelsen, "Simulation of
+//! Wrinkled Surfaces Revisited", University of Copenhagen, 2008, whose tangents (MikkTSpace) glTF prescribes. Unlike there, the
+//! derivative by v is kept too, so that a texture may be turned on a surface where the two are not at right angles.
+//! Tangents that the mesh has of its own stand as they are.
+
+use glam::{DVec2, DVec3, Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::Mesh;
+use super::neighbours::Neighbours;
+
+/// Of more vertices at one point none are joined, as each would be compared with each.
+const MOST_JOINED: usize = 64;
+/// The cosine of the largest angle between normals that count as one: 1 degree.
+const ONE_NORMAL: f64 = 0.9998;
+/// The cosine of the largest angle between tangents that are joined: 60 degrees.
+const ONE_DIRECTION: f64 = 0.5;
+/// By how much texture coordinates that differ by whole numbers may be off, as files round them.
+const WHOLE: f64 = 1e-4;
+
+/// The tangents of a mesh's vertices. No vertex has triangles of both hands, those whose texture is seen from its front and
+/// those that mirror it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VertexTangents {
+    /// The mesh's triangles; of a vertex that has triangles of both hands, those that mirror have its copy.
+    pub triangles: Vec<[u32; 3]>,
+    /// The vertices that are copied; the copies are numbered after all vertices.
+    pub copies: Vec<u32>,
+    /// The tangents of each vertex, and of each copy.
+    pub tangents: Vec<Tangents>,
+}
+
+/// Derivatives of the position by u and v, up to a common factor: the sum of their squares is 1. They are zero where the
+/// triangles have none, or where those cancel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tangents {
+    /// By u.
+    pub u: Vec3,
+    /// By v.
+    pub v: Vec3,
+}
+
+impl VertexTangents {
+    /// None if the mesh has no texture coordinates, or is flat.
+    pub fn of(mesh: &Mesh) -> Option<VertexTangents> {
+        if mesh.uvs.is_empty() || mesh.normals.is_empty() {
+            return None;
+        }
+        let with_mesh = |vertex: usize| mesh.tangents.get(vertex).and_then(|t| given(*t, mesh.normals[vertex]));
+        let (triangles, copies) = parted(mesh);
+        let neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
+        let mut tangents = vec![Tangents::default(); mesh.positions.len() + copies.len()];
+        let found: Vec<(u32, Tangents)> = (0..neighbours.count())
+            .into_par_iter()
+            .with_min_len(1024)
+            .flat_map_iter(|point| at_point(mesh, &triangles, &neighbours, point))
+            .collect();
+        for (vertex, found) in found {
+            tangents[vertex as usize] = found;
+        }
+        for (vertex, own) in tangents.iter_mut().enumerate().take(mesh.positions.len()) {
+            *own = with_mesh(vertex).unwrap_or(*own);
+        }
+        Some(VertexTangents {
+            triangles,
+            copies,
+            tangents,
+        })
+    }
+}
+
+/// The tangents that a mesh has itself at a vertex with this normal, as glTF has them (glTF 2.0, 3.7.2.1); None where it has none.
+fn given(tangent: Vec4, normal: Vec3) -> Option<Tangents> {
+    let u = tangent.truncate().as_dvec3().try_normalize()?;
+    let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+    let v = normal.as_dvec3().cross(u).try_normalize()? * side;
+    let scale = std::f64::consts::FRAC_1_SQRT_2;
+    Some(Tangents {
+        u: (u * scale).as_vec3(),
+        v: (v * scale).as_vec3(),
+    })
+}
+
+/// Twice the area of a triangle in texture coordinates, negative where the texture is mirrored.
+fn texture_area([a, b, c]: [DVec2; 3]) -> f64 {
+    (b - a).perp_dot(c - a)
+}
+
+/// The triangles such that no vertex has some of both hands, and the vertices that are copied for that.
+fn parted(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
+    const PLAIN: u8 = 1;
+    const MIRRORED: u8 = 2;
+    let hand = |triangle: &[u32; 3]| match texture_area(triangle.map(|vertex| mesh.uvs[vertex as usize].as_dvec2())) {
+        area if area > 0.0 => PLAIN,
+        area if area < 0.0 => MIRRORED,
+        _ => 0,
+    };
+    let hands: Vec<u8> = mesh.triangles.par_iter().map(hand).collect();
+    let mut hands_at = vec![0; mesh.positions.len()];
+    for (triangle, hand) in mesh.triangles.iter().zip(&hands) {
+        triangle.iter().for_each(|vertex| hands_at[*vertex as usize] |= hand);
+    }
+    let mut copies = Vec::new();
+    let mut copy_of = vec![0; hands_at.len()];
+    for (vertex, hands) in hands_at.iter().enumerate() {
+        let has_own = (mesh.tangents.get(vertex)).is_some_and(|t| given(*t, mesh.normals[vertex]).is_some());
+        if *hands == PLAIN | MIRRORED && !has_own {
+            copy_of[vertex] = (hands_at.len() + copies.len()) as u32;
+            copies.push(vertex as u32);
+        }
+    }
+    let mut triangles = mesh.triangles.clone();
+    for (triangle, hand) in triangles.iter_mut().zip(&hands) {
+        for vertex in triangle {
+            if *hand == MIRRORED && copy_of[*vertex as usize] != 0 {
+                *vertex = copy_of[*vertex as usize];
+            }
+        }
+    }
+    (triangles, copies)
+}
+
+/// What the triangles at a vertex add up to.
+#[derive(Clone, Copy, Debug)]
+struct Sum {
+    vertex: u32,
+    uv: DVec2,
+    normal: DVec3,
+    u: DVec3,
+    v: DVec3,
+    /// The sums of the lengths of what was added to `u` and `v`.
+    lengths: DVec2,
+}
+
+impl Sum {
+    fn with(self, other: &Sum) -> Sum {
+        Sum {
+            u: self.u + other.u,
+            v: self.v + other.v,
+            lengths: self.lengths + other.lengths,
+            ..self
+        }
+    }
+
+    /// Whether a texture that repeats goes on from one vertex to another at the same point, as where u goes from 1 to 0 around
+    /// a sphere. Where pieces of an atlas meet, each keeps its own tangents, as MikkTSpace has them: maps are made with those.
+    fn goes_on_in(&self, other: &Sum) -> bool {
+        let apart = self.uv - other.uv;
+        let repeats = (apart - apart.round()).abs().max_element() < WHOLE;
+        let agree = |a: DVec3, b: DVec3| a.dot(b) > ONE_DIRECTION * a.length() * b.length();
+        repeats && self.normal.dot(other.normal) > ONE_NORMAL && agree(self.u, other.u) && agree(self.v, other.v)
+    }
+
+    fn tangents(&self) -> Tangents {
+        let lengths = DVec2::new(self.u.length(), self.v.length());
+        if lengths.cmpgt(self.lengths * 1e-3).all() {
+            let scale = 1.0 / lengths.length();
+            Tangents {
+                u: (self.u * scale).as_vec3(),
+                v: (self.v * scale).as_vec3(),
+            }
+        } else {
+            Tangents::default()
+        }
+    }
+}
+
+/// What a triangle adds at its corner k; nothing if its texture coordinates have no area.
+fn at_corner(mesh: &Mesh, triangle: [u32; 3], k: usize, vertex: u32) -> Option<Sum> {
+    let corners = [0, 1, 2].map(|i| triangle[(k + i) % 3] as usize);
+    let [p, next, previous] = corners.map(|corner| mesh.positions[corner].as_dvec3());
+    let uvs = corners.map(|corner| mesh.uvs[corner].as_dvec2());
+    let normal = mesh.normals[corners[0]].as_dvec3();
+    let (e, f) = (next - p, previous - p);
+    let (a, b) = (uvs[1] - uvs[0], uvs[2] - uvs[0]);
+    let sign = texture_area(uvs).signum();
+    let in_plane = |d: DVec3| d - normal * normal.dot(d);
+    let u = in_plane((e * b.y - f * a.y) * sign);
+    let v = in_plane((f * a.x - e * b.x) * sign);
+    let angle = f64::atan2(e.cross(f).length(), e.dot(f));
+    let scale = angle / (u.length_squared() + v.length_squared()).sqrt();
+    (texture_area(uvs) != 0.0 && scale.is_finite()).then(|| Sum {
+        vertex,
+        uv: uvs[0],
+        normal,
+        u: u * scale,
+        v: v * scale,
+        lengths: DVec2::new(u.length(), v.length()) * scale,
+    })
+}
+
+/// The tangents of the vertices at a point.
+fn at_point(mesh: &Mesh, triangles: &[[u32; 3]], neighbours: &Neighbours, point: usize) -> Vec<(u32, Tangents)> {
+    let at_triangle = |i: &u32| {
+        let triangle = mesh.triangles[*i as usize];
+        let k = (0..3).find(|k| neighbours.points[triangle[*k] as usize] as usize == point)?;
+        at_corner(mesh, triangle, k, triangles[*i as usize][k])
+    };
+    let mut corners: Vec<Sum> = neighbours.around(point).iter().filter_map(at_triangle).collect();
+    corners.sort_by_key(|corner| corner.vertex);
+    let sums: Vec<Sum> = corners
+        .chunk_by(|a, b| a.vertex == b.vertex)
+        .filter_map(|corners| corners.iter().copied().reduce(|sum, corner| sum.with(&corner)))
+        .collect();
+    let joined = |sum: &Sum| {
+        let others = sums
+            .iter()
+            .filter(|other| other.vertex != sum.vertex && sums.len() <= MOST_JOINED && sum.goes_on_in(other));
+        (sum.vertex, others.fold(*sum, Sum::with).tangents())
+    };
+    sums.iter().map(joined).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+
+    /// A mesh in the plane of x and y, with texture coordinates by its points.
+    fn plane(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, uv: impl Fn(Vec3) -> Vec2) -> Mesh {
+        Mesh {
+            uvs: positions.iter().copied().map(uv).collect(),
+            normals: vec![Vec3::Z; positions.len()],
+            positions,
+            triangles,
+            ..Mesh::default()
+        }
+    }
+
+    /// Two triangles that share a corner alone.
+    fn bow(uv: impl Fn(Vec3) -> Vec2) -> Mesh {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y];
+        plane(positions, vec![[0, 1, 2], [0, 3, 4]], uv)
+    }
+
+    #[test]
+    fn tangents_have_the_texture_s_directions_and_proportions() {
+        let mesh = bow(|p| Vec2::new(p.x / 4.0, p.x / 3.0 + p.y / 3.0));
+        let found = VertexTangents::of(&mesh).unwrap();
+        assert_eq!((&found.triangles, found.copies.len()), (&mesh.triangles, 0));
+        for Tangents { u, v } in found.tangents {
+            let expected = [Vec3::new(4.0, -4.0, 0.0), Vec3::new(0.0, 3.0, 0.0)].map(|d| d / 41f32.sqrt());
+            assert!(u.abs_diff_eq(expected[0], 1e-6) && v.abs_diff_eq(expected[1], 1e-6));
+        }
+    }
+
+    #[test]
+    fn neither_size_nor_number_of_triangles_counts() {
+        // To the left of the origin, where x is negative, the texture lies in another direction.
+        let at_origin = |rim: &[Vec3]| {
+            let positions: Vec<Vec3> = [Vec3::ZERO].iter().chain(rim).copied().collect();
+            let triangles = (1..rim.len() as u32).map(|i| [0, i, i + 1]).collect();
+            let mesh = plane(positions, triangles, |p| Vec2::new(p.x, p.y - p.x.min(0.0)));
+            VertexTangents::of(&mesh).unwrap().tangents[0].u
+        };
+        let left = Vec3::new(-0.3, 0.3, 0.0);
+        let found = at_origin(&[Vec3::X, Vec3::Y, -Vec3::X]);
+        assert!(found.y > 0.1 && found.abs_diff_eq(at_origin(&[Vec3::X * 9.0, Vec3::Y, left, -Vec3::X]), 1e-6));
+    }
+
+    #[test]
+    fn a_seam_of_the_normals_parts_tangents() {
+        let with_normal = |normal: Vec3| {
+            let mut mesh = bow(|p| Vec2::new(p.x, p.y - p.x.min(0.0)));
+            mesh.triangles[1][0] = 5;
+            mesh.positions.push(Vec3::ZERO);
+            mesh.uvs.push(Vec2::ZERO);
+            mesh.normals.push(normal.normalize());
+            VertexTangents::of(&mesh).unwrap().tangents[0].u.normalize()
+        };
+        assert!(with_normal(Vec3::Z).y > 0.1);
+        assert!(with_normal(Vec3::new(0.1, 0.0, 1.0)).abs_diff_eq(Vec3::X, 1e-6));
+    }
+
+    #[test]
+    fn tangents_that_cancel_are_zero() {
+        // The texture is turned by half a turn on the second triangle.
+        let mesh = bow(|p| p.truncate().abs());
+        let found = VertexTangents::of(&mesh).unwrap().tangents;
+        assert_eq!(found[0], Tangents::default());
+        assert!(found[1].u.x > 0.0 && found[3].u.x < 0.0);
+    }
+
+    #[test]
+    fn a_vertex_has_a_copy_for_mirrored_triangles() {
+        let mesh = bow(|p| Vec2::new(p.x.abs(), p.y));
+        let found = VertexTangents::of(&mesh).unwrap();
+        assert_eq!((found.triangles, found.copies), (vec![[0, 1, 2], [5, 3, 4]], vec![0]));
+        assert!(found.tangents[0].u.x > 0.0 && found.tangents[5].u.x < 0.0);
+        assert_eq!(found.tangents.len(), 6);
+    }
+
+    #[test]
+    fn where_very_many_vertices_meet_each_is_by_itself() {
+        // A disk whose triangles have a middle each.
+        let at_middle = |count: u32| {
+            let rim = |i: u32| Vec2::from_angle(std::f32::consts::TAU * i as f32 / count as f32).extend(0.0);
+            let positions = (0..2 * count).map(|i| if i < count { rim(i) } else { Vec3::ZERO });
+            let triangles = (0..count).map(|i| [count + i, i, (i + 1) % count]);
+            let mesh = plane(positions.collect(), triangles.collect(), |p| {
+                Vec2::new(p.x, p.y + 0.1 * p.x * p.x)
+            });
+            VertexTangents::of(&mesh).unwrap().tangents[count as usize]
+                .u
+                .normalize()
+        };
+        // The texture is bent: the first triangle's own direction is another one than the mean.
+        assert!(at_middle(64).y.abs() < 0.01);
+        assert!(at_middle(65).y.abs() > 0.05);
+    }
+
+    #[test]
+    fn flat_meshes_and_those_without_texture_coordinates_have_none() {
+        let mesh = bow(|p| p.truncate());
+        let without = |uvs: bool| Mesh {
+            uvs: if uvs { vec![] } else { mesh.uvs.clone() },
+            normals: if uvs { mesh.normals.clone() } else { vec![] },
+            ..mesh.clone()
+        };
+        assert_eq!(VertexTangents::of(&without(true)), None);
+        assert_eq!(VertexTangents::of(&without(false)), None);
+    }
+}

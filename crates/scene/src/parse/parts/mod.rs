@@ -1,0 +1,355 @@
+//! A scene file in parts, so that a parser holds one of them at a time: what it makes of a text takes some 30 times the
+//! text's memory. A part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]`, `[textures.NAME]`, `[meshes.NAME]` or `[[instances]]`; what is
+//! outside of these is one part.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use toml::de::Error;
+use toml::{Table, Value};
+use toml_parser::Source;
+use toml_parser::lexer::{Token, TokenKind};
+
+use super::syntax::{explained, syntax_error};
+use crate::error::{KeyPath, SceneError, Segment};
+
+/// The largest part in bytes, and the largest file that has to be read as a whole.
+pub const LARGEST: usize = 4 << 20;
+
+/// What a part belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Textures,
+    Materials,
+    Lights,
+    Shapes,
+    Meshes,
+    Instances,
+}
+
+impl Kind {
+    pub const ALL: [Kind; 6] = [
+        Kind::Textures,
+        Kind::Materials,
+        Kind::Lights,
+        Kind::Shapes,
+        Kind::Meshes,
+        Kind::Instances,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Textures => "textures",
+            Kind::Materials => "materials",
+            Kind::Lights => "lights",
+            Kind::Shapes => "shapes",
+            Kind::Meshes => "meshes",
+            Kind::Instances => "instances",
+        }
+    }
+
+    /// Whether its tables have names.
+    fn is_map(self) -> bool {
+        matches!(self, Kind::Textures | Kind::Materials | Kind::Meshes)
+    }
+}
+
+/// A table with those below it that follow it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    pub kind: Kind,
+    /// Where it is in the text, its header first.
+    pub place: Range<usize>,
+}
+
+/// A text's parts. Each is a TOML document by itself.
+pub struct Parts<'a> {
+    pub text: &'a str,
+    pub parts: Cow<'a, [Part]>,
+}
+
+/// An error in a text.
+#[derive(Debug)]
+pub struct Broken {
+    /// Byte offset.
+    pub at: usize,
+    message: String,
+    /// Whether the message is the TOML parser's, and the place is known.
+    is_syntax: bool,
+}
+
+impl Broken {
+    /// Returns the parser's error of the document that begins at `start`.
+    pub fn of(start: usize, error: &Error) -> Broken {
+        Broken {
+            at: start + error.span().map_or(0, |span| span.start),
+            message: error.message().to_owned(),
+            is_syntax: error.span().is_some(),
+        }
+    }
+
+    fn too_large(at: usize, message: String) -> Broken {
+        Broken {
+            at,
+            message,
+            is_syntax: false,
+        }
+    }
+
+    /// Returns the error of the text of a file.
+    pub fn into_error(self, text: &str, origin: &str) -> SceneError {
+        let message = match self.is_syntax {
+            true => explained(text, self.at, &self.message),
+            false => self.message,
+        };
+        syntax_error(text, origin, self.at, &message)
+    }
+
+    /// A text that would have to be read as a whole, and is too large for that.
+    pub fn whole(text: &str) -> Broken {
+        let size = text.len() as f64 / f64::from(1 << 20);
+        let rule =
+            "every texture, material, light, shape, mesh and instance must have its own header, such as [[shapes]]";
+        let message = format!(
+            "in a file larger than {} MiB {rule}; it has {size:.1} MiB",
+            LARGEST >> 20
+        );
+        Broken::too_large(0, message)
+    }
+}
+
+/// What is outside of the parts, as a document by itself.
+#[derive(Default)]
+pub struct Rest {
+    pub text: String,
+    /// Where each piece of it begins, here and in the whole text.
+    pieces: Vec<(usize, usize)>,
+}
+
+impl Rest {
+    /// Where a byte of it is in the whole text.
+    pub fn place(&self, at: usize) -> usize {
+        let next = self.pieces.partition_point(|(here, _)| *here <= at);
+        let (here, there) = next.checked_sub(1).map_or((0, 0), |last| self.pieces[last]);
+        there + (at - here)
+    }
+}
+
+/// A name that a part's table has, if it has one, and the table.
+pub type Named = (Option<String>, Table);
+
+impl<'a> Parts<'a> {
+    pub fn of(text: &'a str) -> Parts<'a> {
+        let mut parts: Vec<Part> = Vec::new();
+        // The keys of the part's header, while it goes on.
+        let mut open: Option<Vec<&str>> = None;
+        for header in Headers::of(text) {
+            let below = |keys: &Vec<&str>| header.keys.len() > keys.len() && header.keys.starts_with(keys);
+            if open.as_ref().is_some_and(below) {
+                continue;
+            }
+            if let (Some(_), Some(part)) = (open.take(), parts.last_mut()) {
+                part.place.end = header.start;
+            }
+            let kind = Kind::ALL.into_iter().find(|kind| {
+                let length = if kind.is_map() { 2 } else { 1 };
+                header.is_array != kind.is_map()
+                    && header.keys.len() == length
+                    && header.keys.first() == Some(&kind.name())
+            });
+            if let Some(kind) = kind {
+                let place = header.start..text.len();
+                parts.push(Part { kind, place });
+                open = Some(header.keys);
+            }
+        }
+        Parts {
+            text,
+            parts: parts.into(),
+        }
+    }
+
+    /// What is outside of the parts.
+    pub fn rest(&self) -> Rest {
+        let mut rest = Rest::default();
+        let mut end = 0;
+        let places = self.parts.iter().map(|part| part.place.clone());
+        for place in places.chain(std::iter::once(self.text.len()..self.text.len())) {
+            if end < place.start {
+                rest.pieces.push((rest.text.len(), end));
+                rest.text.push_str(&self.text[end..place.start]);
+            }
+            end = place.end;
+        }
+        rest
+    }
+
+    /// What is larger than [`LARGEST`], if anything is.
+    pub fn too_large(&self) -> Option<Broken> {
+        let large = self.parts.iter().find(|part| part.place.len() > LARGEST);
+        if let Some(part) = large {
+            let message = format!("the table that starts here is larger than {} MiB", LARGEST >> 20);
+            return Some(Broken::too_large(part.place.start, message));
+        }
+        let parts: usize = self.parts.iter().map(|part| part.place.len()).sum();
+        let rest = self.text.len() - parts;
+        (rest > LARGEST).then(|| Broken::whole(self.text))
+    }
+
+    /// The tables outside of the parts.
+    pub fn read_rest(&self) -> Result<Table, Broken> {
+        let rest = self.rest();
+        toml::from_str(&rest.text).map_err(|error| {
+            let broken = Broken::of(0, &error);
+            Broken {
+                at: rest.place(broken.at),
+                ..broken
+            }
+        })
+    }
+
+    /// The table of a part; `None` if it is none of its kind, and the file must be read as a whole.
+    pub fn read(&self, part: &Part) -> Result<Option<Named>, Broken> {
+        let document = toml::from_str(self.text(part)).map_err(|error| Broken::of(part.place.start, &error));
+        let mut document: Table = document?;
+        Ok(match document.remove(part.kind.name()) {
+            Some(Value::Array(mut tables)) if tables.len() == 1 => match tables.pop() {
+                Some(Value::Table(table)) => Some((None, table)),
+                _ => None,
+            },
+            Some(Value::Table(tables)) if part.kind.is_map() && tables.len() == 1 => match tables.into_iter().next() {
+                Some((name, Value::Table(table))) => Some((Some(name), table)),
+                _ => None,
+            },
+            _ => None,
+        })
+    }
+
+    /// What TOML says of two parts together, which have the same name.
+    pub fn twice(&self, name: &str, part: &Part) -> Option<Broken> {
+        let path = [part.kind.name(), name].map(Segment::from);
+        let (first, _) = self.find(&KeyPath(path.to_vec()))?;
+        let both = [self.text(first), self.text(part)];
+        let error = toml::from_str::<Table>(&both.concat()).err()?;
+        let at = error.span().map_or(0, |span| span.start);
+        let start = match at.checked_sub(both[0].len()) {
+            Some(at) => part.place.start + at,
+            None => first.place.start + at,
+        };
+        Some(Broken {
+            at: start,
+            ..Broken::of(0, &error)
+        })
+    }
+
+    /// The part that a key path leads into, and the path in it.
+    pub fn find(&self, path: &KeyPath) -> Option<(&Part, KeyPath)> {
+        let [Segment::Key(first), second, rest @ ..] = path.0.as_slice() else {
+            return None;
+        };
+        let mut parts = self.parts.iter().filter(|part| part.kind.name() == first);
+        let (part, second) = match second {
+            Segment::Index(index) => (parts.nth(*index)?, Segment::Index(0)),
+            Segment::Key(name) => {
+                let part = parts.find(|part| {
+                    let lines = self.text[part.place.clone()].lines();
+                    let header: Option<Table> = lines.take(1).find_map(|line| toml::from_str(line).ok());
+                    let tables = header.and_then(|mut header| header.remove(first));
+                    tables.is_some_and(|tables| tables.get(name).is_some())
+                });
+                (part?, Segment::Key(name.clone()))
+            }
+        };
+        let start = [Segment::Key(first.clone()), second];
+        Some((part, KeyPath(start.into_iter().chain(rest.iter().cloned()).collect())))
+    }
+
+    pub fn text(&self, part: &Part) -> &'a str {
+        &self.text[part.place.clone()]
+    }
+}
+
+/// A table's header: `[a.b]` or `[[a.b]]`.
+struct Header<'a> {
+    start: usize,
+    is_array: bool,
+    /// As they are written.
+    keys: Vec<&'a str>,
+}
+
+/// The headers of a text, in its order. What is no header, or a broken one, is passed over.
+struct Headers<'a, T: Iterator<Item = Token>> {
+    text: &'a str,
+    tokens: T,
+    /// Whether a statement may begin: at the start, and on a new line.
+    begins: bool,
+}
+
+impl<'a> Headers<'a, toml_parser::lexer::Lexer<'a>> {
+    fn of(text: &'a str) -> Self {
+        Headers {
+            text,
+            tokens: Source::new(text).lex(),
+            begins: true,
+        }
+    }
+}
+
+impl<'a, T: Iterator<Item = Token>> Headers<'a, T> {
+    /// The header whose first bracket stands at `start`; the tokens go on behind it.
+    fn header(&mut self, start: usize) -> Option<Header<'a>> {
+        let mut keys = Vec::new();
+        let mut brackets = [1, 0]; // opened, closed
+        for token in self.tokens.by_ref() {
+            let (begin, end) = (token.span().start(), token.span().end());
+            match token.kind() {
+                TokenKind::LeftSquareBracket if keys.is_empty() && brackets[0] == 1 => brackets[0] = 2,
+                TokenKind::RightSquareBracket => brackets[1] += 1,
+                TokenKind::Atom | TokenKind::BasicString | TokenKind::LiteralString => {
+                    keys.push(self.text.get(begin..end)?);
+                }
+                TokenKind::Dot | TokenKind::Whitespace => {}
+                _ => return None,
+            }
+            if brackets[0] == brackets[1] {
+                return Some(Header {
+                    start,
+                    is_array: brackets[0] == 2,
+                    keys,
+                });
+            }
+        }
+        None
+    }
+}
+
+impl<'a, T: Iterator<Item = Token>> Iterator for Headers<'a, T> {
+    type Item = Header<'a>;
+
+    fn next(&mut self) -> Option<Header<'a>> {
+        let mut depth = 0_usize; // of brackets in a value
+        while let Some(token) = self.tokens.next() {
+            match token.kind() {
+                TokenKind::Newline if depth == 0 => self.begins = true,
+                TokenKind::Whitespace | TokenKind::Newline | TokenKind::Comment => {}
+                TokenKind::LeftSquareBracket if self.begins => {
+                    self.begins = false;
+                    match self.header(token.span().start()) {
+                        Some(header) => return Some(header),
+                        None => self.begins = true, // on the next line, or the text is broken
+                    }
+                }
+                TokenKind::LeftSquareBracket | TokenKind::LeftCurlyBracket => {
+                    self.begins = false;
+                    depth += 1;
+                }
+                TokenKind::RightSquareBracket | TokenKind::RightCurlyBracket => depth = depth.saturating_sub(1),
+                _ => self.begins = false,
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,142 @@
+//! A text read by its parts says what it says read as a whole.
+
+use super::*;
+use crate::Description;
+use crate::error::SceneError;
+use crate::parse::{Defines, invalid, read_file};
+
+const START: &str = "\
+image = { width = 4, height = 4 }
+camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
+";
+const POINT: &str = "[[lights]]\ntype = 'point'\nposition = [0, 0, 3]\ncolor = [1, 1, 1]\n";
+const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'a'\ncenter = [0, 0, 0]\nradius = 1\n";
+const RED: &str = "[materials.a]\ntype = 'phong'\ncolor = [1, 0, 0]\n";
+const BLUE: &str = "[materials.\"b c\"]\ntype = 'phong'\ncolor = [0, 0, 1]\n";
+
+/// Returns the description of a text that is parsed as a whole, or its error.
+fn whole(text: &str) -> Result<Description, SceneError> {
+    let table = toml::from_str(text).map_err(|error| Broken::of(0, &error).into_error(text, "s"))?;
+    read_file(table).map_err(|problems| invalid(text, "s", problems, &Defines::new(&[])))
+}
+
+/// The same by parts, with line and column of what is wrong.
+fn by_parts(text: &str) -> Result<Description, String> {
+    Description::parse(text, "s").map_err(|error| error.to_string())
+}
+
+fn assert_same(text: &str) {
+    match (whole(text), by_parts(text)) {
+        (Ok(whole), Ok(parts)) => assert!(whole == parts, "{text}"),
+        (Err(whole), Err(parts)) => assert_eq!(whole.to_string(), parts, "{text}"),
+        (whole, parts) => panic!("{text}\n{whole:?}\n{parts:?}"),
+    }
+}
+
+#[test]
+fn good_files_say_the_same() {
+    let sub = "[materials.a.normal_map]\ntexture = 't'\n";
+    let image = "[textures.t]\ntype = 'image'\nfile = 'a [[shapes]] b'\n";
+    let strange = "[[ shapes ]] # [[lights]]\n type = \"\"\"sphere\"\"\"\nmaterial = '[[shapes]]'\ncenter = [ # [x]\n0,\n\
+                   [[shapes]]\n][0:0]";
+    let nested = "[[shapes]]\r\ntype = 'triangle'\r\nmaterial = 'a'\r\nvertices = [\r\n[0, 0, 0],\r\n  [1, 0, 0],\r\n[0, 1, 0]]\r\n";
+    let text = "[materials.z]\ntype = 'phong'\n[materials.z.color]\ntexture = \"\"\"\n[[shapes]]\n\"\"\"\n";
+    let render = "[render]\nseed = 3\n[render.pixel_samples]\ncount = 4\n";
+    let pieces = [POINT, SPHERE, RED, BLUE, sub, image, nested, text, render];
+    // Every order of three, and those in which a table below comes late or a table is defined twice, which is an error.
+    for a in pieces {
+        for b in pieces {
+            for c in pieces {
+                assert_same(&format!("{START}{a}{b}{c}"));
+            }
+        }
+    }
+    assert_same(&format!("{START}{strange}"));
+    assert_same(&format!("\u{feff}{START}{SPHERE}{RED}"));
+    assert_same(&format!("{START}shapes = []\n{RED}"));
+    assert_same(&format!(
+        "{START}lights = [{{ type = 'point', position = [0, 0, 3], color = [1, 1, 1] }}]\n{SPHERE}{RED}"
+    ));
+    assert_same(&format!("{START}[materials]\n{RED}{SPHERE}"));
+    assert_same(&format!("{START}[materials]\nb = {{ type = 'mirror' }}\n{RED}{SPHERE}"));
+    assert_same(&format!("{START}materials.b.type = 'mirror'\n{RED}{SPHERE}"));
+    assert_same(&format!("{START}[\"materials\".b]\ntype = 'mirror'\n{RED}{SPHERE}"));
+    let parts = Parts::of(&format!("{START}{RED}{sub}{BLUE}{SPHERE}{SPHERE}{render}{POINT}"))
+        .parts
+        .len();
+    assert_eq!(parts, 5);
+}
+
+#[test]
+fn bad_files_are_told_the_same() {
+    let good = format!(
+        "{START}{POINT}{RED}{render}{SPHERE}{BLUE}{SPHERE}{POINT}",
+        render = "[render]\nseed = 3\n"
+    );
+    assert_same(&good);
+    // Every line left out, doubled, cut in the middle, or with something before it.
+    let lines: Vec<&str> = good.lines().collect();
+    for i in 0..lines.len() {
+        let line = lines[i];
+        let half = &line[..line.len() / 2];
+        for new in [
+            String::new(),
+            format!("{line}\n{line}"),
+            half.to_owned(),
+            format!("{half}\n{line}"),
+            format!("x = 3\n{line}"),
+            format!("[shapes.b]\n{line}"),
+            format!("[[lights.b]]\n{line}"),
+            format!("[\n{line}"),
+            format!("[[shapes]] {line}"),
+            format!("= {line}"),
+            format!("x = [\n{line}"),
+            format!("x = \"\"\"\n{line}"),
+            format!("{line}\n\u{7}"),
+            line.replace("type = '", "type = 'x"),
+            line.replace("[0", "['x'"),
+        ] {
+            let mut changed: Vec<&str> = lines.clone();
+            changed[i] = &new;
+            assert_same(&changed.join("\n"));
+        }
+    }
+}
+
+#[test]
+fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
+    let many = "[0, 0, 0],".repeat(LARGEST / 10 + 1);
+    let told = |text: &str| by_parts(text).unwrap_err();
+    let long = format!("{START}{RED}[[shapes]]\nx = [{many}]\n");
+    assert_eq!(told(&long), "s:6:1: the table that starts here is larger than 4 MiB");
+    let rest = format!("{START}x = [{many}]\n{SPHERE}");
+    assert!(told(&rest).starts_with("s:1:1: "));
+    assert!(
+        told(&rest).contains("in a file larger than 4 MiB every texture, material, light, shape, mesh and instance")
+    );
+    let spheres = SPHERE.repeat(LARGEST / SPHERE.len() + 1);
+    assert!(by_parts(&format!("{START}{spheres}{RED}")).unwrap().shapes.len() > 50_000);
+    assert!(told(&format!("{START}{spheres}[materials]\n{RED}")).contains("must have its own header"));
+    let bad = format!("{START}{spheres}{RED}[render]\nseed = -1\n");
+    let line = 1 + bad[..bad.len() - 10].matches('\n').count();
+    assert!(
+        told(&bad).starts_with(&format!("s:{line}: render.seed: -1 ")),
+        "{}",
+        told(&bad)
+    );
+    let bad = format!(
+        "{START}{RED}{spheres}{}{BLUE}",
+        BLUE.replace("b c", "d").replace("color", "colour")
+    );
+    let line = bad.matches('\n').count() - 3;
+    assert!(
+        told(&bad).starts_with(&format!("s:{line}: materials.d.colour: ")),
+        "{}",
+        told(&bad)
+    );
+    let twice = told(&format!("{START}{RED}{spheres}{RED}"));
+    assert!(twice.contains("duplicate key") && !twice.starts_with("s:3:"), "{twice}");
+    let bad = format!("{START}{spheres}{}", SPHERE.replace("radius", "size"));
+    let line = bad.matches('\n').count();
+    assert!(told(&bad).starts_with(&format!("s:{line}: shapes[")), "{}", told(&bad));
+}

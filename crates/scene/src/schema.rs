@@ -1,0 +1,266 @@
+//! The JSON Schema of scene files, made of the very types that read them (`description/`) and of the limits that their values are
+//! checked by (`limits.rs`).
+
+pub(crate) mod fields;
+pub(super) mod kinds;
+
+use schemars::generate::SchemaSettings;
+use schemars::{Schema, SchemaGenerator};
+use serde_json::{Map, Value, json};
+
+use super::description::tagged::Tagged as _;
+use super::{CameraDescription, Description};
+
+/// What is between the words of a kind of values and their range, as `kinds` has them.
+const SPLIT: &str = "|";
+
+/// A JSON Schema of the draft 2020-12 that scene files in TOML keep, for editors to complete and check them by.
+///
+/// What it refuses the program refuses. The program knows more rules: those of several values together, such as a camera that looks at
+/// its own position, and of what names refer to.
+pub fn schema() -> String {
+    let mut schema = of_files();
+    without_kinds(&mut schema);
+    schema["title"] = json!("wgray scene");
+    schema["description"] = json!("A scene of wgray, version ".to_owned() + env!("CARGO_PKG_VERSION") + ".");
+    format!("{schema:#}\n")
+}
+
+/// The schema, in which values have their kinds as titles.
+fn of_files() -> Value {
+    // Editors that do not look beside a reference see all that is said in its place.
+    let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
+    let mut schema = settings
+        .into_generator()
+        .into_root_schema_for::<Description>()
+        .to_value();
+    of_camera(&mut schema);
+    finish(&mut schema);
+    schema
+}
+
+/// Takes the kinds away, which descriptions tell.
+fn without_kinds(schema: &mut Value) {
+    match schema {
+        Value::Array(all) => all.iter_mut().for_each(without_kinds),
+        Value::Object(all) => {
+            all.retain(|key, value| key != "title" || !value.is_string());
+            all.values_mut().for_each(without_kinds);
+        }
+        _ => {}
+    }
+}
+
+/// A table that its key `type` tells apart: `shape` is what it is of. Each type has its tag, its description and its own schema, which
+/// becomes one of the definitions.
+pub(super) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
+    let tags: Vec<&str> = types.iter().map(|(tag, ..)| *tag).collect();
+    let told: Vec<&str> = types.iter().map(|(_, told, _)| told.trim()).collect();
+    let key = json!({ "description": "The type.", "type": "string", "enum": tags, "enumDescriptions": told });
+    // A condition for each type, so that a mistake is told at its key. Some editors complete by no conditions: for them alone all types
+    // stand beside what everything is.
+    let mut all = vec![json!({})];
+    let mut conditions = Vec::new();
+    for (tag, told, schema) in types {
+        let mut schema = schema.to_value();
+        let mut properties = Map::new();
+        properties.insert("type".to_owned(), json!({ "description": told.trim(), "const": tag }));
+        if let Some(Value::Object(own)) = schema.get_mut("properties") {
+            properties.append(own);
+        }
+        schema["properties"] = Value::Object(properties);
+        let name = definition(shape, tag);
+        let reference = json!({ "$ref": format!("#/$defs/{name}") });
+        conditions.push(json!({
+            "if": { "properties": { "type": { "const": tag } }, "required": ["type"] },
+            "then": reference.clone(),
+        }));
+        all.push(reference);
+        generator.definitions_mut().insert(name, schema);
+    }
+    let schema = json!({
+        "type": "object",
+        "properties": { "type": key },
+        "required": ["type"],
+        "allOf": conditions,
+        "anyOf": all,
+    });
+    schema.try_into().unwrap_or_default()
+}
+
+/// The name of a type's definition: `camera-perspective`.
+fn definition(shape: &str, tag: &str) -> String {
+    format!("{}-{tag}", shape.trim_end_matches("Description").to_lowercase())
+}
+
+/// A camera is perspective if it does not say what it is, and what it does not say may be in the keys of its path.
+fn of_camera(schema: &mut Value) {
+    let camera = &mut schema["properties"]["camera"];
+    camera["properties"]["type"]["default"] = json!(CameraDescription::DEFAULT);
+    let tags = CameraDescription::TYPES;
+    if let Some(camera) = camera.as_object_mut() {
+        camera.remove("required");
+    }
+    for condition in camera["allOf"].as_array_mut().into_iter().flatten() {
+        let of = &mut condition["if"];
+        if of["properties"]["type"]["const"] == CameraDescription::DEFAULT {
+            *of = json!({ "properties": of["properties"] });
+        }
+    }
+    for tag in tags {
+        let Some(of_type) = schema["$defs"][definition("camera", tag)].as_object_mut() else {
+            continue;
+        };
+        if let Some(required) = of_type.remove("required") {
+            let either = json!([{ "required": required }, { "required": ["path"] }]);
+            of_type.insert("anyOf".to_owned(), either);
+        }
+    }
+}
+
+/// Goes through a schema: says in every description what the values may be and what stands for an absent one; takes away what JSON
+/// has and TOML has not, and what only Rust knows.
+fn finish(schema: &mut Value) {
+    match schema {
+        Value::Array(all) => all.iter_mut().for_each(finish),
+        Value::Object(_) => {
+            without_null(schema);
+            names(schema);
+            tell_kind(schema);
+            if let Some(Value::Object(properties)) = schema.get_mut("properties") {
+                for property in properties.values_mut() {
+                    finish(property);
+                    tell_default(property);
+                }
+            }
+            let Some(all) = schema.as_object_mut() else { return };
+            all.remove("format");
+            for (key, value) in all.iter_mut() {
+                if key != "properties" && key != "default" {
+                    finish(value);
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// TOML has no null.
+fn without_null(schema: &mut Value) {
+    let null = json!("null");
+    let types = schema.get_mut("type");
+    if let Some(Value::Array(list)) = types {
+        list.retain(|name| *name != null);
+        if let [one] = list.as_slice() {
+            schema["type"] = one.clone();
+        }
+    }
+    if let Some(Value::Array(list)) = schema.get_mut("enum") {
+        list.retain(|name| !name.is_null());
+    }
+    let Some(all) = schema.as_object_mut() else { return };
+    for word in ["anyOf", "oneOf"] {
+        let Some(Value::Array(list)) = all.get_mut(word) else {
+            continue;
+        };
+        list.retain(|one| one.get("type") != Some(&null));
+        if let [Value::Object(one)] = list.as_slice() {
+            let one = one.clone();
+            all.remove(word);
+            for (key, value) in one {
+                all.entry(key).or_insert(value);
+            }
+        }
+    }
+    if all.get("default") == Some(&Value::Null) {
+        all.remove("default");
+    }
+}
+
+/// Names that each have a description become a list, which all editors know.
+fn names(schema: &mut Value) {
+    let Some(all) = schema.as_object_mut() else { return };
+    let Some(Value::Array(list)) = all.get("oneOf") else {
+        return;
+    };
+    let parts = list
+        .iter()
+        .map(|one| Some((one.get("const")?.clone(), one.get("description")?.clone())));
+    let Some(parts) = parts.collect::<Option<Vec<_>>>() else {
+        return;
+    };
+    let (names, told): (Vec<Value>, Vec<Value>) = parts.into_iter().unzip();
+    all.remove("oneOf");
+    all.insert("type".to_owned(), json!("string"));
+    all.insert("enum".to_owned(), Value::Array(names));
+    all.insert("enumDescriptions".to_owned(), Value::Array(told));
+}
+
+/// Puts what its kind says behind a description.
+fn tell_kind(schema: &mut Value) {
+    let Some(all) = schema.as_object_mut() else { return };
+    let mut told = match all.get("description") {
+        Some(Value::String(told)) => told.split_whitespace().collect::<Vec<_>>().join(" "),
+        _ => String::new(),
+    };
+    if let Some(Value::String(kind)) = all.get("title") {
+        let (words, range) = kind.split_once(SPLIT).unwrap_or((kind, ""));
+        let is_told = words.is_empty() || told.to_lowercase().contains(words);
+        let more = [words, range]
+            .into_iter()
+            .filter(|part| !part.is_empty() && (*part != words || !is_told));
+        let more = more.collect::<Vec<_>>().join(", ");
+        let end = if told.is_empty() || told.ends_with('.') {
+            ""
+        } else {
+            "."
+        };
+        if let Some(first) = more.get(..1) {
+            told = format!("{told}{end} {}{}.", first.to_uppercase(), &more[1..]);
+        }
+    }
+    if !told.is_empty() {
+        all.insert("description".to_owned(), Value::String(told.trim().to_owned()));
+    }
+}
+
+/// The most keys of a table that is told as a default.
+const MOST_SAID: usize = 3;
+
+/// Puts what stands for an absent key behind its description.
+fn tell_default(property: &mut Value) {
+    let Some(all) = property.as_object_mut() else { return };
+    match (all.get("default"), all.get("description")) {
+        // A whole section, each key of which tells its own.
+        (Some(Value::Object(table)), _) if table.is_empty() || table.len() > MOST_SAID => {
+            all.remove("default");
+        }
+        (Some(Value::Array(list)), _) if list.is_empty() => {
+            all.remove("default");
+        }
+        (Some(default), Some(Value::String(told))) => {
+            let told = format!("{told} Default: {}.", toml_of(default));
+            all.insert("description".to_owned(), Value::String(told));
+        }
+        _ => {}
+    }
+}
+
+/// A value as a scene file has it.
+fn toml_of(value: &Value) -> String {
+    match value {
+        Value::Object(table) => {
+            let pairs: Vec<String> = table
+                .iter()
+                .map(|(key, value)| format!("{key} = {}", toml_of(value)))
+                .collect();
+            format!("{{ {} }}", pairs.join(", "))
+        }
+        Value::Array(list) => {
+            let all: Vec<String> = list.iter().map(toml_of).collect();
+            format!("[{}]", all.join(", "))
+        }
+        Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), |x| x.to_string()),
+        other => other.to_string(),
+    }
+}

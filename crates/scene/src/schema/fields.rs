@@ -1,0 +1,603 @@
+//! The values of an object of a scene file that can be changed one by one, as the schema tells them: of what kind each is, its
+//! unit, its range, and what stands for it where it is absent.
+
+use std::sync::OnceLock;
+
+use serde::Serialize;
+use serde_json::{Value as Json, json};
+use toml::{Table, Value};
+
+use super::{SPLIT, definition, of_files};
+use crate::CameraDescription;
+use crate::error::{KeyPath, Segment, cut};
+
+/// A value that can be changed, or is shown.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Field {
+    /// The way to it from the top of the file.
+    pub path: String,
+    /// The way to it from its object.
+    pub name: String,
+    /// What it is.
+    pub kind: Kind,
+    /// How many numbers a list has; 1 of what is none.
+    pub length: usize,
+    /// As the file has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<Json>,
+    /// What stands for it where it is absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub default: Option<Json>,
+    /// What numbers are counted in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<&'static str>,
+    /// The smallest and the largest number that it may be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range: Option<(f64, f64)>,
+    /// Between these, the ends left out, it may not be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap: Option<(f64, f64)>,
+    /// Whether it must be the square of a whole number.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub squares: bool,
+    /// A smaller range, around what it is; of a colour that shines around its strength, the largest of its numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slider: Option<Slider>,
+    /// What a choice may be; the first of them where they are many.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub choices: Vec<String>,
+    /// What it does.
+    pub about: String,
+    /// Whether it must be there.
+    pub required: bool,
+    /// Why it cannot be changed, if it cannot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fixed: Option<String>,
+}
+
+/// What a value is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Any number.
+    Number,
+    /// A whole number.
+    Whole,
+    /// Linear red, green and blue.
+    Color,
+    /// A list of numbers.
+    Vector,
+    /// One of some texts.
+    Choice,
+    /// True or false.
+    Switch,
+    /// Any text.
+    Text,
+}
+
+/// What a slider goes over.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Slider {
+    /// Its left end.
+    pub from: f64,
+    /// Its right end.
+    pub to: f64,
+    /// How far its steps are apart, where it is linear.
+    pub step: f64,
+    /// Whether equal ways are equal factors.
+    pub logarithmic: bool,
+}
+
+/// The names that a scene has for what others name.
+#[derive(Clone, Debug, Default)]
+pub struct Names {
+    /// `[materials.NAME]`
+    pub materials: Vec<String>,
+    /// `[textures.NAME]`
+    pub textures: Vec<String>,
+    /// `[meshes.NAME]`
+    pub meshes: Vec<String>,
+}
+
+/// So many choices are told.
+const MOST_CHOICES: usize = 200;
+/// So many elements of a list of lists or tables are looked into.
+const MOST_ELEMENTS: usize = 32;
+
+impl Names {
+    /// The section whose names a key's text must be one of.
+    pub fn section(path: &KeyPath) -> Option<&'static str> {
+        let key = |segment: &Segment| match segment {
+            Segment::Key(key) => Some(key.clone()),
+            Segment::Index(_) => None,
+        };
+        let [.., around, last] = path.0.as_slice() else {
+            return None;
+        };
+        // In a table `materials` of a shape every key names one.
+        if path.0.len() > 2 && key(around).as_deref() == Some("materials") {
+            return Some("materials");
+        }
+        match key(last).as_deref() {
+            Some("material") => Some("materials"),
+            Some("texture") => Some("textures"),
+            Some("mesh") => Some("meshes"),
+            _ => None,
+        }
+    }
+
+    /// Those that a key's text must be one of.
+    fn of(&self, path: &[Segment]) -> Option<&[String]> {
+        match Names::section(&KeyPath(path.to_vec()))? {
+            "materials" => Some(&self.materials),
+            "textures" => Some(&self.textures),
+            _ => Some(&self.meshes),
+        }
+    }
+}
+
+/// The fields of the object at a path, `[shapes, 3]` or `[camera]`, whose table this is; none of what is no object.
+pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
+    static SCHEMA: OnceLock<Json> = OnceLock::new();
+    let whole = SCHEMA.get_or_init(of_files);
+    let Some(schema) = schema_of(whole, object, table) else {
+        return Vec::new();
+    };
+    let mut found = Found {
+        names,
+        object: object.0.len(),
+        fields: Vec::new(),
+    };
+    let mut path = object.0.clone();
+    found.look(
+        schema,
+        &mut path,
+        &Place {
+            value: Some(table),
+            default: None,
+            required: true,
+            about: "",
+        },
+    );
+    found.fields
+}
+
+/// The schema of an object: of its type, where it has one.
+fn schema_of<'a>(whole: &'a Json, object: &KeyPath, table: &Value) -> Option<&'a Json> {
+    let Segment::Key(section) = object.0.first()? else {
+        return None;
+    };
+    let of_section = whole.get("properties")?.get(section)?;
+    let schema = match object.0.get(1) {
+        None => of_section,
+        Some(Segment::Index(_)) => of_section.get("items")?,
+        Some(Segment::Key(_)) => of_section.get("additionalProperties")?,
+    };
+    if schema.get("allOf").is_none() {
+        return Some(schema);
+    }
+    let tag = match table.get("type") {
+        Some(tag) => tag.as_str()?,
+        None => CameraDescription::DEFAULT,
+    };
+    whole.get("$defs")?.get(definition(section.trim_end_matches('s'), tag))
+}
+
+/// What is known of the place of a value.
+struct Place<'a> {
+    value: Option<&'a Value>,
+    default: Option<&'a Json>,
+    required: bool,
+    about: &'a str,
+}
+
+struct Found<'a> {
+    names: &'a Names,
+    /// How long the object's own path is.
+    object: usize,
+    fields: Vec<Field>,
+}
+
+impl Found<'_> {
+    fn look(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &Place) {
+        let mut branches = Vec::new();
+        alternatives(schema, &mut branches);
+        let Some(chosen) = choose(&branches, place) else {
+            return;
+        };
+        let about = match schema.get("description").and_then(Json::as_str) {
+            Some(own) => own,
+            None => place.about,
+        };
+        let place = Place { about, ..*place };
+        match chosen.get("type").and_then(Json::as_str) {
+            Some("object") => self.look_into(chosen, path, &place),
+            Some("array") => self.look_at_list(chosen, path, &place),
+            Some("number") => self.add(Kind::Number, chosen, path, &place),
+            Some("integer") => self.add(Kind::Whole, chosen, path, &place),
+            Some("boolean") => self.add(Kind::Switch, chosen, path, &place),
+            Some("string") => self.add(Kind::Text, chosen, path, &place),
+            _ => {}
+        }
+        // What may be any text besides is no number to be moved.
+        let is_free = |branch: &&Json| branch.get("type") == Some(&json!("string")) && branch.get("enum").is_none();
+        if branches.len() > 1
+            && branches.iter().any(is_free)
+            && let Some(field) = self.fields.last_mut()
+            && field.path == KeyPath(path.clone()).exact()
+        {
+            field.fixed.get_or_insert_with(|| FREE_TEXT.to_owned());
+        }
+    }
+
+    fn look_into(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &Place) {
+        let table = place.value.and_then(Value::as_table);
+        let required = required_keys(schema, table);
+        for (key, of_key) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
+            if of_key.get("const").is_some() {
+                continue; // its type
+            }
+            // A table that is not there is made with one key.
+            if table.is_none() && required.iter().any(|name| name != key) {
+                continue;
+            }
+            let default = match (of_key.get("default"), place.default) {
+                (_, Some(whole)) if table.is_none() => whole.get(key).or(of_key.get("default")),
+                (own, _) => own,
+            };
+            path.push(Segment::from(key.as_str()));
+            let place = Place {
+                value: table.and_then(|table| table.get(key)),
+                default,
+                required: table.is_some() && required.contains(&key.as_str()),
+                about: "",
+            };
+            self.look(of_key, path, &place);
+            path.pop();
+        }
+        if let Some(of_key) = schema.get("additionalProperties").filter(|of_key| of_key.is_object()) {
+            for (key, value) in table.into_iter().flatten().take(MOST_ELEMENTS) {
+                path.push(Segment::from(key.as_str()));
+                let place = Place {
+                    value: Some(value),
+                    default: None,
+                    required: false,
+                    about: place.about,
+                };
+                self.look(of_key, path, &place);
+                path.pop();
+            }
+        }
+    }
+
+    fn look_at_list(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &Place) {
+        let Some(items) = schema.get("items") else { return };
+        if let Some("number" | "integer") = items.get("type").and_then(Json::as_str) {
+            let is_color = kind_of(schema).0.starts_with(COLOR);
+            let kind = if is_color { Kind::Color } else { Kind::Vector };
+            return self.add(kind, schema, path, place);
+        }
+        let elements = place.value.and_then(Value::as_array);
+        for (i, value) in elements.into_iter().flatten().enumerate().take(MOST_ELEMENTS) {
+            path.push(Segment::from(i));
+            let about = place.about;
+            self.look(
+                items,
+                path,
+                &Place {
+                    value: Some(value),
+                    default: None,
+                    required: true,
+                    about,
+                },
+            );
+            path.pop();
+        }
+    }
+
+    fn add(&mut self, kind: Kind, schema: &Json, path: &[Segment], place: &Place) {
+        let key = KeyPath(path.to_vec());
+        let numbers = schema.get("items").unwrap_or(schema);
+        let value = place.value.map(json_of);
+        let length = match value.as_ref().or(place.default).and_then(Json::as_array) {
+            Some(list) => list.len(),
+            None => schema.get("minItems").and_then(Json::as_u64).unwrap_or(1) as usize,
+        };
+        let choices = match schema.get("enum").and_then(Json::as_array) {
+            Some(names) => Some(
+                names
+                    .iter()
+                    .filter_map(Json::as_str)
+                    .map(str::to_owned)
+                    .collect::<Vec<_>>(),
+            ),
+            None if kind == Kind::Text => self
+                .names
+                .of(path)
+                .map(|names| names.iter().take(MOST_CHOICES).cloned().collect()),
+            None => None,
+        };
+        let is_choice = choices.is_some();
+        if value.is_none() && choices.as_ref().is_some_and(Vec::is_empty) {
+            return; // there is nothing to name
+        }
+        let kind = if is_choice { Kind::Choice } else { kind };
+        let mut choices = choices.unwrap_or_default();
+        if let (true, Some(Json::String(own))) = (is_choice, &value)
+            && !choices.contains(own)
+        {
+            choices.insert(0, own.clone());
+        }
+        let unit = unit_of(schema);
+        let is_number = matches!(kind, Kind::Number | Kind::Whole | Kind::Color | Kind::Vector);
+        let range = is_number.then(|| range_of(numbers)).flatten();
+        let gap = is_number.then(|| gap_of(numbers)).flatten();
+        let now = value.as_ref().or(place.default);
+        let slider = match kind {
+            Kind::Number | Kind::Whole => slider(numbers, kind == Kind::Whole, unit, now.and_then(Json::as_f64)),
+            Kind::Color if shines(path) => {
+                let list = now.and_then(Json::as_array).into_iter().flatten();
+                slider(numbers, false, unit, list.filter_map(Json::as_f64).reduce(f64::max))
+            }
+            _ => None,
+        };
+        self.fields.push(Field {
+            path: key.exact(),
+            name: KeyPath(path[self.object..].to_vec()).exact(),
+            kind,
+            length,
+            value,
+            default: place.default.cloned(),
+            unit,
+            range,
+            gap,
+            squares: false,
+            slider,
+            choices,
+            about: place.about.to_owned(),
+            required: place.required,
+            fixed: (kind == Kind::Text).then(|| FREE_TEXT.to_owned()),
+        });
+    }
+}
+
+/// Returns the keys that a table must keep. Where a schema has alternatives, these are the keys that all the satisfied ones require.
+fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
+    let keys_of = |schema: &'a Json| -> Vec<&'a str> {
+        let list = schema.get("required").and_then(Json::as_array).into_iter().flatten();
+        list.filter_map(Json::as_str).collect()
+    };
+    let mut required = keys_of(schema);
+    let alternatives = schema
+        .get("anyOf")
+        .and_then(Json::as_array)
+        .into_iter()
+        .flatten()
+        .map(keys_of);
+    let mut satisfied = alternatives.filter(|keys| {
+        keys.iter()
+            .all(|key| table.is_some_and(|table| table.contains_key(*key)))
+    });
+    if let Some(mut common) = satisfied.next() {
+        satisfied.for_each(|keys| common.retain(|key| keys.contains(key)));
+        required.extend(common);
+    }
+    required
+}
+
+/// Why a text cannot be changed: it may name a file.
+const FREE_TEXT: &str = "names and files can only be changed in the scene file";
+
+impl Field {
+    /// A value that was sent, as a scene file has it.
+    ///
+    /// # Errors
+    ///
+    /// The rule that it breaks: that of its kind. Ranges are the scene's own matter.
+    pub fn value_of(&self, given: &Json, names: &Names) -> Result<Value, String> {
+        if let Some(why) = &self.fixed {
+            return Err(why.clone());
+        }
+        let number = |given: &Json| given.as_f64().filter(|x| x.is_finite()).map(Value::from);
+        let found = match self.kind {
+            Kind::Number => number(given).ok_or("a number".to_owned()),
+            Kind::Whole => {
+                let whole = given.as_i64().or(given
+                    .as_f64()
+                    .filter(|x| x.fract() == 0.0 && x.abs() < 1e15)
+                    .map(|x| x as i64));
+                whole.map(Value::from).ok_or("a whole number".to_owned())
+            }
+            Kind::Color | Kind::Vector => {
+                let list = given.as_array().filter(|list| list.len() == self.length);
+                let list = list.and_then(|list| list.iter().map(number).collect::<Option<Vec<Value>>>());
+                list.map(Value::from)
+                    .ok_or(format!("a list of {} numbers", self.length))
+            }
+            Kind::Switch => given.as_bool().map(Value::from).ok_or("true or false".to_owned()),
+            Kind::Choice | Kind::Text => {
+                let path = self.path.parse::<KeyPath>().map_err(|problem| problem.to_string())?;
+                let is_known = |text: &&str| {
+                    let is_name = names
+                        .of(&path.0)
+                        .is_some_and(|names| names.iter().any(|name| name == text));
+                    is_name || self.choices.iter().any(|choice| choice == text)
+                };
+                let text = given.as_str().filter(is_known);
+                text.map(Value::from).ok_or("one of the allowed names".to_owned())
+            }
+        };
+        found.map_err(|rule| format!("{} must be {rule}", cut(&given.to_string())))
+    }
+}
+
+/// The alternatives of a schema, or itself.
+fn alternatives<'a>(schema: &'a Json, found: &mut Vec<&'a Json>) {
+    match (schema.get("type"), schema.get("anyOf").and_then(Json::as_array)) {
+        (None, Some(all)) => all.iter().for_each(|one| alternatives(one, found)),
+        _ => found.push(schema),
+    }
+}
+
+/// The alternative that a value is of, or its default; the first of them if there is neither.
+fn choose<'a>(branches: &[&'a Json], place: &Place) -> Option<&'a Json> {
+    let named = |branch: &Json, names: &[&str]| {
+        let name = branch.get("type").and_then(Json::as_str);
+        name.is_some_and(|name| names.contains(&name))
+    };
+    let types: &[&str] = match (place.value, place.default) {
+        (Some(Value::Table(_)), _) => &["object"],
+        (Some(Value::Array(_)), _) => &["array"],
+        (Some(Value::Integer(_)), _) => &["number", "integer"],
+        (Some(Value::Float(_)), _) => &["number"],
+        (Some(Value::String(_)), _) => &["string"],
+        (Some(Value::Boolean(_)), _) => &["boolean"],
+        (Some(Value::Datetime(_)), _) => return None,
+        (None, Some(Json::Array(_))) => &["array"],
+        (None, Some(Json::Number(_))) => &["number", "integer"],
+        (None, Some(Json::String(_))) => &["string"],
+        (None, Some(Json::Bool(_))) => &["boolean"],
+        (None, _) => return branches.first().copied(),
+    };
+    branches.iter().find(|branch| named(branch, types)).copied()
+}
+
+/// How the words of colours begin.
+const COLOR: &str = "linear red";
+
+/// The words of a kind, and its range.
+fn kind_of(schema: &Json) -> (&str, &str) {
+    let title = schema.get("title").and_then(Json::as_str).unwrap_or_default();
+    title.split_once(SPLIT).unwrap_or((title, ""))
+}
+
+/// What the numbers of a kind are counted in.
+fn unit_of(schema: &Json) -> Option<&'static str> {
+    let (words, _) = kind_of(schema);
+    let units = [
+        ("degrees", "°"),
+        ("pixels", "px"),
+        ("stops", "stops"),
+        ("seconds", "s"),
+        ("linear", "linear"),
+        ("for each scene unit", "per unit"),
+        ("scene units", "units"),
+    ];
+    units
+        .into_iter()
+        .find(|(word, _)| words.contains(word))
+        .map(|(_, unit)| unit)
+}
+
+/// Whether the colour at a path is light, which has no natural end, and not a share of it.
+fn shines(path: &[Segment]) -> bool {
+    let is_any = |segment: Option<&Segment>, names: &[&str]| match segment {
+        Some(Segment::Key(key)) => names.contains(&key.as_str()),
+        _ => false,
+    };
+    is_any(path.first(), &["lights", "environment", "render"]) || is_any(path.last(), &["emission"])
+}
+
+/// Where a range leaves its ends out, those that are told are inside of it by this part of its width.
+const INSIDE: f64 = 1e-3;
+
+/// The ends of a schema of numbers.
+fn ends(schema: &Json) -> Option<(f64, f64)> {
+    if let Some(only) = schema.get("const").and_then(Json::as_f64) {
+        return Some((only, only));
+    }
+    let end = |name: &str| schema.get(name).and_then(Json::as_f64);
+    match (end("exclusiveMinimum"), end("exclusiveMaximum")) {
+        (Some(low), Some(high)) => Some((low + INSIDE * (high - low), high - INSIDE * (high - low))),
+        _ => Some((end("minimum")?, end("maximum")?)),
+    }
+}
+
+/// The ranges that a number may be in.
+fn ranges(schema: &Json) -> Vec<(f64, f64)> {
+    match schema.get("anyOf").and_then(Json::as_array) {
+        Some(all) => all.iter().filter_map(ends).collect(),
+        None => ends(schema).into_iter().collect(),
+    }
+}
+
+fn range_of(schema: &Json) -> Option<(f64, f64)> {
+    let all = ranges(schema);
+    let ends = all.iter().copied().reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
+    ends.filter(|(low, high)| low < high)
+}
+
+/// What is left out between two ranges.
+fn gap_of(schema: &Json) -> Option<(f64, f64)> {
+    let [a, b] = ranges(schema).try_into().ok()?;
+    Some(if a.0 < b.0 { (a.1, b.0) } else { (b.1, a.0) })
+}
+
+/// The widest range that a linear slider goes over as a whole.
+const WIDE: f64 = 1000.0;
+/// From this ratio of its ends on a range is gone over by factors.
+const RATIO: f64 = 50.0;
+/// A slider goes to so many times a value, or to that part of it.
+const FACTOR: f64 = 100.0;
+
+/// A slider for a number that is `now`.
+fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Option<f64>) -> Option<Slider> {
+    let at = now.unwrap_or(0.0);
+    let ranges = ranges(schema);
+    let (low, high) = match ranges.iter().find(|(low, high)| (*low..=*high).contains(&at)) {
+        Some(range) if range.0 < range.1 => *range,
+        _ => range_of(schema)?,
+    };
+    let linear = |from: f64, to: f64| {
+        let step = 10f64.powf(((to - from) / 100.0).log10().floor());
+        let step = if is_whole { step.max(1.0) } else { step };
+        Some(Slider {
+            from,
+            to,
+            step,
+            logarithmic: false,
+        })
+    };
+    if low > 0.0 && high / low >= RATIO && unit != Some("°") {
+        let around = if at > 0.0 { at } else { 1.0 };
+        let (from, to) = ((around / FACTOR).max(low), (around * FACTOR).min(high));
+        return Some(Slider {
+            from,
+            to,
+            step: 0.0,
+            logarithmic: true,
+        });
+    }
+    if high - low <= WIDE {
+        return linear(low, high);
+    }
+    let least = if is_whole { 10.0 } else { 1.0 };
+    let reach = round_up((4.0 * at.abs()).max(least));
+    linear(low.max(-reach), high.min(reach))
+}
+
+/// 1, 2 or 5 times a power of ten that is not below a number.
+fn round_up(x: f64) -> f64 {
+    let power = 10f64.powf(x.log10().floor());
+    let found = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|digit| digit * power)
+        .find(|rounded| *rounded >= x * 0.999);
+    found.unwrap_or(x)
+}
+
+/// A value of TOML as JSON.
+fn json_of(value: &Value) -> Json {
+    match value {
+        Value::String(text) => json!(text),
+        Value::Integer(x) => json!(x),
+        Value::Float(x) => json!(x),
+        Value::Boolean(x) => json!(x),
+        Value::Datetime(time) => json!(time.to_string()),
+        Value::Array(list) => list.iter().map(json_of).collect(),
+        Value::Table(table) => {
+            let pairs = table.iter().map(|(key, value)| (key.clone(), json_of(value)));
+            Json::Object(pairs.collect())
+        }
+    }
+}

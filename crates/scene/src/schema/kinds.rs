@@ -1,0 +1,209 @@
+//! Kinds of values of a scene file: what the schema says of a number, of a list of them, or of a name, whatever its type in Rust is.
+//! Fields of descriptions name them: `#[schemars(with = "Length")]`.
+
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde_json::{Value, json};
+
+use super::SPLIT;
+use crate::limits::*;
+use crate::{MetalIndex, ViewSettings};
+
+/// Each kind with its words, behind which its range comes, and its schema.
+macro_rules! kinds {
+    ($($name:ident, $words:literal, $schema:expr;)+) => { $(
+        pub(crate) struct $name;
+
+        impl JsonSchema for $name {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                kind($words, $schema)
+            }
+        }
+    )+ };
+}
+
+kinds! {
+    Point, "a point in scene units, three numbers", list(3, number(COORDINATES));
+    Vector, "a direction, three numbers that are not all 0", direction();
+    Points3, "three points in scene units", of_lists(3, list(3, number(COORDINATES)));
+    Points4, "four points in scene units", of_lists(4, list(3, number(COORDINATES)));
+    Length, "a length in scene units", number(LENGTHS);
+    Size, "two lengths in scene units", list(2, number(LENGTHS));
+    Rgb, "linear red, green and blue", list(3, number(COLORS));
+    ShareRgb, "linear red, green and blue", list(3, number(SHARES));
+    Share, "", number(SHARES);
+    Degrees, "in degrees", number(TURNS);
+    Angles, "three angles in degrees", list(3, number(TURNS));
+
+    Pixels, "in pixels", whole(1, MOST);
+    Count, "a whole number", whole(1, MOST);
+    MostSamples, "a whole number", whole(LEAST_ADAPTIVE, MOST);
+    Stops, "in stops", number((-ViewSettings::MOST_STOPS, ViewSettings::MOST_STOPS));
+    Depth, "a whole number", whole(0, DEEPEST);
+    Seed, "a whole number", whole(0, u32::MAX);
+    Clamp, "", number(CLAMPS);
+    ShadowEpsilon, "", number(SHADOW_EPSILONS);
+    FilterRadius, "in pixels", number(FILTER_RADII);
+
+    FrameNumber, "a frame", number(FRAMES);
+    Fov, "in degrees", number(FOVS);
+    Aperture, "a length in scene units", number(APERTURES);
+    FNumber, "", number(F_NUMBERS);
+    Blades, "a whole number", blades();
+
+    Shininess, "", number(SHININESS);
+    Ior, "", number(IORS);
+    PrincipledIor, "", number(PRINCIPLED_IORS);
+    Etas, "for red, green and blue", list(3, number(ETAS));
+    Ks, "for red, green and blue", list(3, number(KS));
+    Metal, "a metal's name", names(MetalIndex::names());
+    Absorption, "for red, green and blue, for each scene unit", list(3, number(ABSORPTIONS));
+    Thickness, "in scene units", number(THICKNESSES);
+    AttenuationDistance, "in scene units", number(ATTENUATION_DISTANCES);
+
+    UvScale, "two numbers", list(2, scale());
+    UvOffset, "two numbers", list(2, number(OFFSETS));
+    LineWidth, "above 0 and below 1", inside(LINE_WIDTHS);
+    Anisotropy, "", number(ANISOTROPIES);
+    Factors, "four numbers", list(4, number(FACTORS));
+    UvSet, "a whole number", whole(0, UV_SETS - 1);
+    Strength, "", number(STRENGTHS);
+
+    ConeAngle, "in degrees", number(CONES);
+    InnerAngle, "in degrees", number((0.0, CONES.1));
+    EnvironmentScale, "", number(ENVIRONMENT_SCALES);
+    Elevation, "in degrees", number(ELEVATIONS);
+    Turbidity, "", number(TURBIDITIES);
+    Seconds, "in seconds", number(TIMES);
+
+    Factor, "", scale();
+    Factor3, "three numbers", list(3, scale());
+    Matrix, "three rows of four numbers", matrix();
+    Place, "a number", whole(0, u32::MAX);
+}
+
+/// Colours from textures, where a colour is a share of light.
+pub(crate) struct ShareColor;
+
+impl JsonSchema for ShareColor {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "ShareColor".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut schema = generator.subschema_for::<crate::ColorDescription>();
+        let share = generator.subschema_for::<ShareRgb>().to_value();
+        if let Some(Value::Array(either)) = schema.get_mut("anyOf")
+            && let Some(plain) = either.first_mut()
+        {
+            *plain = share;
+        }
+        tell_plain(&mut schema);
+        schema
+    }
+}
+
+/// Where a texture may stand in place of a plain value, the key tells what that may be.
+pub(crate) fn tell_plain(schema: &mut Schema) {
+    let plain = schema.get("anyOf").and_then(|either| either.get(0)?.get("title"));
+    if let Some(told) = plain.and_then(Value::as_str) {
+        let told = told.replacen(SPLIT, &format!(", or a texture{SPLIT}"), 1);
+        schema.insert("title".to_owned(), Value::String(told));
+    }
+}
+
+fn kind(words: &str, schema: Value) -> Schema {
+    let mut schema: Schema = schema.try_into().unwrap_or_default();
+    let mut inner = schema.as_value();
+    while let Some(items) = inner.get("items") {
+        inner = items;
+    }
+    let range = range(inner);
+    let told = match range {
+        Some(range) => format!("{words}{SPLIT}{range}"),
+        None => words.to_owned(),
+    };
+    schema.insert("title".to_owned(), Value::String(told));
+    schema
+}
+
+/// `1e-9 to 1e9`, or several of that.
+fn range(schema: &Value) -> Option<String> {
+    if let Some(either) = schema.get("anyOf").and_then(Value::as_array) {
+        let all: Option<Vec<String>> = either.iter().map(range).collect();
+        return Some(all?.join(" or "));
+    }
+    if let Some(only) = schema.get("const") {
+        return Some(only.to_string());
+    }
+    let [low, high] = ["minimum", "maximum"].map(|end| schema.get(end).and_then(Value::as_f64));
+    Some(format!("{} to {}", short(low?), short(high?)))
+}
+
+fn short(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e6).contains(&x.abs()) || x == f64::from(u32::MAX) {
+        x.to_string()
+    } else {
+        format!("{x:e}")
+    }
+}
+
+fn number((low, high): (f64, f64)) -> Value {
+    json!({ "type": "number", "minimum": low, "maximum": high })
+}
+
+fn inside((low, high): (f64, f64)) -> Value {
+    json!({ "type": "number", "exclusiveMinimum": low, "exclusiveMaximum": high })
+}
+
+fn whole(low: u32, high: u32) -> Value {
+    json!({ "type": "integer", "minimum": low, "maximum": high })
+}
+
+fn list(count: usize, items: Value) -> Value {
+    json!({ "type": "array", "items": items, "minItems": count, "maxItems": count })
+}
+
+fn of_lists(count: usize, items: Value) -> Value {
+    list(count, items)
+}
+
+fn direction() -> Value {
+    let mut schema = list(3, number(COORDINATES));
+    schema["contains"] = json!({ "not": { "const": 0 } });
+    schema
+}
+
+fn names(names: impl Iterator<Item = &'static str>) -> Value {
+    json!({ "type": "string", "enum": names.collect::<Vec<_>>() })
+}
+
+fn blades() -> Value {
+    let (low, high) = BLADES;
+    json!({ "type": "integer", "anyOf": [{ "const": 0 }, { "minimum": low, "maximum": high }] })
+}
+
+fn scale() -> Value {
+    let (low, high) = SCALES;
+    json!({ "type": "number", "anyOf": [{ "minimum": low, "maximum": high }, { "minimum": -high, "maximum": -low }] })
+}
+
+/// There may be a fourth row.
+fn matrix() -> Value {
+    let mut schema = list(3, list(4, number(COORDINATES)));
+    schema["maxItems"] = json!(4);
+    schema
+}

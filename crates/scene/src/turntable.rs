@@ -1,0 +1,107 @@
+//! A camera that goes once around what it looks at.
+
+use std::f64::consts::TAU;
+
+use glam::{DQuat, DVec3};
+
+use super::error::Problem;
+use super::{CameraDescription, CameraKeyDescription, CameraPathDescription, Interpolation};
+
+/// The most frames.
+pub(super) const MOST_FRAMES: u32 = 100_000;
+
+/// The camera with a path of so many frames around what it looks at, counter-clockwise as seen from where up is: frame 1 is where it stands, and
+/// what would come after the last is frame 1 again. Each frame has its own key, so that it lies on the circle.
+pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraDescription, Problem> {
+    if !(1..=MOST_FRAMES).contains(&frames) {
+        return Err(Problem::new(format!("{frames} must be from 1 to {MOST_FRAMES}")));
+    }
+    let (position, look_at, up) = match camera {
+        CameraDescription::Perspective(camera) => (camera.position, camera.look_at, camera.up),
+        CameraDescription::Orthographic(camera) => (camera.position, camera.look_at, camera.up),
+        CameraDescription::Panorama(_) => {
+            let rule = "does not apply to a panorama camera, which has no orbit";
+            return Err(Problem::new(rule));
+        }
+    };
+    let from = position - look_at;
+    let key = |i: u32| {
+        let turn = turned(up, f64::from(i) / f64::from(frames));
+        let turned = if i == 0 { position } else { look_at + turn * from };
+        CameraKeyDescription {
+            position: Some(turned),
+            ..CameraKeyDescription::new(f64::from(i) + 1.0)
+        }
+    };
+    let path = CameraPathDescription::new(Interpolation::Linear, (0..frames).map(key));
+    Ok(camera.clone().with_path(path))
+}
+
+/// A turn by a part of a whole one.
+fn turned(axis: DVec3, part: f64) -> DQuat {
+    DQuat::from_axis_angle(axis.normalize_or(DVec3::Z), part * TAU)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera_path::CameraPath;
+    use crate::{OrthographicDescription, PanoramaDescription, PerspectiveDescription};
+
+    #[test]
+    fn frames_lie_on_a_circle_about_up() {
+        for (up, position) in [
+            (DVec3::Z, DVec3::new(3.0, -4.0, 2.5)),
+            (DVec3::Y * 7.0, DVec3::new(1.0, 2.0, 8.0)),
+        ] {
+            let look_at = DVec3::new(0.5, 0.25, 1.0);
+            let camera = PerspectiveDescription {
+                up,
+                ..PerspectiveDescription::new(position, look_at, 40.0)
+            };
+            let parallel = OrthographicDescription {
+                up,
+                ..OrthographicDescription::new(position, look_at, 4.0)
+            };
+            for camera in [CameraDescription::from(camera), parallel.into()] {
+                for frames in [1, 2, 3, 36, 100] {
+                    let turning = turning(&camera, frames).unwrap();
+                    let path = CameraPath::of(&turning).unwrap();
+                    assert_eq!(path.frames(), (1.0, f64::from(frames)));
+                    let at = |frame: u32| path.at(frame.into()).unwrap();
+                    assert_eq!(
+                        at(1),
+                        camera.validate().unwrap(),
+                        "the first is the picture without a turn"
+                    );
+                    let axis = up.normalize();
+                    let around = |p: DVec3| (p - look_at) - axis * (p - look_at).dot(axis);
+                    for frame in 1..=frames {
+                        let now = at(frame);
+                        assert_eq!((now.look_at, now.projection), (look_at, at(1).projection));
+                        let height = (now.position - position).dot(axis);
+                        let radii = [now.position, position].map(|p| around(p).length());
+                        assert!(height.abs() < 1e-12 && (radii[0] - radii[1]).abs() < 1e-12, "{now:?}");
+                        let next = at(if frame == frames { 1 } else { frame + 1 });
+                        let (a, b) = (around(now.position), around(next.position));
+                        let angle = a.cross(b).dot(axis).atan2(a.dot(b));
+                        let wanted = TAU / f64::from(frames);
+                        let apart = (angle - wanted).rem_euclid(TAU);
+                        assert!(apart.min(TAU - apart) < 1e-9, "{frame} of {frames}: {angle}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_turn_is_told() {
+        let told = |camera: CameraDescription, frames| turning(&camera, frames).unwrap_err().to_string();
+        let camera = || PerspectiveDescription::new([0.0, -1.0, 0.0], [0.0; 3], 40.0).into();
+        assert_eq!(told(camera(), 0), "0 must be from 1 to 100000");
+        assert_eq!(told(camera(), 100_001), "100001 must be from 1 to 100000");
+        turning(&camera(), 100_000).unwrap();
+        let panorama = PanoramaDescription::new([0.0, -1.0, 0.0], [0.0; 3]).into();
+        assert!(told(panorama, 4).starts_with("does not apply to a panorama camera"));
+    }
+}

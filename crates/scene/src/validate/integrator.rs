@@ -1,0 +1,152 @@
+//! The integrator of a scene that names none: `path` if the scene uses a key that needs it, else `phong`.
+
+use super::super::error::{KeyPath, Segment};
+use super::super::{Description, Integrator, MaterialDescription, ShapeDescription};
+
+impl Description {
+    /// Returns the integrator: the one that `[render]` names, else [`Integrator::Path`] if any key of the scene needs it.
+    pub fn integrator(&self) -> Integrator {
+        let needed = || needs_path(self).map_or(Integrator::Phong, |_| Integrator::Path);
+        self.render.integrator.unwrap_or_else(needed)
+    }
+}
+
+/// Returns the note that the path tracer was chosen, and why.
+pub(super) fn note(description: &Description) -> Option<String> {
+    if description.render.integrator.is_some() {
+        return None;
+    }
+    let key = needs_path(description)?;
+    Some(format!(
+        "render.integrator is not set; using \"path\", which {key} requires. Set it in the scene to silence this warning"
+    ))
+}
+
+/// Returns the first key that only the path tracer supports.
+fn needs_path(description: &Description) -> Option<KeyPath> {
+    let render = &description.render;
+    let settings = [
+        ("rr_depth", render.rr_depth.is_some()),
+        ("clamp", render.clamp.is_some()),
+        ("alpha", render.alpha.is_some()),
+    ];
+    if let Some((name, _)) = settings.into_iter().find(|(_, is_given)| *is_given) {
+        return Some(path([Segment::from("render"), name.into()]));
+    }
+    if description.environment.is_some() {
+        return Some(path([Segment::from("environment")]));
+    }
+    let materials = description.materials.iter();
+    let mut needed = materials.filter_map(|(name, material)| {
+        let key = key_of_material(material)?;
+        Some(path([Segment::from("materials"), name.as_str().into(), key.into()]))
+    });
+    let is_gltf = |shape: &ShapeDescription| matches!(shape, ShapeDescription::Gltf(_));
+    let gltf = || {
+        let shape = description.shapes.iter().position(is_gltf)?;
+        Some(path([Segment::from("shapes"), shape.into(), "type".into()]))
+    };
+    needed.next().or_else(gltf)
+}
+
+fn path<const N: usize>(steps: [Segment; N]) -> KeyPath {
+    KeyPath(steps.to_vec())
+}
+
+fn key_of_material(material: &MaterialDescription) -> Option<&'static str> {
+    let emission = match material {
+        MaterialDescription::Phong(phong) => &phong.emission,
+        MaterialDescription::Mirror(mirror) => &mirror.emission,
+        MaterialDescription::Glass(glass) => &glass.emission,
+        MaterialDescription::Diffuse(_)
+        | MaterialDescription::Conductor(_)
+        | MaterialDescription::Dielectric(_)
+        | MaterialDescription::Principled(_) => return Some("type"),
+    };
+    emission.is_some().then_some("emission")
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Background, Define, EnvironmentDescription, Integrator, Overrides, Scene};
+
+    const SCENE: &str = "\
+image = { width = 4, height = 3 }
+camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
+materials.red = { type = 'phong', color = [1, 0, 0] }
+";
+
+    fn load(more: &str, overrides: &Overrides) -> Scene {
+        Scene::parse_with(&format!("{SCENE}{more}"), "s.toml", overrides).unwrap()
+    }
+
+    #[test]
+    fn scenes_without_keys_of_the_path_tracer_are_rendered_by_phong() {
+        let scene = load("", &Overrides::default());
+        assert_eq!((scene.render.integrator, scene.notes), (Integrator::Phong, vec![]));
+    }
+
+    /// Another integrator changes what the other settings may be, so they are checked with the one that is used.
+    #[test]
+    fn the_settings_are_those_of_the_chosen_integrator() {
+        let scene = load(
+            "environment.color = [1, 1, 1]\nrender = { max_depth = 0, pixel_samples = 5 }\n",
+            &Overrides::default(),
+        );
+        assert_eq!(scene.render.integrator, Integrator::Path);
+        assert_eq!(scene.render.pixel_samples.pattern, crate::Pattern::Sobol);
+        let overrides = Overrides {
+            max_depth: Some(0),
+            pixel_samples: Some(5),
+            environment: Some("sky".parse::<EnvironmentDescription>().unwrap()),
+            ..Overrides::default()
+        };
+        let scene = load("", &overrides);
+        assert_eq!((scene.render.integrator, scene.render.max_depth), (Integrator::Path, 0));
+        assert!(
+            scene.notes[0].message.starts_with("render.integrator is not set; "),
+            "{:?}",
+            scene.notes
+        );
+    }
+
+    #[test]
+    fn overrides_and_defines_decide_too() {
+        let clear = Overrides {
+            background: Some(Background::Transparent),
+            ..Overrides::default()
+        };
+        assert!(load("", &clear).render.alpha);
+        let define = |text: &str| Overrides {
+            define: vec![text.parse::<Define>().unwrap()],
+            ..Overrides::default()
+        };
+        let emissive = load("", &define("materials.red.emission=[1, 1, 1]"));
+        assert_eq!(emissive.render.integrator, Integrator::Path);
+        assert!(
+            emissive.notes[0]
+                .message
+                .starts_with("render.integrator is not set; using \"path\", which materials.red.emission requires")
+        );
+        // An integrator that is named is kept, without a note.
+        let named = load("environment.color = [1, 1, 1]\n", &define("render.integrator=path"));
+        assert!(
+            !named.notes.iter().any(|note| note.message.contains("integrator: ")),
+            "{:?}",
+            named.notes
+        );
+    }
+
+    #[test]
+    fn a_description_keeps_that_no_integrator_is_named() {
+        let text = format!("{SCENE}environment.color = [1, 1, 1]\n");
+        let description = crate::Description::parse(&text, "s.toml").unwrap();
+        assert_eq!(
+            (description.render.integrator, description.integrator()),
+            (None, Integrator::Path)
+        );
+        let written = description.to_toml().unwrap();
+        assert!(!written.contains("integrator"), "{written}");
+        assert_eq!(crate::Description::parse(&written, "s.toml").unwrap(), description);
+    }
+}

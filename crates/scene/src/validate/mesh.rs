@@ -1,0 +1,422 @@
+//! The rules of meshes.
+
+use crate::note::Note;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat3, DQuat, DVec3};
+
+use super::super::error::cut;
+use super::super::image_file::Place;
+use super::super::limits::{FARTHEST, LENGTHS, SCALES, TURNS};
+use super::super::mesh_file;
+use super::super::suggest::Suggestions;
+use super::super::{
+    Assets, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Reflection, Rotation, Scale,
+    Shape, ShapeDescription, Up,
+};
+use super::mtl::Looks;
+use super::{At, Checked, Collector, FLATTEST, Problem, between, check, list, number, point, show, unit};
+use crate::mesh::{Group, Mesh, Normals};
+
+/// The most groups of all meshes' instances together.
+const MOST_GROUPS: usize = 1 << 24;
+
+/// What shapes name: the scene's materials, and files.
+pub(super) struct Known<'a> {
+    pub names: &'a BTreeMap<&'a str, usize>,
+    pub looks: Looks<'a>,
+    pub assets: &'a Assets,
+    /// False if the scene has problems already: no mesh is needed then.
+    pub reads_files: bool,
+    pub suggestions: Suggestions,
+}
+
+impl Known<'_> {
+    /// The index of a material of the scene.
+    pub fn material(&self, name: &str) -> Checked<usize> {
+        let unknown = || Problem::new(self.suggestions.unknown("material", name, self.names.keys().copied()));
+        self.names.get(name).copied().ok_or_else(unknown)
+    }
+}
+
+/// A mesh that instances name.
+pub(super) struct NamedMesh<'a> {
+    /// `None` if it cannot be read, or is not needed.
+    mesh: Option<Arc<Mesh>>,
+    description: &'a MeshFileDescription,
+}
+
+/// What places a mesh, and what it is made of.
+struct Placement<'a> {
+    material: Option<&'a String>,
+    materials: &'a BTreeMap<String, String>,
+    translate: Option<DVec3>,
+    rotate: Option<Rotation>,
+    scale: Option<Scale>,
+    matrix: Option<&'a Vec<[f64; 4]>>,
+}
+
+impl<'a> NamedMesh<'a> {
+    /// Reads a mesh of `[meshes.NAME]`. If that fails, its problem is kept.
+    pub fn read(description: &'a MeshFileDescription, name: &str, known: &mut Known, found: &mut Collector) -> Self {
+        let mesh = load(&description.file, description.normals, known).at(name);
+        NamedMesh {
+            mesh: found.value(mesh).flatten(),
+            description,
+        }
+    }
+}
+
+/// A shape of type `mesh`.
+pub(super) fn mesh(shape: &MeshDescription, known: &mut Known) -> Checked<Option<Shape>> {
+    let mesh = load(&shape.file, shape.normals, known)?;
+    let placement = Placement {
+        material: shape.material.as_ref(),
+        materials: &shape.materials,
+        translate: shape.translate,
+        rotate: shape.rotate,
+        scale: shape.scale,
+        matrix: shape.matrix.as_ref(),
+    };
+    placed(mesh, shape.up, &shape.file, &placement, known)
+}
+
+/// One of `[[instances]]`.
+pub(super) fn instance(
+    instance: &InstanceDescription,
+    meshes: &BTreeMap<&str, NamedMesh<'_>>,
+    known: &mut Known,
+) -> Checked<Option<Shape>> {
+    let name = &instance.mesh;
+    let unknown = || Problem::new(known.suggestions.unknown("mesh", name, meshes.keys().copied()));
+    let NamedMesh {
+        mesh,
+        description: file,
+    } = meshes.get(name.as_str()).ok_or_else(unknown).at("mesh")?;
+    let placement = Placement {
+        material: instance.material.as_ref(),
+        materials: &instance.materials,
+        translate: instance.translate,
+        rotate: instance.rotate,
+        scale: instance.scale,
+        matrix: instance.matrix.as_ref(),
+    };
+    placed(mesh.clone(), file.up, &file.file, &placement, known)
+}
+
+/// The words of all groups have to be numbered.
+pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
+    let groups = shapes.iter().map(|shape| match &shape.geometry {
+        Geometry::Mesh { materials, .. } => materials.len(),
+        _ => 0,
+    });
+    let groups: usize = groups.sum();
+    check(groups <= MOST_GROUPS, || {
+        format!("the meshes have {groups} groups together; they must be at most {MOST_GROUPS}")
+    })
+}
+
+/// What is odd about the mesh files, each file's once.
+pub(super) fn notes(
+    descriptions: &[ShapeDescription],
+    shapes: &[Shape],
+    meshes: &BTreeMap<&str, NamedMesh>,
+) -> Vec<Note> {
+    let of_shapes = descriptions.iter().zip(shapes).filter_map(|pair| match pair {
+        (
+            ShapeDescription::Mesh(description),
+            Shape {
+                geometry: Geometry::Mesh { mesh, .. },
+                ..
+            },
+        ) => Some((&description.file, mesh)),
+        _ => None,
+    });
+    let named = (meshes.values()).filter_map(|named| Some((&named.description.file, named.mesh.as_ref()?)));
+    let of_mesh = |(file, mesh): (&String, &Arc<Mesh>)| -> Vec<Note> {
+        mesh.notes.iter().map(|note| note.clone().in_file(file)).collect()
+    };
+    let notes: BTreeSet<Note> = of_shapes.chain(named).flat_map(of_mesh).collect();
+    notes.into_iter().collect()
+}
+
+/// Returns a mesh; `None` if no files are read.
+fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Option<Arc<Mesh>>> {
+    if let Some(mesh) = known.assets.meshes.get(file) {
+        return match mesh.broken_rule() {
+            None => Ok(Some(Arc::clone(mesh))),
+            Some(rule) => Err(Problem::new(format!("{file:?}: {rule}"))).at("file"),
+        };
+    }
+    let place = known.assets.find(file).at("file")?;
+    let Place::File(path) = place else {
+        return Err(Problem::new(format!("{file:?} is an image in memory, and no mesh"))).at("file");
+    };
+    if !known.reads_files {
+        return Ok(None);
+    }
+    let mesh = mesh_file::load(&path, normals)
+        .map_err(|error| Problem::new(error.to_string()))
+        .at("file")?;
+    if let (true, Some(damage)) = (known.assets.strict, mesh.damage.first()) {
+        return Err(Problem::damage(damage.clone().of(Path::new(file)).to_string())).at("file");
+    }
+    known.looks.know(&mesh);
+    Ok(Some(mesh))
+}
+
+/// Returns a placed mesh; without a mesh only the values of its placement are checked.
+fn placed(
+    mesh: Option<Arc<Mesh>>,
+    up: Up,
+    file: &str,
+    placement: &Placement,
+    known: &mut Known,
+) -> Checked<Option<Shape>> {
+    let map = self::placement(placement.translate, placement.rotate, placement.scale, placement.matrix)?;
+    let Some(mesh) = mesh else {
+        placement
+            .material
+            .map(|name| known.material(name))
+            .transpose()
+            .at("material")?;
+        for (group, name) in placement.materials {
+            known.material(name).at(group.as_str()).at("materials")?;
+        }
+        return Ok(None);
+    };
+    let to_world = map * turned_up(up);
+    let corners: Vec<DVec3> = mesh.corners().map(|corner| to_world.transform_point3(corner)).collect();
+    let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let farthest = low.abs().max(high.abs()).max_element();
+    check(farthest <= FARTHEST, || {
+        let (farthest, limit) = (number(farthest), number(FARTHEST));
+        format!("{file:?} reaches to {farthest} there; coordinates must be from -{limit} to {limit}")
+    })
+    .at("file")?;
+    let size = (high - low).max_element();
+    check(size >= LENGTHS.0, || {
+        format!(
+            "{file:?} must be at least {} long there; it is {}",
+            number(LENGTHS.0),
+            number(size)
+        )
+    })
+    .at("file")?;
+    let materials = materials(&mesh, file, placement, known)?;
+    Ok(Some(Shape {
+        material: materials.first().copied().unwrap_or(0),
+        geometry: Geometry::Mesh {
+            mesh,
+            to_world,
+            materials,
+        },
+    }))
+}
+
+/// For each group of a mesh the index of its material: what the scene says, else what the mesh's own file does.
+fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Known) -> Checked<Vec<usize>> {
+    let named = |name: &String| -> Checked<usize> {
+        let index = known.material(name)?;
+        check(
+            !mesh.uvs.is_empty() || !has_textures(&known.looks.materials[index]),
+            || format!("{name:?} must have no texture here, as {file:?} has no texture coordinates"),
+        )?;
+        Ok(index)
+    };
+    let whole = placement.material.map(named).transpose().at("material")?;
+    let mut of_names = BTreeMap::new();
+    for (group, material) in placement.materials {
+        let is_there = mesh.groups.iter().any(|g| names(g).any(|name| name == group));
+        check(is_there, || {
+            let all = mesh.groups.iter().flat_map(names).filter(|name| !name.is_empty());
+            let all: BTreeSet<&str> = all.collect();
+            match all.is_empty() {
+                true => format!("{file:?} has no groups with names"),
+                false => format!("{file:?} has no such group or material; there are {}", list(all)),
+            }
+        })
+        .at(group.as_str())
+        .at("materials")?;
+        of_names.insert(group.as_str(), named(material).at(group.as_str()).at("materials")?);
+    }
+    let mut indices = Vec::with_capacity(mesh.groups.len());
+    let mut missing = BTreeSet::new();
+    for (i, group) in mesh.groups.iter().enumerate() {
+        let named = names(group).find_map(|name| of_names.get(name).copied()).or(whole);
+        let index = named.or_else(|| known.looks.of_group(mesh, i));
+        if index.is_none() {
+            missing.extend(group.material.as_deref());
+        }
+        indices.push(index.unwrap_or_else(|| known.looks.default_material(!mesh.colors.is_empty())));
+    }
+    if !missing.is_empty() {
+        let damage = Problem::damage(without_material(mesh, file, &missing));
+        known.looks.without_material(damage)?;
+    }
+    Ok(indices)
+}
+
+/// Reports materials that the file names and no file describes.
+fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String {
+    /// Maximum number of names in the message.
+    const MOST_NAMES: usize = 8;
+    let shown = missing.iter().take(MOST_NAMES);
+    let mut names = shown
+        .map(|name| format!("{:?}", cut(name)))
+        .collect::<Vec<_>>()
+        .join(", ");
+    if missing.len() > MOST_NAMES {
+        names += &format!(" and {} more", missing.len() - MOST_NAMES);
+    }
+    let why = match mesh.libraries.as_slice() {
+        [] => "the file names no MTL file".to_owned(),
+        libraries => {
+            let unread = libraries
+                .iter()
+                .find_map(|library| Some((library, library.problem.as_ref()?)));
+            match unread {
+                Some((library, problem)) => {
+                    let name = library.file.file_name().unwrap_or_default().to_string_lossy();
+                    format!("its MTL file {:?} cannot be read: {problem}", cut(&name))
+                }
+                None => "its MTL files do not have it".to_owned(),
+            }
+        }
+    };
+    format!("{file}: no material {names}: {why}")
+}
+
+/// The names by which a file's group may be told: its own, and that of the material which the file gives it.
+fn names(group: &Group) -> impl Iterator<Item = &str> {
+    std::iter::once(group.name.as_str()).chain(group.material.as_deref())
+}
+
+/// Whether what a material looks like depends on texture coordinates.
+fn has_textures(material: &Material) -> bool {
+    let is_streaked = match &material.reflection {
+        Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,
+        _ => false,
+    };
+    is_streaked || !material.textures().is_empty()
+}
+
+/// Returns the map that turns an axis of a file upwards.
+pub(crate) fn turned_up(up: Up) -> DAffine3 {
+    DAffine3::from_mat3(match up {
+        Up::X => DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
+        Up::Y => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
+        Up::Z => DMat3::IDENTITY,
+    })
+}
+
+/// What keys of a placement say.
+pub(crate) fn placement(
+    translate: Option<DVec3>,
+    rotate: Option<Rotation>,
+    scale: Option<Scale>,
+    matrix: Option<&Vec<[f64; 4]>>,
+) -> Checked<DAffine3> {
+    if let Some(matrix) = matrix {
+        let others = translate.is_some() || rotate.is_some() || scale.is_some();
+        check(!others, || {
+            "cannot be combined with translate, rotate or scale, which it stands in for".to_owned()
+        })
+        .at("matrix")?;
+        return self::matrix(matrix).at("matrix");
+    }
+    let scale = match scale {
+        None => DVec3::ONE,
+        Some(Scale::All(s)) => factors(DVec3::splat(s)).at("scale")?,
+        Some(Scale::Each(s)) => factors(s).at("scale")?,
+    };
+    let rotation = match rotate {
+        None => DMat3::IDENTITY,
+        Some(rotation) => turn(&rotation).at("rotate")?,
+    };
+    let translate = translate.map_or(Ok(DVec3::ZERO), point).at("translate")?;
+    Ok(DAffine3::from_mat3_translation(
+        rotation * DMat3::from_diagonal(scale),
+        translate,
+    ))
+}
+
+fn factors(factors: DVec3) -> Checked<DVec3> {
+    let (low, high) = SCALES;
+    for x in factors.to_array() {
+        check((low..=high).contains(&x.abs()), || {
+            let (x, low, high) = (number(x), number(low), number(high));
+            format!("{x} must not be 0, and be from {low} to {high}, or from -{high} to -{low}")
+        })?;
+    }
+    Ok(factors)
+}
+
+pub(super) fn turn(rotation: &Rotation) -> Checked<DMat3> {
+    let angle = |degrees: f64| between(degrees, TURNS);
+    Ok(match rotation {
+        Rotation::Angles(angles) => {
+            let [x, y, z] = [angle(angles.x)?, angle(angles.y)?, angle(angles.z)?];
+            turn_about(DVec3::Z, z) * turn_about(DVec3::Y, y) * turn_about(DVec3::X, x)
+        }
+        Rotation::About(about) => {
+            let axis = unit(about.axis).at("axis")?;
+            turn_about(axis, angle(about.degrees).at("degrees")?)
+        }
+    })
+}
+
+/// A rotation. Of a quarter turn about an axis of the coordinates the numbers are whole.
+fn turn_about(axis: DVec3, degrees: f64) -> DMat3 {
+    let quarters = degrees / 90.0;
+    let is_axis = DVec3::AXES.iter().any(|a| a.abs() == axis.abs());
+    let turn = DMat3::from_quat(DQuat::from_axis_angle(axis, degrees.to_radians()));
+    match is_axis && quarters.fract() == 0.0 {
+        true => DMat3::from_cols(turn.x_axis.round(), turn.y_axis.round(), turn.z_axis.round()),
+        false => turn,
+    }
+}
+
+fn matrix(rows: &[[f64; 4]]) -> Checked<DAffine3> {
+    let rows: &[[f64; 4]; 3] = match rows {
+        [rows @ .., [0.0, 0.0, 0.0, 1.0]] if rows.len() == 3 => rows.try_into(),
+        rows => rows.try_into(),
+    }
+    .map_err(|_| match rows {
+        [_, _, _, [x, y, z, w]] => {
+            let row = [x, y, z, w].map(|x| number(*x)).join(", ");
+            Problem::new(format!("[{row}] must be [0, 0, 0, 1], or not be there")).at(3)
+        }
+        rows => Problem::new(format!(
+            "must be a list of 3 rows of 4 numbers; it has {}. There may be a fourth one, which is [0, 0, 0, 1]",
+            rows.len()
+        )),
+    })?;
+    for (i, row) in rows.iter().enumerate() {
+        point(DVec3::new(row[0], row[1], row[2])).at(i)?;
+        point(DVec3::splat(row[3])).at(i)?;
+    }
+    let column = |i: usize| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
+    let columns = [column(0), column(1), column(2)];
+    for (i, c) in columns.iter().enumerate() {
+        let (low, high) = SCALES;
+        check((low..=high).contains(&c.length()), || {
+            let (c, low, high) = (show(*c), number(low), number(high));
+            format!("its column {i}, {c}, must have a length from {low} to {high}")
+        })?;
+    }
+    let [a, b, c] = columns.map(DVec3::normalize);
+    check(a.cross(b).dot(c).abs() > FLATTEST, || {
+        "its first three columns must not lie in one plane".to_owned()
+    })?;
+    Ok(DAffine3::from_mat3_translation(
+        DMat3::from_cols(columns[0], columns[1], columns[2]),
+        column(3),
+    ))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,526 @@
+//! What is told of meshes that break a rule, and where good ones are.
+
+use std::fs;
+
+use glam::Vec2;
+use tempfile::TempDir;
+
+use super::*;
+use crate::{Description, Encoding, Image, Scene, SceneError, Texels};
+
+/// A scene that names meshes in each way.
+const GOOD: &str = r#"image = { width = 4, height = 4 }
+camera = { position = [0, -9, 0], look_at = [0, 0, 0], fov = 40 }
+[textures.checks]
+type = "checker"
+even = [1, 1, 1]
+odd = [0, 0, 0]
+[materials.red]
+type = "mirror"
+[materials.white]
+type = "mirror"
+[materials.checked]
+type = "mirror"
+tint = { texture = "checks" }
+[meshes.parts]
+file = "parts.obj"
+[[shapes]]
+type = "mesh"
+file = "one.obj"
+material = "red"
+scale = 2
+rotate = [0, 0, 90]
+translate = [1, 2, 3]
+[[shapes]]
+type = "mesh"
+file = "one.obj"
+material = "white"
+matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]]
+[[instances]]
+mesh = "parts"
+materials = { roof = "red", brick = "white" }
+rotate = { axis = [0, 0, 2], degrees = 45 }
+"#;
+
+/// A triangle without names.
+const ONE: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\nf 1 2 3\n";
+/// The same with texture coordinates.
+const COORDINATES: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+/// Three groups: `roof` of no material, `wall` of brick, and one of brick whose name is `door`.
+const PARTS: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\ng roof\nf 1 2 3\nv 0 0 5\nv 1 0 5\nv 0 2 9\nusemtl brick\ng wall\nf 4 5 6\n\
+                     v 0 0 7\nv 1 0 7\nv 0 2 8\ng door\nf 7 8 9\n";
+
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("one.obj", ONE);
+    write("coordinates.obj", COORDINATES);
+    write("parts.obj", PARTS);
+    write("broken.obj", "v 0 0 0\nf 1 2 3\n");
+    write("far.obj", "v 0 0 0\nv 1e9 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("small.obj", "v 0 0 0\nv 1e-8 0 0\nv 0 1e-8 0\nf 1 2 3\n");
+    write("odd.obj", &format!("{ONE}f 1 1 2\n"));
+    folder
+}
+
+fn parse_in(folder: &TempDir, text: &str) -> Result<Scene, SceneError> {
+    let path = folder.path().join("s.toml");
+    Scene::parse(text, &path.display().to_string())
+}
+
+fn parse(text: &str) -> Result<Scene, SceneError> {
+    parse_in(&folder(), text)
+}
+
+/// The good scene with one line changed.
+fn with(line: &str, changed: &str) -> String {
+    let line = format!("\n{line}\n");
+    assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
+    GOOD.replace(&line, &format!("\n{changed}\n"))
+}
+
+/// Where a shape is: the map of its mesh to the scene.
+fn to_world(scene: &Scene, shape: usize) -> DAffine3 {
+    match scene.shapes[shape].geometry {
+        Geometry::Mesh { to_world, .. } => to_world,
+        _ => panic!("no mesh: {:?}", scene.shapes[shape]),
+    }
+}
+
+/// The materials of a mesh's groups.
+fn groups(scene: &Scene, shape: usize) -> &[usize] {
+    match &scene.shapes[shape].geometry {
+        Geometry::Mesh { materials, .. } => materials,
+        _ => panic!("no mesh: {:?}", scene.shapes[shape]),
+    }
+}
+
+const LINE_OF_MATERIALS: &str = r#"materials = { roof = "red", brick = "white" }"#;
+const LINE_OF_MATRIX: &str = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]]";
+
+/// A line of the good scene, what stands there instead, and what is told of it.
+const BAD: &[(&str, &str, &str)] = &[
+    // Files.
+    (
+        "file = \"parts.obj\"",
+        "file = \"none.obj\"",
+        "meshes.parts.file: \"none.obj\" cannot be read: ",
+    ),
+    (
+        "file = \"parts.obj\"",
+        "file = \"../none.obj\"",
+        "meshes.parts.file: \"../none.obj\" ",
+    ),
+    (
+        "file = \"parts.obj\"",
+        "file = \"s.txt\"",
+        "meshes.parts.file: \"s.txt\" cannot be read: ",
+    ),
+    (
+        "file = \"parts.obj\"",
+        "file = \".\"",
+        "meshes.parts.file: \".\" must be a file",
+    ),
+    (
+        "file = \"parts.obj\"",
+        "file = \"parts.obj\"\nnormals = \"file\"",
+        "meshes.parts.file: ",
+    ),
+    (
+        "file = \"parts.obj\"",
+        "file = \"parts.obj\"\nnormals = \"round\"",
+        "meshes.parts.normals: \"round\" must be one of \"smooth\", \"flat\", \"file\"",
+    ),
+    (
+        "file = \"parts.obj\"",
+        "file = \"parts.obj\"\nup = \"-y\"",
+        "meshes.parts.up: \"-y\" must be one of \"x\", \"y\", \"z\"",
+    ),
+    (
+        "file = \"parts.obj\"",
+        "file = \"parts.obj\"\nscale = 2",
+        "meshes.parts.scale: unknown key; expected one of \"file\", \"normals\", \"up\"",
+    ),
+    // Meshes by their names.
+    (
+        "mesh = \"parts\"",
+        "mesh = \"part\"",
+        "instances[0].mesh: there is no mesh \"part\"; did you mean \"parts\"?",
+    ),
+    // Places.
+    (
+        LINE_OF_MATRIX,
+        "scale = 0",
+        "shapes[1].scale: 0 must not be 0, and be from 1e-6 to 1e6, or from -1e6 to -1e-6",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "scale = [1, -2e6, 1]",
+        "shapes[1].scale: -2e6 must not be 0, and be from 1e-6 to 1e6, or from -1e6 to -1e-6",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "scale = [1, nan, 1]",
+        "shapes[1].scale: nan must not be 0, and be from 1e-6 to 1e6, or from -1e6 to -1e-6",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "scale = [1, 2]",
+        "shapes[1].scale: [1, 2] must be a number or a list of 3 numbers",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "rotate = [0, 361, 0]",
+        "shapes[1].rotate: 361 must be from -360 to 360",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "rotate = 90",
+        "shapes[1].rotate: 90 must be a list of 3 angles in degrees or a table such as",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "rotate = { axis = [0, 0, 0], degrees = 9 }",
+        "shapes[1].rotate.axis: [0, 0, 0] must not be zero: its length must be at least 1e-9",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "rotate = { axis = [0, 0, 1], degrees = inf }",
+        "shapes[1].rotate.degrees: inf must be from -360 to 360",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "translate = [0, 0, -2e9]",
+        "shapes[1].translate: -2e9 must be finite, from -1e9 to 1e9",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "translate = [1e9, 0, 0]",
+        "shapes[1].file: \"one.obj\" reaches to 1.000000001e9 there; coordinates must be from -1e9 to 1e9",
+    ),
+    (
+        "translate = [1, 2, 3]",
+        "matrix = []",
+        "shapes[0].matrix: cannot be combined with translate, rotate or scale, which it stands in for",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "matrix = [[1, 0, 0, 5], [0, 1, 0, 6]]",
+        "shapes[1].matrix: must be a list of 3 rows of 4 numbers; it has 2. There may be a fourth one, which is [0, 0, 0, 1]",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 2]]",
+        "shapes[1].matrix[3]: [0, 0, 0, 2] must be [0, 0, 0, 1], or not be there",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1], [0, 0, 0, 1]]",
+        "shapes[1].matrix: must be a list of 3 rows of 4 numbers; it has 5. ",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "matrix = [[1, 0, 0, 5], [0, 1, 0, 2e9], [0, 0, 1, 7]]",
+        "shapes[1].matrix[1]: 2e9 must be finite, from -1e9 to 1e9",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "matrix = [[1, 0, 0, 5], [0, nan, 0, 6], [0, 0, 1, 7]]",
+        "shapes[1].matrix[1]: nan must be finite, from -1e9 to 1e9",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "matrix = [[1, 0, 0, 5], [0, 0, 0, 6], [0, 0, 1, 7]]",
+        "shapes[1].matrix: its column 1, [0, 0, 0], must have a length from 1e-6 to 1e6",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "matrix = [[1, 0, 1, 5], [0, 1, 1, 6], [0, 0, 0, 7]]",
+        "shapes[1].matrix: its first three columns must not lie in one plane",
+    ),
+    // Materials.
+    (
+        "material = \"white\"",
+        "material = \"blue\"",
+        "shapes[1].material: there is no material \"blue\"; the scene has \"checked\", \"red\", \"white\"",
+    ),
+    (
+        "material = \"white\"",
+        "material = \"checked\"",
+        "shapes[1].material: \"checked\" must have no texture here, as \"one.obj\" has no texture coordinates",
+    ),
+    (
+        "material = \"white\"",
+        "materials = { roof = \"white\" }",
+        "shapes[1].materials.roof: \"one.obj\" has no groups with names",
+    ),
+    (
+        LINE_OF_MATERIALS,
+        "materials = { roof = \"red\", floor = \"white\" }",
+        "instances[0].materials.floor: \"parts.obj\" has no such group or material; there are \"brick\", \"door\", \
+         \"roof\", \"wall\"",
+    ),
+    (
+        LINE_OF_MATERIALS,
+        "materials = { roof = \"red\", brick = \"blue\" }",
+        "instances[0].materials.brick: there is no material \"blue\"; the scene has",
+    ),
+    (
+        LINE_OF_MATERIALS,
+        "materials = { roof = \"red\", brick = \"checked\" }",
+        "instances[0].materials.brick: \"checked\" must have no texture here, as \"parts.obj\" has no texture",
+    ),
+];
+
+#[test]
+fn bad_meshes_are_told_with_line_key_value_and_rule() {
+    let folder = folder();
+    for &(line, bad, told) in BAD {
+        let message = parse_in(&folder, &with(line, bad)).unwrap_err().to_string();
+        let (_, rest) = message.split_once("s.toml:").unwrap();
+        let (place, rest) = rest.split_once(": ").unwrap();
+        assert!(rest.starts_with(told), "{rest}\n{told}");
+        assert!(place.parse::<usize>().unwrap() > 13, "{message}");
+    }
+}
+
+#[test]
+fn files_are_told_with_their_own_places() {
+    let folder = folder();
+    for (file, told) in [
+        ("broken.obj", "broken.obj:2: vertex 2 of the face does not exist"),
+        ("far.obj", "\"far.obj\" reaches to "),
+        ("small.obj", ""),
+    ] {
+        // Twice as large as its file at least, and three times as far away.
+        let text = GOOD.replacen("file = \"one.obj\"", &format!("file = \"{file}\""), 1);
+        match parse_in(&folder, &text) {
+            Ok(_) => assert_eq!(told, ""),
+            Err(error) => {
+                let (_, rest) = error
+                    .to_string()
+                    .split_once("shapes[0].file: ")
+                    .map(|(a, b)| (a.to_owned(), b.to_owned()))
+                    .unwrap();
+                assert!(rest.contains(told) && !told.is_empty(), "{rest}\n{told}");
+            }
+        }
+    }
+    let text = with("scale = 2", "scale = 1e-3").replacen("file = \"one.obj\"", "file = \"small.obj\"", 1);
+    let told = parse_in(&folder, &text).unwrap_err().to_string();
+    assert!(
+        told.contains("shapes[0].file: \"small.obj\" must be at least 1e-9 long there; it is "),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_mesh_is_no_image_in_memory() {
+    let image = Image {
+        width: 1,
+        height: 1,
+        texels: Texels::Bytes(Encoding::Linear, vec![[0; 3]]),
+    };
+    let mut assets = Assets::default();
+    assets.images.insert("one.obj".to_owned(), Arc::new(image));
+    let camera = crate::PerspectiveDescription::new([0.0, -9.0, 0.0], [0.0; 3], 40.0);
+    let scene = Description::new(4, 4, camera).with_shape(MeshDescription::new("red", "one.obj"));
+    let told = scene.validate_with(&assets).unwrap_err().to_string();
+    assert_eq!(told, "shapes[0].file: \"one.obj\" is an image in memory, and no mesh");
+}
+
+#[test]
+fn names_of_nothing_are_told_so() {
+    let start = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
+    let told = |text: &str| {
+        let message = parse(&format!("{start}{text}")).unwrap_err().to_string();
+        message.split_once("s.toml:").unwrap().1.to_owned()
+    };
+    assert_eq!(
+        told("[[instances]]\nmesh = 'a'\n"),
+        "4: instances[0].mesh: there is no mesh \"a\"; the scene has none"
+    );
+    assert_eq!(
+        told("[[shapes]]\ntype = 'mesh'\nfile = 'one.obj'\nmaterial = 'a'\n"),
+        "6: shapes[0].material: there is no material \"a\"; the scene has none"
+    );
+}
+
+#[test]
+fn groups_are_counted() {
+    let shape = |groups| Shape {
+        geometry: Geometry::Mesh {
+            mesh: Arc::default(),
+            to_world: DAffine3::IDENTITY,
+            materials: vec![0; groups],
+        },
+        material: 0,
+    };
+    few_groups(&[shape(MOST_GROUPS / 2), shape(MOST_GROUPS / 2)]).unwrap();
+    let told = few_groups(&[shape(MOST_GROUPS / 2), shape(MOST_GROUPS / 2 + 1)]).unwrap_err();
+    assert_eq!(
+        told.to_string(),
+        "the meshes have 16777217 groups together; they must be at most 16777216"
+    );
+}
+
+#[test]
+fn groups_have_the_materials_of_their_names_first() {
+    // checked, red, white
+    let scene = parse(GOOD).unwrap();
+    assert_eq!((groups(&scene, 0), groups(&scene, 1)), (&[1][..], &[2][..]));
+    assert_eq!(groups(&scene, 2), [1, 2, 2]);
+    let changed = "material = 'red'\nmaterials = { wall = 'white' }";
+    assert_eq!(groups(&parse(&with(LINE_OF_MATERIALS, changed)).unwrap(), 2), [1, 2, 1]);
+    // A group's own name goes before that of its material.
+    let changed = "material = 'red'\nmaterials = { brick = 'white', door = 'red' }";
+    assert_eq!(groups(&parse(&with(LINE_OF_MATERIALS, changed)).unwrap(), 2), [1, 2, 1]);
+}
+
+#[test]
+fn textures_are_on_meshes_with_coordinates() {
+    let text = with("material = \"white\"", "material = \"checked\"");
+    let scene = parse(&text.replace("one.obj", "coordinates.obj")).unwrap();
+    assert_eq!(groups(&scene, 1), [0]);
+    let Geometry::Mesh { mesh, .. } = &scene.shapes[1].geometry else {
+        panic!("{:?}", scene.shapes[1]);
+    };
+    assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::X, Vec2::Y]);
+}
+
+/// Wherever a material of the path tracer has its texture.
+#[test]
+fn every_texture_of_a_material_needs_coordinates() {
+    let texture = "{ texture = \"checks\" }";
+    let plain = "[1, 1, 1]";
+    for (needs, lines) in [
+        (false, format!("type = \"diffuse\"\ncolor = {plain}\nroughness = 0.5")),
+        (true, format!("type = \"diffuse\"\ncolor = {texture}")),
+        (
+            true,
+            format!("type = \"diffuse\"\ncolor = {plain}\nroughness = {texture}"),
+        ),
+        (
+            true,
+            format!("type = \"diffuse\"\ncolor = {plain}\nemission = {texture}"),
+        ),
+        (false, format!("type = \"conductor\"\ncolor = {plain}")),
+        (true, format!("type = \"conductor\"\ncolor = {texture}")),
+        (false, format!("type = \"dielectric\"\nior = 1.5\ncolor = {plain}")),
+        (true, format!("type = \"dielectric\"\nior = 1.5\ncolor = {texture}")),
+        (true, format!("type = \"phong\"\ncolor = {plain}\nemission = {texture}")),
+        (true, format!("type = \"mirror\"\nemission = {texture}")),
+        (true, format!("type = \"glass\"\nior = 1.5\nemission = {texture}")),
+    ] {
+        let text = with("material = \"white\"", "material = \"checked\"")
+            .replace("type = \"mirror\"\ntint = { texture = \"checks\" }", &lines)
+            .replace("[meshes.parts]", "[render]\nintegrator = \"path\"\n[meshes.parts]");
+        assert!(text.contains(&lines));
+        parse(&text.replace("one.obj", "coordinates.obj")).unwrap();
+        match parse(&text) {
+            Ok(_) => assert!(!needs, "{lines}"),
+            Err(error) => {
+                assert!(needs, "{lines}: {error}");
+                assert!(error.to_string().contains("shapes[1].material: "), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn meshes_are_scaled_then_turned_then_moved() {
+    let scene = parse(GOOD).unwrap();
+    let at = |shape, p: [f64; 3]| to_world(&scene, shape).transform_point3(p.into());
+    // Quarter turns are exact.
+    assert_eq!(at(0, [1.0, 0.0, 0.0]), DVec3::new(1.0, 4.0, 3.0));
+    assert_eq!(at(0, [0.0, 2.0, 4.0]), DVec3::new(-3.0, 2.0, 11.0));
+    assert_eq!(at(1, [1.0, 2.0, 4.0]), DVec3::new(6.0, 8.0, 11.0));
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    assert!(at(2, [1.0, 0.0, 0.0]).distance(DVec3::new(half, half, 0.0)) < 1e-15);
+}
+
+#[test]
+fn the_axes_are_turned_about_in_their_order() {
+    let text = with("rotate = [0, 0, 90]", "rotate = [90, 0, 90]").replace("scale = 2\n", "");
+    let scene = parse(&text).unwrap();
+    let turned = |p: [f64; 3]| to_world(&scene, 0).transform_vector3(p.into());
+    // About x: y becomes z; then about z: x becomes y.
+    assert_eq!(turned([0.0, 1.0, 0.0]), DVec3::Z);
+    assert_eq!(turned([1.0, 0.0, 0.0]), DVec3::Y);
+    assert_eq!(turned([0.0, 0.0, 1.0]), DVec3::X);
+    let text = with("rotate = [0, 0, 90]", "rotate = [30, -50, 70]");
+    let scene = parse(&text).unwrap();
+    let turn = |axis: DVec3, degrees: f64| DMat3::from_axis_angle(axis, degrees.to_radians());
+    let expected = turn(DVec3::Z, 70.0) * turn(DVec3::Y, -50.0) * turn(DVec3::X, 30.0) * 2.0;
+    assert!(to_world(&scene, 0).matrix3.abs_diff_eq(expected, 1e-14));
+}
+
+#[test]
+fn another_axis_may_be_up() {
+    for (up, x, y, z) in [
+        ("x", DVec3::Z, DVec3::X, DVec3::Y),
+        ("y", DVec3::X, DVec3::Z, DVec3::NEG_Y),
+        ("z", DVec3::X, DVec3::Y, DVec3::Z),
+    ] {
+        let text = with(LINE_OF_MATRIX, &format!("up = '{up}'"));
+        let map = to_world(&parse(&text).unwrap(), 1);
+        assert_eq!((map.x_axis, map.y_axis, map.z_axis), (x, y, z), "{up}");
+        // No mesh is mirrored by that.
+        assert_eq!(map.matrix3.determinant(), 1.0);
+        // All else is done to the turned mesh.
+        let text = with(
+            LINE_OF_MATRIX,
+            &format!("up = '{up}'\nscale = [1, 2, 3]\ntranslate = [5, 6, 7]"),
+        );
+        let map = to_world(&parse(&text).unwrap(), 1);
+        let scale = DVec3::new(1.0, 2.0, 3.0);
+        assert_eq!((map.x_axis, map.y_axis, map.z_axis), (x * scale, y * scale, z * scale));
+        assert_eq!(map.translation, DVec3::new(5.0, 6.0, 7.0));
+    }
+}
+
+#[test]
+fn a_matrix_may_have_a_fourth_row_and_mirror() {
+    let three = to_world(&parse(GOOD).unwrap(), 1);
+    let four = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]]";
+    assert_eq!(to_world(&parse(&with(LINE_OF_MATRIX, four)).unwrap(), 1), three);
+    let mirrored = "matrix = [[-1, 0, 0, 5], [0.5, 1, 0, 6], [0, 0, 1, 7]]";
+    let map = to_world(&parse(&with(LINE_OF_MATRIX, mirrored)).unwrap(), 1);
+    assert_eq!(map.transform_point3(DVec3::ONE), DVec3::new(4.0, 7.5, 8.0));
+}
+
+#[test]
+fn values_at_the_limits_are_good() {
+    for good in [
+        "scale = [1e-6, -1e-6, 1e6]",
+        "rotate = [360, -360, 0]",
+        "translate = [0, 999999999, -1e9]\nscale = [1, 1e-6, 0.25]",
+        "matrix = [[1, 0, 1, 5], [0, 1, 1, 6], [0, 0, 1e-5, 7]]",
+    ] {
+        parse(&with(LINE_OF_MATRIX, good)).unwrap();
+    }
+}
+
+#[test]
+fn what_is_odd_is_noted_once_for_each_file() {
+    assert_eq!(parse(GOOD).unwrap().notes, Vec::<String>::new());
+    let scene = parse(&GOOD.replace("one.obj", "odd.obj")).unwrap();
+    assert_eq!(
+        scene.notes,
+        ["odd.obj: 1 of 2 triangles has no area (degenerate) and was removed"]
+    );
+    let text = GOOD.replace("one.obj", "odd.obj") + "[meshes.other]\nfile = './odd.obj'\n";
+    assert_eq!(parse(&text).unwrap().notes.len(), 2);
+}
+
+#[test]
+fn shapes_and_instances_of_a_file_share_its_triangles() {
+    let scene = parse(&(GOOD.to_owned() + "[[instances]]\nmesh = 'parts'\nmaterial = 'red'\n")).unwrap();
+    let mesh = |shape: usize| match &scene.shapes[shape].geometry {
+        Geometry::Mesh { mesh, .. } => mesh,
+        _ => panic!("no mesh"),
+    };
+    assert!(Arc::ptr_eq(mesh(0), mesh(1)));
+    assert!(Arc::ptr_eq(mesh(2), mesh(3)));
+    assert!(!Arc::ptr_eq(mesh(0), mesh(2)));
+}

@@ -1,0 +1,668 @@
+//! From a [`Description`] to a [`Scene`]: every rule that a value of a scene file must keep.
+//!
+//! The limits keep all that is computed from a scene, squares of lengths included, inside the range of `f32`.
+
+mod appearance;
+mod camera;
+mod default_material;
+mod environment;
+mod integrator;
+mod light;
+mod mesh;
+mod mtl;
+mod path;
+mod principled;
+
+use crate::note::Note;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use self::appearance::{Images, Textures};
+use self::mesh::{Known, NamedMesh};
+use self::mtl::Looks;
+use super::error::{At, Collector, Problem, Problems, both, cut};
+use super::gltf_shape::Expanded;
+use super::limits::{
+    CLAMPS, COLORS, DEEPEST, FARTHEST, FILTER_RADII, LEAST_ADAPTIVE, LENGTHS, MOST, SHADOW_EPSILONS, SHARES,
+};
+use super::parse::list;
+use super::suggest::Suggestions;
+use super::{
+    Adaptive, AdaptiveDescription, Assets, Camera, CameraPath, Color, Description, EllipsoidDescription, Environment,
+    Geometry, ImageDescription, InstanceDescription, Integrator, Light, LightDescription, Material, Parallelogram,
+    Pattern, PixelFilter, PixelFilterDescription, Render, RenderDescription, Samples, SamplesDescription, Scene,
+    Shadows, Shape, ShapeDescription, Texture, ViewSettings,
+};
+
+pub(super) use self::appearance::TEXEL_MEMORY;
+pub(super) use self::mesh::{placement, turned_up};
+pub(super) use self::path::LIGHT_SAMPLES;
+
+/// From which bounce on a path may end at random, if nothing is said.
+const RR_DEPTH: u32 = 5;
+/// The sine of the smallest angle between directions that are not parallel; likewise the smallest height of a
+/// triangle or tetrahedron relative to its longest edge.
+const FLATTEST: f64 = 1e-6;
+
+type Checked<T> = Result<T, Problem>;
+
+impl Description {
+    /// Checks every value and makes a scene of them. Image files that they name are in the current folder.
+    ///
+    /// # Errors
+    ///
+    /// A value that breaks a rule. [`Scene::parse`](super::Scene::parse) reports all of them.
+    pub fn validate(&self) -> Result<Scene, Problem> {
+        self.validate_with(&Assets::beside(Path::new(".")))
+    }
+
+    /// Checks every value, the files that they name among them, and makes a scene of them.
+    ///
+    /// # Errors
+    ///
+    /// A value that breaks a rule.
+    pub fn validate_with(&self, assets: &Assets) -> Result<Scene, Problem> {
+        let scene = self.validate_and_list(assets, &mut BTreeSet::new());
+        scene.map_err(|problems| problems.first)
+    }
+
+    /// [`Description::validate_with`] with all problems. Lists the files of the scene even if it has problems.
+    pub(super) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problems> {
+        files.extend(self.files_beside(assets));
+        let integrator = self.integrator();
+        let settings = self.settings(integrator);
+        let has_gltf = self
+            .shapes
+            .iter()
+            .any(|shape| matches!(shape, ShapeDescription::Gltf(_)));
+        let expanded = match &settings {
+            Ok(_) if has_gltf => Some(Expanded::of(self, assets, files)),
+            _ => None,
+        };
+        let mut scene = match expanded {
+            None => self.validate_plain(settings, integrator, assets, files)?,
+            Some(Err(problem)) => {
+                let others = self.validate_plain(Err(problem.into()), integrator, assets, files);
+                others.map_err(Problems::once_per_key)? // the file may have the same problem again
+            }
+            Some(Ok(expanded)) => {
+                // The files may have added lights.
+                let settings = expanded.description.settings(integrator);
+                let described = &expanded.description;
+                let scene = described.validate_plain(settings, integrator, &expanded.assets, files);
+                let place = |problem| expanded.place(self, problem);
+                let mut scene = scene.map_err(|problems| problems.map(place).once_per_key())?;
+                scene.notes.splice(0..0, expanded.notes);
+                scene.imported = expanded.imported;
+                scene
+            }
+        };
+        let chosen = integrator::note(self).map(Note::from);
+        scene.notes.splice(0..0, chosen);
+        Ok(scene)
+    }
+
+    /// Validates the sections that name no files.
+    fn settings(&self, integrator: Integrator) -> Result<Settings, Problems> {
+        let image = both(
+            image(&self.image).at("image"),
+            camera::with_path(&self.camera).at("camera"),
+        );
+        let render = render(&self.render, integrator).at("render");
+        let lights = each(&self.lights, |description| light(description).map(Some)).at("lights");
+        let ((((width, height), view), (camera, camera_path)), (render, lights)) = both(image, both(render, lights))?;
+        Ok(Settings {
+            width,
+            height,
+            view,
+            camera,
+            camera_path,
+            render,
+            lights,
+        })
+    }
+
+    /// Validates a description without glTF files. If the settings have problems, files are not read, because no scene can be made of
+    /// them; all other values are checked nevertheless.
+    fn validate_plain(
+        &self,
+        settings: Result<Settings, Problems>,
+        integrator: Integrator,
+        assets: &Assets,
+        files: &mut BTreeSet<PathBuf>,
+    ) -> Result<Scene, Problems> {
+        // A map is sorted: a material's index is its place among the names.
+        let names = self.materials.keys().map(String::as_str);
+        let indices: BTreeMap<_, _> = names.zip(0..).collect();
+        let reads_files = settings.is_ok();
+        let mut images = Images::new(assets, reads_files);
+        let (mut textures, replaced, of_textures) = appearance::textures(&self.textures, &mut images);
+        let alphas = match reads_files && of_textures.is_ok() {
+            true => appearance::alphas(&self.materials, &self.textures, &mut images, &mut textures),
+            false => BTreeMap::new(),
+        };
+        let known = Textures {
+            names: self.textures.keys().map(String::as_str).collect(),
+            textures: &textures,
+            alphas,
+            replaced,
+            integrator,
+            suggestions: Suggestions::default(),
+        };
+        let [stand_in, _] = default_material::default_materials(integrator);
+        let mut of_materials = Collector::default();
+        let materials = (self.materials.iter())
+            .map(|(name, description)| of_materials.value(known.material(description).at(name.as_str())))
+            .map(|material| material.unwrap_or_else(|| stand_in.clone()))
+            .collect();
+        let appearance = both(of_textures.at("textures"), of_materials.end(()).at("materials"));
+        let environment = environment::environment(self, integrator, &mut images).at("environment");
+        let own = (self.materials.keys().cloned().collect(), materials);
+        let mut known = Known {
+            names: &indices,
+            looks: Looks::new(own, textures, images, files, integrator),
+            assets,
+            reads_files,
+            suggestions: Suggestions::default(),
+        };
+        let shapes = each(&self.shapes, |description| shape(description, &mut known)).at("shapes");
+        let mut of_meshes = Collector::default();
+        let meshes: BTreeMap<_, _> = (self.meshes.iter())
+            .map(|(name, description)| {
+                let mesh = NamedMesh::read(description, name, &mut known, &mut of_meshes);
+                (name.as_str(), mesh)
+            })
+            .collect();
+        let of_meshes = of_meshes.end(()).at("meshes");
+        let instance = |description: &InstanceDescription| mesh::instance(description, &meshes, &mut known);
+        let instances = each(&self.instances, instance).at("instances");
+        let appearance = both(appearance, environment);
+        let objects = both(shapes, both(of_meshes, instances));
+        let (settings, ((_, environment), (shapes, (_, instances)))) = both(settings, both(appearance, objects))?;
+        let mut shapes: Vec<Shape> = shapes;
+        shapes.extend(instances);
+        mesh::few_groups(&shapes).at("instances")?;
+        let mut notes = mesh::notes(&self.shapes, &shapes, &meshes);
+        let mut looks = known.looks;
+        if let Some(damage) = looks.damage() {
+            return Err(damage.into());
+        }
+        let material_names = std::mem::take(&mut looks.names);
+        let materials = std::mem::take(&mut looks.materials);
+        let textures = std::mem::take(&mut looks.textures);
+        let files = looks.files.iter().cloned().collect();
+        notes.extend(looks.notes().map(Note::from));
+        let of_paths = path::notes((&self.render, integrator), (&material_names, &materials), &textures);
+        notes.extend(of_paths.into_iter().map(Note::from));
+        notes.extend(environment::note(self, environment.as_ref()).map(Note::from));
+        let Settings {
+            width,
+            height,
+            view,
+            camera,
+            camera_path,
+            mut render,
+            lights,
+        } = settings;
+        if render.integrator == Integrator::Path {
+            render.background = environment
+                .as_ref()
+                .map_or(DVec3::ZERO, |environment| environment.color);
+        }
+        Ok(Scene {
+            width,
+            height,
+            view,
+            camera,
+            camera_path,
+            render,
+            environment,
+            lights,
+            textures,
+            materials,
+            material_names,
+            shapes,
+            instances: self.instances.len(),
+            files,
+            notes,
+            imported: Vec::new(),
+        })
+    }
+}
+
+/// The sections of a scene that name no files.
+struct Settings {
+    width: u32,
+    height: u32,
+    view: ViewSettings,
+    camera: Camera,
+    camera_path: Option<CameraPath>,
+    render: Render,
+    lights: Vec<Light>,
+}
+
+/// Returns the size of an image, and how it is displayed.
+fn image(image: &ImageDescription) -> Result<((u32, u32), ViewSettings), Problems> {
+    let size = both(side(image.width).at("width"), side(image.height).at("height"));
+    both(size, view(image))
+}
+
+pub(super) fn view(image: &ImageDescription) -> Checked<ViewSettings> {
+    let rule = |rule: String| Problem::of("exposure", format!("{} {rule}", image.exposure));
+    Ok(ViewSettings {
+        transform: image.view_transform,
+        exposure: ViewSettings::check_exposure(image.exposure).map_err(rule)?,
+    })
+}
+
+/// Checks all entries of a list. `check` returns `None` where files are not read.
+fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<Option<T>>) -> Result<Vec<T>, Problems> {
+    let mut found = Collector::default();
+    let descriptions = descriptions.iter().enumerate();
+    let all = descriptions
+        .filter_map(|(i, description)| found.value(check(description).at(i)).flatten())
+        .collect();
+    found.end(all)
+}
+
+/// The number of pixels along a side.
+pub(super) fn side(pixels: u32) -> Checked<u32> {
+    count_to_most(pixels)
+}
+
+/// The number of samples of a pattern.
+pub(super) fn sample_count(pattern: Pattern, count: u32) -> Checked<u32> {
+    count_to_most(count)?;
+    let valid = !pattern.needs_square() || count.isqrt().pow(2) == count;
+    check(valid, || {
+        let (name, root) = (pattern.name(), count.isqrt());
+        let (below, above) = (root.pow(2), (root + 1).pow(2));
+        format!(
+            "{count} must be a square number, such as {below} or {above}: the pattern {name:?} is an n x n grid; \
+             other patterns take any number"
+        )
+    })?;
+    Ok(count)
+}
+
+fn count_to_most(count: u32) -> Checked<u32> {
+    let valid = (1..=MOST).contains(&count);
+    check(valid, || format!("{count} must be from 1 to {MOST}"))?;
+    Ok(count)
+}
+
+fn samples(description: &SamplesDescription, integrator: Integrator) -> Checked<Samples> {
+    let pattern = description.pattern(integrator);
+    let count = sample_count(pattern, description.count).at("count")?;
+    Ok(Samples { pattern, count })
+}
+
+fn render(description: &RenderDescription, integrator: Integrator) -> Result<Render, Problems> {
+    let is_path = integrator == Integrator::Path;
+    let mut found = Collector::default();
+    let ambient = found.or_default(color(description.ambient).at("ambient"));
+    let background = found.or_default(color(description.background).at("background"));
+    let shadow_epsilon = between(description.shadow_epsilon, SHADOW_EPSILONS).at("shadow_epsilon");
+    let shadow_epsilon = found.or_default(shadow_epsilon);
+    let max_depth = found.or_default(max_depth(description.max_depth, integrator).at("max_depth"));
+    let rr_depth = found.or_default(of_path(integrator, description.rr_depth, rr_depth).at("rr_depth"));
+    let clamp = found.or_default(of_path(integrator, description.clamp, clamp).at("clamp"));
+    let alpha = found.or_default(of_path(integrator, description.alpha, Ok).at("alpha"));
+    // Adaptive sampling depends on the samples of pixels.
+    let pixel_samples = samples(&description.pixel_samples, integrator).at("pixel_samples");
+    let pixels = pixel_samples.and_then(|samples| {
+        let adaptive = description.adaptive.as_ref();
+        let adaptive = adaptive.map(|adaptive| self::adaptive(adaptive, &description.pixel_samples, integrator));
+        Ok((samples, adaptive.transpose().at("adaptive")?))
+    });
+    let light_samples = samples(&description.light_samples, integrator).at("light_samples");
+    let samples = both(both(pixels, light_samples), filter(&description.filter).at("filter"));
+    let (_, (((pixel_samples, adaptive), light_samples), filter)) = both(found.end(()), samples)?;
+    Ok(Render {
+        integrator,
+        ambient: if is_path { DVec3::ZERO } else { ambient },
+        background,
+        shadow_epsilon,
+        shadows: if is_path { Shadows::Opaque } else { description.shadows },
+        max_depth,
+        rr_depth: rr_depth.unwrap_or(RR_DEPTH),
+        clamp,
+        alpha: alpha.unwrap_or(false),
+        ray_differentials: description.ray_differentials,
+        seed: description.seed,
+        pixel_samples,
+        light_samples,
+        filter,
+        adaptive,
+    })
+}
+
+fn filter(description: &PixelFilterDescription) -> Checked<PixelFilter> {
+    let PixelFilterDescription { kind, radius } = *description;
+    let radius = between(radius.unwrap_or(kind.radius()), FILTER_RADII).at("radius")?;
+    Ok(PixelFilter { kind, radius })
+}
+
+/// The error that adaptive sampling aims at.
+pub(super) fn adaptive_error(error: f64) -> Checked<f64> {
+    between(error, SHARES)
+}
+
+/// Adaptive sampling, of pixels with these samples.
+pub(super) fn adaptive(
+    description: &AdaptiveDescription,
+    pixel_samples: &SamplesDescription,
+    integrator: Integrator,
+) -> Checked<Adaptive> {
+    let (pattern, count) = (pixel_samples.pattern(integrator), pixel_samples.count);
+    check(pattern.goes_on(), || {
+        let name = pattern.name();
+        let others: Vec<_> = Pattern::ALL
+            .into_iter()
+            .filter(|pattern| pattern.goes_on())
+            .map(Pattern::name)
+            .collect();
+        format!(
+            "the pattern of pixel_samples, {name:?}, cannot add samples; use one of {}",
+            list(others)
+        )
+    })?;
+    let error = adaptive_error(description.error).at("error")?;
+    let most = description.max_samples;
+    let most = most.unwrap_or(count.saturating_mul(16).min(MOST));
+    let least = count.max(LEAST_ADAPTIVE); // one sample tells nothing of an error
+    check((least..=MOST).contains(&most), || {
+        format!("{most} must be from {least} to {MOST}, and at least the count of pixel_samples")
+    })
+    .at("max_samples")?;
+    Ok(Adaptive {
+        error,
+        max_samples: most,
+    })
+}
+
+/// The fewest and the most bounces of a path.
+pub(super) fn depths(integrator: Integrator) -> (u32, u32) {
+    match integrator {
+        Integrator::Phong => (1, 64),
+        Integrator::Path => (0, DEEPEST),
+    }
+}
+
+pub(super) fn max_depth(depth: u32, integrator: Integrator) -> Checked<u32> {
+    let (low, high) = depths(integrator);
+    check((low..=high).contains(&depth), || {
+        format!("{depth} must be from {low} to {high}")
+    })?;
+    Ok(depth)
+}
+
+fn rr_depth(depth: u32) -> Checked<u32> {
+    check(depth <= DEEPEST, || format!("{depth} must be from 0 to {DEEPEST}"))?;
+    Ok(depth)
+}
+
+fn clamp(most: f64) -> Checked<f64> {
+    between(most, CLAMPS)
+}
+
+/// A value of a key that only paths have, if it is there.
+fn of_path<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<T>) -> Checked<Option<T>> {
+    let Some(value) = value else { return Ok(None) };
+    path::needs_path(integrator)?;
+    check(value).map(Some)
+}
+
+pub(super) fn light(description: &LightDescription) -> Checked<Light> {
+    Ok(match description {
+        LightDescription::Spot(light) => return light::spot(light),
+        LightDescription::Rectangle(light) => Light::Rectangle {
+            rectangle: rectangle(light.center, light.size, light.normal, light.tangent)?,
+            color: color(light.color).at("color")?,
+            visible: light.visible,
+        },
+        LightDescription::Point(light) => Light::Point {
+            position: point(light.position).at("position")?,
+            color: color(light.color).at("color")?,
+        },
+        LightDescription::Directional(light) => Light::Directional {
+            direction: unit(light.direction).at("direction")?,
+            color: color(light.color).at("color")?,
+        },
+    })
+}
+
+/// Returns a shape; `None` if it has a file that is not read.
+fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Option<Shape>> {
+    let (geometry, name) = match description {
+        ShapeDescription::Rectangle(shape) => {
+            let rectangle = rectangle(shape.center, shape.size, shape.normal, shape.tangent)?;
+            (Geometry::Rectangle(rectangle), &shape.material)
+        }
+        ShapeDescription::Disk(shape) => {
+            let center = point(shape.center).at("center")?;
+            let radius = length(shape.radius).at("radius")?;
+            let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
+            let disk = Parallelogram {
+                center,
+                u: tangent * radius,
+                v: bitangent * radius,
+            };
+            (Geometry::Disk(disk), &shape.material)
+        }
+        ShapeDescription::Ellipsoid(shape) => (ellipsoid(shape)?, &shape.material),
+        ShapeDescription::Sphere(shape) => {
+            let center = point(shape.center).at("center")?;
+            let radius = length(shape.radius).at("radius")?;
+            let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * radius);
+            (Geometry::Ellipsoid { center, axes }, &shape.material)
+        }
+        ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
+        ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
+        ShapeDescription::Mesh(shape) => return mesh::mesh(shape, known),
+        // Expanded, unless there are problems.
+        ShapeDescription::Gltf(shape) => {
+            placement(shape.translate, shape.rotate, shape.scale, shape.matrix.as_ref())?;
+            return known.assets.find(&shape.file).at("file").map(|_| None);
+        }
+        ShapeDescription::Plane(shape) => {
+            let point = point(shape.point).at("point")?;
+            let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
+            let plane = Geometry::Plane {
+                point,
+                tangent,
+                bitangent,
+            };
+            (plane, &shape.material)
+        }
+    };
+    let material = known.material(name).at("material")?;
+    let has_tangents = !matches!(geometry, Geometry::Triangles(_));
+    check(
+        has_tangents || known.looks.materials[material].normal_map.is_none(),
+        || format!("{name:?} must have no normal map here, because this shape has no tangents"),
+    )
+    .at("material")?;
+    let textures = known.looks.materials[material].textures();
+    let sets = textures.iter().map(|i| known.looks.textures[*i].uv_set);
+    let set = sets.max().unwrap_or(0);
+    check(set == 0, || {
+        format!("{name:?} must have no texture with uv_set = {set} here, because this shape has only the set 0")
+    })
+    .at("material")?;
+    if let Geometry::Plane { .. } = geometry {
+        let emission = &known.looks.materials[material].emission;
+        let is_dark = path::most(emission, &known.looks.textures) == Some(DVec3::ZERO);
+        check(is_dark, || {
+            format!("{name:?} must not emit light here, because this shape is infinite")
+        })
+        .at("material")?;
+    }
+    Ok(Some(Shape { geometry, material }))
+}
+
+fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3, tangent: Option<DVec3>) -> Checked<Parallelogram> {
+    let center = point(center).at("center")?;
+    let width = length(size[0]).at("size")?;
+    let height = length(size[1]).at("size")?;
+    let (tangent, bitangent) = frame(normal, tangent)?;
+    Ok(Parallelogram {
+        center,
+        u: tangent * (width / 2.0),
+        v: bitangent * (height / 2.0),
+    })
+}
+
+fn ellipsoid(shape: &EllipsoidDescription) -> Checked<Geometry> {
+    let center = point(shape.center).at("center")?;
+    let x = unit(shape.a).at("a")?;
+    let y = unit(shape.b).at("b")?;
+    let z = unit(shape.c).at("c")?;
+    check(x.cross(y).length() > FLATTEST, || {
+        format!("{} must not be parallel to a, {}", show(shape.b), show(shape.a))
+    })
+    .at("b")?;
+    check(x.cross(y).dot(z).abs() > FLATTEST, || {
+        let (a, b, c) = (show(shape.a), show(shape.b), show(shape.c));
+        format!("{c} must not lie in the plane of a and b, {a} and {b}")
+    })
+    .at("c")?;
+    Ok(Geometry::Ellipsoid {
+        center,
+        axes: [shape.a, shape.b, shape.c],
+    })
+}
+
+fn triangle(vertices: [DVec3; 3]) -> Checked<Geometry> {
+    let longest = longest_edge(&vertices)?;
+    let [v0, v1, v2] = vertices;
+    let area = (v1 - v0).cross(v2 - v1).length();
+    check(area > FLATTEST * longest * longest, || {
+        format!("{} must not lie on one line", show_all(&vertices))
+    })?;
+    Ok(Geometry::Triangles(vec![vertices]))
+}
+
+fn tetrahedron(vertices: [DVec3; 4]) -> Checked<Geometry> {
+    let longest = longest_edge(&vertices)?;
+    let [v0, mut v1, mut v2, v3] = vertices;
+    let volume = (v1 - v0).cross(v2 - v0).dot(v3 - v0);
+    check(volume.abs() > FLATTEST * longest.powi(3), || {
+        format!("{} must not lie in one plane", show_all(&vertices))
+    })?;
+    if volume < 0.0 {
+        // Mirrored: without this the faces would look inwards.
+        (v1, v2) = (v2, v1);
+    }
+    let faces = vec![[v0, v2, v1], [v0, v1, v3], [v1, v2, v3], [v0, v3, v2]];
+    Ok(Geometry::Triangles(faces))
+}
+
+/// Checks the vertices one by one, then that they are not all the same.
+fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
+    for (i, &vertex) in vertices.iter().enumerate() {
+        point(vertex).at(i)?;
+    }
+    let from = |a: &DVec3| vertices.iter().map(|b| a.distance(*b)).fold(0.0, f64::max);
+    let longest = vertices.iter().map(from).fold(0.0, f64::max);
+    check(longest >= LENGTHS.0, || {
+        format!("{} must be at least {} apart", show_all(vertices), number(LENGTHS.0))
+    })?;
+    Ok(longest)
+}
+
+/// Returns the unit vectors of u and v: the part of the tangent that is orthogonal to the normal, and normal x tangent. Without a
+/// tangent u is along x, or along y if the normal is nearly along x.
+fn frame(normal: DVec3, tangent: Option<DVec3>) -> Checked<(DVec3, DVec3)> {
+    let n = unit(normal).at("normal")?;
+    let tangent = tangent.unwrap_or(if n.x.abs() < 0.9 { DVec3::X } else { DVec3::Y });
+    let t = unit(tangent).at("tangent")?;
+    let t = t - n * n.dot(t);
+    check(t.length() > FLATTEST, || {
+        format!("{} must not be parallel to the normal, {}", show(tangent), show(normal))
+    })
+    .at("tangent")?;
+    let t = t.normalize();
+    Ok((t, n.cross(t)))
+}
+
+pub(super) fn point(p: DVec3) -> Checked<DVec3> {
+    for x in p.to_array() {
+        check(x.abs() <= FARTHEST, || {
+            let (x, limit) = (number(x), number(FARTHEST));
+            format!("{x} must be finite, from -{limit} to {limit}")
+        })?;
+    }
+    Ok(p)
+}
+
+pub(super) fn color(c: DVec3) -> Checked<DVec3> {
+    for x in c.to_array() {
+        let (low, high) = COLORS;
+        check((low..=high).contains(&x), || {
+            let (x, low, high) = (number(x), number(low), number(high));
+            format!("{x} must be finite, from {low} to {high}")
+        })?;
+    }
+    Ok(c)
+}
+
+/// A direction of any length, made a unit vector.
+fn unit(direction: DVec3) -> Checked<DVec3> {
+    let length = point(direction)?.length();
+    check(length >= LENGTHS.0, || {
+        let (direction, limit) = (show(direction), number(LENGTHS.0));
+        format!("{direction} must not be zero: its length must be at least {limit}")
+    })?;
+    Ok(direction / length)
+}
+
+fn length(x: f64) -> Checked<f64> {
+    let (low, high) = LENGTHS;
+    check((low..=high).contains(&x), || {
+        let (x, low, high) = (number(x), number(low), number(high));
+        format!("{x} must be finite and greater than 0, from {low} to {high}")
+    })?;
+    Ok(x)
+}
+
+fn between(x: f64, (low, high): (f64, f64)) -> Checked<f64> {
+    check((low..=high).contains(&x), || {
+        format!("{} must be from {} to {}", number(x), number(low), number(high))
+    })?;
+    Ok(x)
+}
+
+fn check(valid: bool, message: impl FnOnce() -> String) -> Checked<()> {
+    match valid {
+        true => Ok(()),
+        false => Err(Problem::new(message())),
+    }
+}
+
+/// A number as a person would write it.
+fn number(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e6).contains(&x.abs()) {
+        x.to_string()
+    } else {
+        format!("{x:e}").to_lowercase() // NaN among them, which TOML writes nan
+    }
+}
+
+fn show(v: DVec3) -> String {
+    format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
+}
+
+fn show_pair([x, y]: [f64; 2]) -> String {
+    format!("[{}, {}]", number(x), number(y))
+}
+
+fn show_all(points: &[DVec3]) -> String {
+    let points: Vec<_> = points.iter().map(|&point| show(point)).collect();
+    format!("[{}]", points.join(", "))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,266 @@
+//! What MTL files make of meshes, and what is told of them.
+
+use std::fs;
+use std::path::PathBuf;
+
+use glam::DVec3;
+use tempfile::TempDir;
+
+use crate::{Color, Geometry, Material, Reflection, Scene, SceneError, TextureKind};
+
+const SCENE: &str = "image = { width = 4, height = 4 }\n\
+                     camera = { position = [0, -9, 0], look_at = [0, 0, 0], fov = 40 }\n\
+                     [materials.own]\ntype = 'mirror'\n";
+const MESH: &str = "[[shapes]]\ntype = 'mesh'\nfile = 'in/a.obj'\n";
+
+/// Triangles with texture coordinates: of red, of red with a name, and of blue.
+const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 2 4\nv 0 0 5\nv 1 0 5\nv 0 2 9\nv 0 0 6\nv 1 0 6\nv 0 2 8\nvt 0 0\n\
+                   usemtl red\nf 1/1 2/1 3/1\ng door\nf 4/1 5/1 6/1\nusemtl blue\nf 7/1 8/1 9/1\n";
+
+struct Place(TempDir);
+
+impl Place {
+    /// The mesh in the folder `in`, with these materials.
+    fn new(mtl: &str) -> Place {
+        let place = Place(tempfile::tempdir().unwrap());
+        fs::create_dir(place.path("in")).unwrap();
+        place.write("in/a.obj", OBJ);
+        place.write("in/a.mtl", mtl);
+        let image = image::RgbImage::from_pixel(2, 1, image::Rgb([255, 0, 0]));
+        image.save(place.path("in/red wood.png")).unwrap();
+        fs::write(place.path("in/damaged.png"), "no image").unwrap();
+        image.save(place.path("outside.png")).unwrap();
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    fn scene(&self, shapes: &str) -> Result<Scene, SceneError> {
+        let name = self.path("s.toml");
+        Scene::parse(&format!("{SCENE}{shapes}"), &name.display().to_string())
+    }
+}
+
+/// The names of the materials of a shape's groups.
+fn names(scene: &Scene, shape: usize) -> Vec<&str> {
+    match &scene.shapes[shape].geometry {
+        Geometry::Mesh { materials, .. } => materials.iter().map(|i| scene.material_names[*i].as_str()).collect(),
+        other => panic!("no mesh: {other:?}"),
+    }
+}
+
+fn named<'a>(scene: &'a Scene, name: &str) -> &'a Material {
+    let i = scene.material_names.iter().position(|known| known == name).unwrap();
+    &scene.materials[i]
+}
+
+/// Ambient, diffuse and specular factor, and the exponent.
+fn phong(material: &Material) -> (Color, Color, Color, f64) {
+    assert_eq!((material.emission, material.normal_map), (Color::BLACK, None));
+    match material.reflection {
+        Reflection::Phong {
+            ambient,
+            diffuse,
+            specular,
+            shininess,
+        } => (ambient, diffuse, specular, shininess),
+        ref other => panic!("not of Phong: {other:?}"),
+    }
+}
+
+const TWO: &str = "newmtl red\nKa 1 1 1\nKd 0.5 0.25 0\nKs 0.125\nNs 96.5\nd 1\nKe 0 0 0\nnewmtl unused\nKe 1 1 1\n\
+                   newmtl blue\nKs 0.5 0.5 0.5\nillum 1\n";
+
+#[test]
+fn groups_have_the_materials_of_their_file() {
+    let place = Place::new(TWO);
+    let scene = place.scene(MESH).unwrap();
+    assert_eq!(scene.notes, Vec::<String>::new());
+    assert_eq!(scene.material_names, ["own", "red", "blue"]);
+    assert_eq!(names(&scene, 0), ["red", "red", "blue"]);
+    let plain = |r, g, b| Color::Plain(DVec3::new(r, g, b));
+    let red = plain(0.5, 0.25, 0.0);
+    assert_eq!(
+        phong(named(&scene, "red")),
+        (red, red, plain(0.125, 0.125, 0.125), 96.5)
+    );
+    // What the file does not say; and no highlights by its model.
+    let gray = plain(0.8, 0.8, 0.8);
+    assert_eq!(phong(named(&scene, "blue")), (gray, gray, plain(0.0, 0.0, 0.0), 16.0));
+}
+
+#[test]
+fn the_scene_goes_before_the_file() {
+    let place = Place::new(TWO);
+    let materials = |keys: &str| {
+        let scene = place.scene(&format!("{MESH}{keys}")).unwrap();
+        names(&scene, 0).join(" ")
+    };
+    assert_eq!(materials("material = 'own'"), "own own own");
+    assert_eq!(materials("materials = { door = 'own' }"), "red own own");
+    assert_eq!(materials("materials = { red = 'own' }"), "own own blue");
+    // Nothing is made of materials that are not used, and nothing is told of them.
+    place.write("in/a.mtl", "newmtl red\nKe 1 1 1\nmap_Kd none.png\nnewmtl blue\n");
+    let scene = place.scene(&format!("{MESH}materials = {{ red = 'own' }}")).unwrap();
+    assert_eq!((scene.material_names.len(), scene.textures.len()), (2, 0));
+    assert_eq!(scene.notes, Vec::<String>::new());
+}
+
+#[test]
+fn instances_share_materials() {
+    let place = Place::new(TWO);
+    place.write("in/b.obj", &OBJ.replace("red", "unused"));
+    let meshes = "[meshes.a]\nfile = 'in/a.obj'\n[meshes.b]\nfile = 'in/b.obj'\n";
+    let instances =
+        "[[instances]]\nmesh = 'a'\n[[instances]]\nmesh = 'a'\ntranslate = [1, 2, 3]\n[[instances]]\nmesh = 'b'\n";
+    let scene = place.scene(&format!("{meshes}{instances}")).unwrap();
+    assert_eq!(scene.material_names, ["own", "red", "blue", "unused"]);
+    assert_eq!(names(&scene, 1), ["red", "red", "blue"]);
+    assert_eq!(names(&scene, 2), ["unused", "unused", "blue"]);
+    assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
+}
+
+#[test]
+fn maps_are_textures() {
+    let place = Place::new("newmtl red\nmap_Kd red wood.png\nnewmtl blue\nmap_Kd ..\\in\\red wood.png\n");
+    place.write(
+        "in/far.mtl",
+        "newmtl red\nmap_Kd C:\\far\\away\\red wood.png\nnewmtl blue\nmap_Kd /far/red wood.png\n",
+    );
+    place.write("in/far.obj", &OBJ.replace("a.mtl", "far.mtl"));
+    let far = place.scene(&MESH.replace("a.obj", "far.obj")).unwrap();
+    assert_eq!((far.textures.len(), &far.notes[..]), (1, &[][..]));
+    let scene = place.scene(MESH).unwrap();
+    let texture = Color::Texture(0);
+    let (ambient, diffuse, ..) = phong(named(&scene, "red"));
+    assert_eq!((ambient, diffuse), (texture, texture));
+    assert_eq!(phong(named(&scene, "blue")).1, texture);
+    let TextureKind::Image { image, .. } = &scene.textures[0].kind else {
+        panic!("{:?}", scene.textures)
+    };
+    assert_eq!((scene.textures.len(), image.width), (1, 2));
+    let names: Vec<_> = (scene.files.iter())
+        .map(|file| file.strip_prefix(place.0.path()).unwrap())
+        .collect();
+    assert!(names.contains(&"in/red wood.png".as_ref()), "{names:?}");
+    assert!(
+        names.contains(&"in/a.mtl".as_ref()) && names.contains(&"in/a.obj".as_ref()),
+        "{names:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_rendered_is_told_once() {
+    for (mtl, told) in [
+        (
+            "Kd -1 0 0",
+            "\"red\": Kd: each of [-1, 0, 0] must be from 0 to 1e6; [0, 0, 0] stands in",
+        ),
+        (
+            "Kd 255 0 0.5",
+            "\"red\": Kd: [255, 0, 0.5] is used, but colors of MTL files are from 0 to 1",
+        ),
+        (
+            "Ks 0 2e6 0",
+            "\"red\": Ks: each of [0, 2e6, 0] must be from 0 to 1e6; [0, 1e6, 0] stands in",
+        ),
+        ("Ks 1\nNs 0", "\"red\": Ns: 0 must be from 1e-6 to 1e6; 1e-6 stands in"),
+        (
+            "Ks 1\nNs 1e9",
+            "\"red\": Ns: 1e9 must be from 1e-6 to 1e6; 1e6 stands in",
+        ),
+        ("Ke 0 0 2", "\"red\": Ke: ignored: it needs integrator = \"path\""),
+        ("Tr 0.5", "\"red\": d: ignored: it needs integrator = \"path\""),
+        (
+            "map_bump b.png",
+            "\"red\": map_Bump: ignored: it needs integrator = \"path\"",
+        ),
+        ("map_Kd none.png", "\"red\": map_Kd: \"in/none.png\" cannot be read: "),
+        (
+            "map_Kd damaged.png",
+            "\"red\": map_Kd: \"in/damaged.png\" must be a PNG, JPEG, WebP, KTX2, EXR or HDR file; Kd stands in",
+        ),
+        ("map_Kd ../../outside.png", "\"red\": map_Kd: \"in/../../outside.png\" "),
+        ("map_Kd -s 2 red wood.png", "\"red\": option \"-s\" of map_Kd: ignored"),
+        ("disp a.png", "\"red\": disp: ignored"),
+    ] {
+        let place = Place::new(&format!("newmtl red\n{mtl}\n# all of it\nnewmtl blue\n"));
+        let scene = place.scene(MESH).unwrap();
+        let [note] = &scene.notes[..] else {
+            panic!("{:?}", scene.notes)
+        };
+        // The warning is about the last line of `mtl`.
+        let line = 1 + mtl.lines().count();
+        let start = format!("in/a.mtl:{line}: material {told}");
+        assert!(note.message.starts_with(&start), "{note}\n{start}");
+        // The other material has it too.
+        let place = Place::new(&format!("newmtl red\n{mtl}\nnewmtl blue\n{mtl}\n"));
+        let notes = place.scene(MESH).unwrap().notes;
+        assert!(
+            notes.len() == 1 && notes[0].message.ends_with(" (and 1 more material)"),
+            "{notes:?}"
+        );
+    }
+    // These change nothing, nor does a line that names no file.
+    let place =
+        Place::new("newmtl red\nKs 0\nNs 0\nd 1\nTr 0\nKe 0 0 0\nmap_Ka a.png\nPr 1\nNi 1.5\nillum 2\nnewmtl blue\n");
+    place.write("in/a.obj", &format!("mtllib\n{OBJ}"));
+    assert_eq!(place.scene(MESH).unwrap().notes, Vec::<String>::new());
+}
+
+#[test]
+fn a_map_needs_texture_coordinates() {
+    let place = Place::new("newmtl red\nKd 1 0 0\nmap_Kd red wood.png\nnewmtl blue\n");
+    place.write("in/a.obj", &OBJ.replace("/1", ""));
+    let scene = place.scene(MESH).unwrap();
+    let told = "in/a.mtl:3: material \"red\": map_Kd: the mesh has no texture coordinates; Kd stands in";
+    assert_eq!(scene.notes, [told]);
+    assert_eq!(phong(named(&scene, "red")).1, Color::Plain(DVec3::X));
+}
+
+#[test]
+fn a_default_stands_in_for_missing_materials() {
+    let place = Place::new("newmtl red\n");
+    let note = |rest: &str| format!("in/a.obj: no material {rest}; a gray material is used instead");
+    let notes = |keys: &str| place.scene(&format!("{MESH}{keys}")).unwrap().notes;
+    let scene = place.scene(MESH).unwrap();
+    assert_eq!(scene.notes, [note("\"blue\": its MTL files do not have it")]);
+    assert_eq!(names(&scene, 0), ["red", "red", "default"]);
+    let gray = Color::Plain(DVec3::splat(0.8));
+    assert_eq!(phong(named(&scene, "default")).1, gray);
+    fs::remove_file(place.path("in/a.mtl")).unwrap();
+    let start = "in/a.obj: no material \"blue\", \"red\": its MTL file \"a.mtl\" cannot be read: ";
+    let found = notes("");
+    assert!(found.len() == 1 && found[0].message.starts_with(start), "{found:?}");
+    place.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", ""));
+    let expected = note("\"blue\": the file names no MTL file");
+    assert_eq!(notes("materials = { red = 'own' }"), [expected]);
+    // A group that names no material is no surprise.
+    place.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", "").replace("usemtl ", "g "));
+    assert_eq!(notes(""), Vec::<String>::new());
+    // Many names.
+    let many = (0..20).fold(OBJ.replace("mtllib a.mtl\n", ""), |text, i| {
+        format!("{text}usemtl m{i}\nf 1/1 2/1 {}/1\n", i % 6 + 4)
+    });
+    place.write("in/a.obj", &many);
+    let rest =
+        "\"blue\", \"m0\", \"m1\", \"m10\", \"m11\", \"m12\", \"m13\", \"m14\" and 14 more: the file names no MTL file";
+    let found = notes("");
+    assert!(found.iter().any(|found| *found == note(rest)), "{found:?}");
+}
+
+#[test]
+fn a_changed_file_of_materials_is_read_anew() {
+    let place = Place::new("newmtl red\nKd 1 0 0\nnewmtl blue\n");
+    let first = place.scene(MESH).unwrap();
+    place.write("in/a.mtl", "newmtl red\nKd 0.25 0 0\nnewmtl blue\n");
+    let second = place.scene(MESH).unwrap();
+    assert_eq!(phong(named(&first, "red")).1, Color::Plain(DVec3::X));
+    assert_eq!(phong(named(&second, "red")).1, Color::Plain(DVec3::X * 0.25));
+}

@@ -1,0 +1,135 @@
+//! What a scene has for the path tracer alone, and what it ignores.
+
+use super::super::{
+    AlphaMode, Integrator, Principled, PrincipledDescription, Reflection, RenderDescription, Shadows, TextureKind,
+    Value,
+};
+use super::{Checked, Color, DVec3, Material, Texture, check, cut, number};
+
+/// The most materials in a note.
+const MOST_NAMES: usize = 8;
+/// How far above 1 a sum of two shares may be by its rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// What is told of `light_samples` that are ignored.
+pub(crate) const LIGHT_SAMPLES: &str =
+    "render.light_samples: no effect with integrator = \"path\"; increase pixel_samples to reduce noise";
+
+/// The rule of what only paths have.
+pub(super) fn needs_path(integrator: Integrator) -> Checked<()> {
+    check(integrator == Integrator::Path, || {
+        "needs integrator = \"path\"".to_owned()
+    })
+}
+
+/// The largest value that a colour has in each component; of images that is not known.
+pub(super) fn most(color: &Color, textures: &[Texture]) -> Option<DVec3> {
+    match *color {
+        Color::Plain(color) => Some(color),
+        Color::Texture(i) => match textures[i].kind {
+            TextureKind::Constant(color) => Some(color),
+            TextureKind::Checker { even, odd } => Some(even.max(odd)),
+            TextureKind::Lines { cell, line, .. } => Some(cell.max(line)),
+            TextureKind::Image { .. } => None,
+        },
+    }
+}
+
+/// What the path tracer does not do as the file says.
+pub(super) fn notes(
+    (render, integrator): (&RenderDescription, Integrator),
+    (names, materials): (&[String], &[Material]),
+    textures: &[Texture],
+) -> Vec<String> {
+    if integrator != Integrator::Path {
+        return Vec::new();
+    }
+    let mut notes = Vec::new();
+    if render.ambient != DVec3::ZERO {
+        notes.push("render.ambient: no effect with integrator = \"path\", which computes indirect light".to_owned());
+    }
+    if render.shadows == Shadows::Transparent {
+        let rule = "no effect with integrator = \"path\", which traces light through glass";
+        notes.push(format!("render.shadows: {rule}"));
+    }
+    if render.light_samples != RenderDescription::default().light_samples {
+        notes.push(LIGHT_SAMPLES.to_owned());
+    }
+    notes.extend(too_bright(names, materials, textures));
+    notes.extend(unused_alpha(names, materials));
+    notes.extend(unused_cutoff(names, materials));
+    notes
+}
+
+/// Which Phong materials would give more light than they get.
+fn too_bright(names: &[String], materials: &[Material], textures: &[Texture]) -> Option<String> {
+    let share = |material: &Material| {
+        let Reflection::Phong { diffuse, specular, .. } = &material.reflection else {
+            return None;
+        };
+        let share = (most(diffuse, textures)? + most(specular, textures)?).max_element();
+        (share > 1.0 + ROUNDING).then_some(share)
+    };
+    let bright: Vec<(&String, f64)> = (names.iter().zip(materials))
+        .filter_map(|(name, material)| Some((name, share(material)?)))
+        .collect();
+    // Hundredths, because sums such as 0.7 + 0.4 have many digits.
+    let shown = bright.iter().map(|(name, share)| {
+        let share = number(((share - ROUNDING) * 100.0).ceil() / 100.0);
+        format!("{:?} ({share})", cut(name))
+    });
+    let all = several(shown)?;
+    Some(format!(
+        "materials: diffuse + specular are scaled down to 1 with integrator = \"path\", which conserves energy: {all}"
+    ))
+}
+
+/// Which materials have an `alpha` that nothing asks.
+fn unused_alpha(names: &[String], materials: &[Material]) -> Option<String> {
+    let is_unused = |principled: &Principled| {
+        principled.alpha_mode == AlphaMode::Opaque && !matches!(principled.alpha, Value::Plain(1.0))
+    };
+    let rule = "has no effect without alpha_mode = \"mask\" or \"blend\"";
+    Some(format!(
+        "materials: alpha {rule}: {}",
+        that(names, materials, is_unused)?
+    ))
+}
+
+/// Which materials have an `alpha_cutoff` that nothing asks.
+fn unused_cutoff(names: &[String], materials: &[Material]) -> Option<String> {
+    let usual = PrincipledDescription::default().alpha_cutoff;
+    let is_unused =
+        |principled: &Principled| principled.alpha_mode != AlphaMode::Mask && principled.alpha_cutoff != usual;
+    let rule = "has no effect without alpha_mode = \"mask\"";
+    Some(format!(
+        "materials: alpha_cutoff {rule}: {}",
+        that(names, materials, is_unused)?
+    ))
+}
+
+/// The names of the `principled` materials of which something is true.
+fn that(names: &[String], materials: &[Material], is_true: impl Fn(&Principled) -> bool) -> Option<String> {
+    let found = (names.iter().zip(materials)).filter(|(_, material)| match &material.reflection {
+        Reflection::Principled(principled) => is_true(principled),
+        _ => false,
+    });
+    several(found.map(|(name, _)| format!("{:?}", cut(name))))
+}
+
+/// `a, b and c`, the first of them where there are many; nothing of none.
+fn several(mut all: impl Iterator<Item = String>) -> Option<String> {
+    let mut shown: Vec<String> = all.by_ref().take(MOST_NAMES).collect();
+    match all.count() {
+        0 => {}
+        more => shown.push(format!("{more} more")),
+    }
+    let last = shown.pop()?;
+    Some(match shown.is_empty() {
+        true => last,
+        false => format!("{} and {last}", shown.join(", ")),
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,832 @@
+//! What a good scene becomes, and what is told of every bad value.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::super::limits::{ABSORPTIONS, BRIGHTEST};
+use super::super::{Camera, Material, Projection, Reflection, SceneError};
+use super::*;
+
+/// One of everything; every line is there once, so that a test can put another in its place.
+const GOOD: &str = r#"
+[image]
+width = 8
+height = 4
+[camera]
+position = [0, -4, 1]
+look_at = [0, 0, 1]
+fov = 90
+focal_length = 2
+[render]
+ambient = [0.1, 0.1, 0.1]
+background = [0.2, 0.2, 0.2]
+shadow_epsilon = 1e-4
+seed = 7
+pixel_samples = { pattern = "grid", count = 4 }
+light_samples = { pattern = "random", count = 3 }
+[materials.white]
+type = "phong"
+color = [0.7, 0.7, 0.7]
+specular = [1, 1, 1]
+shininess = 20
+[materials."dark red"]
+type = "phong"
+ambient = [0.3, 0, 0]
+diffuse = [0.4, 0, 0]
+specular = [0.5, 0, 0]
+[[lights]]
+type = "rectangle"
+center = [0, 0, 9]
+size = [2, 4]
+normal = [0, 0, -3]
+tangent = [4, 0, 3]
+color = [1, 0.5, 0]
+[[lights]]
+type = "point"
+position = [0, 0, 8]
+color = [1, 0.6, 0]
+[[lights]]
+type = "directional"
+direction = [0, 3, -4]
+color = [1, 0.7, 0]
+[[shapes]] # 0
+type = "rectangle"
+material = "white"
+center = [0, 0, 1.5]
+size = [6, 2]
+normal = [0, 0, 1]
+tangent = [0, 1, 0]
+[[shapes]] # 1
+type = "ellipsoid"
+material = "dark red"
+center = [0, 0, 2]
+a = [1, 0, 0]
+b = [1, 2, 0]
+c = [0, 0, 3]
+[[shapes]] # 2
+type = "sphere"
+material = "white" # sphere
+center = [0, 0, 3]
+radius = 0.5
+[[shapes]] # 3
+type = "triangle"
+material = "white" # triangle
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+[[shapes]] # 4
+type = "tetrahedron"
+material = "white" # tetrahedron
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+[[shapes]] # 5
+type = "plane"
+material = "white" # plane
+point = [0, 0, 0.5]
+normal = [0, 0, 2]
+tangent = [1, 1, 0]
+"#;
+
+fn parse(text: &str) -> Result<Scene, SceneError> {
+    Scene::parse(text, "s.toml")
+}
+
+/// The good scene with a line changed.
+fn with(line: &str, changed: &str) -> String {
+    let line = format!("\n{line}\n");
+    assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
+    GOOD.replace(&line, &format!("\n{changed}\n"))
+}
+
+#[test]
+fn a_good_scene_is_what_its_file_says() {
+    let scene = parse(GOOD).unwrap();
+    assert_eq!((scene.width, scene.height), (8, 4));
+    let camera = Camera {
+        position: DVec3::new(0.0, -4.0, 1.0),
+        look_at: DVec3::new(0.0, 0.0, 1.0),
+        right: DVec3::X,
+        up: DVec3::Z,
+        forward: DVec3::Y,
+        projection: Projection::Perspective { fov: FRAC_PI_2 },
+        lens: None,
+    };
+    assert_eq!(scene.camera, camera);
+    let phong = |ambient, diffuse, specular, shininess| Material {
+        reflection: Reflection::Phong {
+            ambient: Color::Plain(ambient),
+            diffuse: Color::Plain(diffuse),
+            specular: Color::Plain(specular),
+            shininess,
+        },
+        emission: Color::BLACK,
+        visible: true,
+        normal_map: None,
+    };
+    let (white, red) = (DVec3::splat(0.7), DVec3::X);
+    let dark_red = phong(red * 0.3, red * 0.4, red * 0.5, 16.0);
+    assert_eq!(scene.materials, [dark_red, phong(white, white, DVec3::ONE, 20.0)]);
+    let square = |z, u, v| Parallelogram {
+        center: DVec3::new(0.0, 0.0, z),
+        u,
+        v,
+    };
+    let lights = [
+        Light::Rectangle {
+            // The tangent's part along the normal is gone; the bitangent is -Z x X.
+            rectangle: square(9.0, DVec3::X, DVec3::NEG_Y * 2.0),
+            color: DVec3::new(1.0, 0.5, 0.0),
+            visible: true,
+        },
+        Light::Point {
+            position: DVec3::new(0.0, 0.0, 8.0),
+            color: DVec3::new(1.0, 0.6, 0.0),
+        },
+        Light::Directional {
+            direction: DVec3::new(0.0, 0.6, -0.8),
+            color: DVec3::new(1.0, 0.7, 0.0),
+        },
+    ];
+    assert_eq!(scene.lights, lights);
+    let geometries: Vec<_> = scene.shapes.iter().map(|shape| &shape.geometry).collect();
+    let rectangle = square(1.5, DVec3::Y * 3.0, DVec3::NEG_X);
+    assert_eq!(geometries[0], &Geometry::Rectangle(rectangle));
+    let sphere = Geometry::Ellipsoid {
+        center: DVec3::Z * 3.0,
+        axes: [DVec3::X * 0.5, DVec3::Y * 0.5, DVec3::Z * 0.5],
+    };
+    assert_eq!(geometries[2], &sphere);
+    let materials: Vec<_> = scene.shapes.iter().map(|shape| shape.material).collect();
+    assert_eq!(materials, [1, 0, 1, 1, 1, 1]);
+}
+
+#[test]
+fn faces_of_a_tetrahedron_look_outwards_however_it_is_given() {
+    let line = "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]";
+    let mirrored = "vertices = [[0, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 1]]";
+    for text in [GOOD.to_owned(), with(line, mirrored)] {
+        let scene = parse(&text).unwrap();
+        let Geometry::Triangles(faces) = &scene.shapes[4].geometry else {
+            panic!("{:?}", scene.shapes[4]);
+        };
+        assert_eq!(faces.len(), 4);
+        for [v0, v1, v2] in faces {
+            let normal = (v1 - v0).cross(v2 - v1);
+            assert!(normal.dot(*v0 - DVec3::splat(0.2)) > 0.0, "{v0} {v1} {v2}");
+        }
+    }
+}
+
+/// A line of the good scene, a bad one in its place, and what is told of it.
+const BAD: &[(&str, &str, &str)] = &[
+    ("width = 8", "width = 0", "image.width: 0 must be from 1 to 65536"),
+    (
+        "height = 4",
+        "height = 65537",
+        "image.height: 65537 must be from 1 to 65536",
+    ),
+    (
+        "position = [0, -4, 1]",
+        "position = [0, nan, 1]",
+        "camera.position: nan must be finite, from -1e9 to 1e9",
+    ),
+    (
+        "look_at = [0, 0, 1]",
+        "look_at = [0, -4, 1]",
+        "camera.look_at: [0, -4, 1] must differ from the camera's position",
+    ),
+    (
+        "look_at = [0, 0, 1]",
+        "look_at = [0, 0, -inf]",
+        "camera.look_at: -inf must be finite, from -1e9 to 1e9",
+    ),
+    (
+        "look_at = [0, 0, 1]",
+        "look_at = [0, 9, 1]\nup = [0, 1, 0]",
+        "camera.look_at: [0, 9, 1] makes the view parallel to up, [0, 1, 0]; choose another up",
+    ),
+    (
+        "fov = 90",
+        "up = [0, 0, 0]\nfov = 90",
+        "camera.up: [0, 0, 0] must not be zero: its length must be at least 1e-9",
+    ),
+    ("fov = 90", "fov = 0", "camera.fov: 0 must be from 0.001 to 179.999"),
+    ("fov = 90", "fov = 180", "camera.fov: 180 must be from 0.001 to 179.999"),
+    ("fov = 90", "fov = nan", "camera.fov: nan must be from 0.001 to 179.999"),
+    (
+        "focal_length = 2",
+        "focal_length = 0",
+        "camera.focal_length: 0 must be finite and greater than 0, from 1e-9 to 1e9",
+    ),
+    (
+        "fov = 90\nfocal_length = 2",
+        "height = -2\ntype = 'orthographic'",
+        "camera.height: -2 must be finite and greater than 0, from 1e-9 to 1e9",
+    ),
+    (
+        "ambient = [0.1, 0.1, 0.1]",
+        "ambient = [0, 0, -0.1]",
+        "render.ambient: -0.1 must be finite, from 0 to 1e6",
+    ),
+    (
+        "background = [0.2, 0.2, 0.2]",
+        "background = [0, inf, 0]",
+        "render.background: inf must be finite, from 0 to 1e6",
+    ),
+    (
+        "shadow_epsilon = 1e-4",
+        "shadow_epsilon = -1e-9",
+        "render.shadow_epsilon: -1e-9 must be from 0 to 0.1",
+    ),
+    (
+        r#"pixel_samples = { pattern = "grid", count = 4 }"#,
+        "pixel_samples = { count = 15 }",
+        "render.pixel_samples.count: 15 must be a square number, such as 9 or 16: the pattern \"grid\" is an n x n grid; other patterns take any number",
+    ),
+    (
+        r#"light_samples = { pattern = "random", count = 3 }"#,
+        "light_samples = { pattern = 'random', count = 0 }",
+        "render.light_samples.count: 0 must be from 1 to 65536",
+    ),
+    (
+        "color = [0.7, 0.7, 0.7]",
+        "color = [-1, 0, 0]",
+        "materials.white.color: -1 must be finite, from 0 to 1e6",
+    ),
+    (
+        "diffuse = [0.4, 0, 0]",
+        "diffuse = [0, 2e6, 0]",
+        "materials.\"dark red\".diffuse: 2e6 must be finite, from 0 to 1e6",
+    ),
+    (
+        "shininess = 20",
+        "shininess = 0",
+        "materials.white.shininess: 0 must be from 1e-6 to 1e6",
+    ),
+    (
+        "center = [0, 0, 9]",
+        "center = [2e9, 0, 0]",
+        "lights[0].center: 2e9 must be finite, from -1e9 to 1e9",
+    ),
+    (
+        "size = [2, 4]",
+        "size = [2, inf]",
+        "lights[0].size: inf must be finite and greater than 0, from 1e-9 to 1e9",
+    ),
+    (
+        "tangent = [4, 0, 3]",
+        "tangent = [0, 0, 5]",
+        "lights[0].tangent: [0, 0, 5] must not be parallel to the normal, [0, 0, -3]",
+    ),
+    (
+        "color = [1, 0.5, 0]",
+        "color = [nan, 0, 0]",
+        "lights[0].color: nan must be finite, from 0 to 1e6",
+    ),
+    (
+        "position = [0, 0, 8]",
+        "position = [0, 0, inf]",
+        "lights[1].position: inf must be finite, from -1e9 to 1e9",
+    ),
+    (
+        "direction = [0, 3, -4]",
+        "direction = [0, 0, 0]",
+        "lights[2].direction: [0, 0, 0] must not be zero: its length must be at least 1e-9",
+    ),
+    (
+        "size = [6, 2]",
+        "size = [6, -1]",
+        "shapes[0].size: -1 must be finite and greater than 0, from 1e-9 to 1e9",
+    ),
+    (
+        "size = [6, 2]",
+        "size = [0, 2]",
+        "shapes[0].size: 0 must be finite and greater than 0, from 1e-9 to 1e9",
+    ),
+    (
+        "normal = [0, 0, 1]",
+        "normal = [0, 0, 0]",
+        "shapes[0].normal: [0, 0, 0] must not be zero: its length must be at least 1e-9",
+    ),
+    (
+        "tangent = [0, 1, 0]",
+        "tangent = [0, 1e-7, 1]",
+        "shapes[0].tangent: [0, 1e-7, 1] must not be parallel to the normal, [0, 0, 1]",
+    ),
+    (
+        "a = [1, 0, 0]",
+        "a = [0, 0, 0]",
+        "shapes[1].a: [0, 0, 0] must not be zero: its length must be at least 1e-9",
+    ),
+    (
+        "b = [1, 2, 0]",
+        "b = [-2, 0, 0]",
+        "shapes[1].b: [-2, 0, 0] must not be parallel to a, [1, 0, 0]",
+    ),
+    (
+        "c = [0, 0, 3]",
+        "c = [1, 1, 0]",
+        "shapes[1].c: [1, 1, 0] must not lie in the plane of a and b, [1, 0, 0] and [1, 2, 0]",
+    ),
+    (
+        "radius = 0.5",
+        "radius = -0.5",
+        "shapes[2].radius: -0.5 must be finite and greater than 0, from 1e-9 to 1e9",
+    ),
+    (
+        "radius = 0.5",
+        "radius = nan",
+        "shapes[2].radius: nan must be finite and greater than 0, from 1e-9 to 1e9",
+    ),
+    (
+        "material = \"white\" # sphere",
+        "material = \"blue\"",
+        "shapes[2].material: there is no material \"blue\"; the scene has \"dark red\", \"white\"",
+    ),
+    (
+        "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+        "vertices = [[0, 0, 0], [1, 1, 1], [2, 2, 2]]",
+        "shapes[3].vertices: [[0, 0, 0], [1, 1, 1], [2, 2, 2]] must not lie on one line",
+    ),
+    (
+        "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+        "vertices = [[1, 2, 3], [1, 2, 3], [1, 2, 3]]",
+        "shapes[3].vertices: [[1, 2, 3], [1, 2, 3], [1, 2, 3]] must be at least 1e-9 apart",
+    ),
+    (
+        "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+        "vertices = [[0, 0, 0], [1, nan, 0], [0, 1, 0]]",
+        "shapes[3].vertices[1]: nan must be finite, from -1e9 to 1e9",
+    ),
+    (
+        "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+        "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]",
+        "shapes[4].vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]] must not lie in one plane",
+    ),
+    (
+        "tangent = [1, 1, 0]",
+        "tangent = [0, 0, -1]",
+        "shapes[5].tangent: [0, 0, -1] must not be parallel to the normal, [0, 0, 2]",
+    ),
+];
+
+#[test]
+fn bad_values_are_told_with_line_key_value_and_rule() {
+    for &(line, bad, told) in BAD {
+        let text = with(line, bad);
+        let place = text[..text.find(bad).unwrap()].lines().count() + 1;
+        let message = parse(&text).unwrap_err().to_string();
+        assert_eq!(message, format!("s.toml:{place}: {told}"));
+    }
+}
+
+#[test]
+fn values_at_the_limits_are_good() {
+    for (line, good) in [
+        ("width = 8", "width = 65536"),
+        ("height = 4", "height = 1"),
+        ("look_at = [0, 0, 1]", "look_at = [1e9, 0, -1e9]"),
+        ("fov = 90", "fov = 179.999"),
+        ("fov = 90", "fov = 0.001"),
+        ("shadow_epsilon = 1e-4", "shadow_epsilon = 0"),
+        (
+            r#"pixel_samples = { pattern = "grid", count = 4 }"#,
+            "pixel_samples = { count = 65536 }",
+        ),
+        ("color = [0.7, 0.7, 0.7]", "color = [0, -0.0, 1e6]"),
+        ("size = [6, 2]", "size = [1e-9, 1e9]"),
+        ("tangent = [0, 1, 0]", "tangent = [0, 1e-5, 1]"),
+        ("c = [0, 0, 3]", "c = [1, 1, 1e-5]"),
+        (
+            "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+            "vertices = [[0, 0, 0], [1, 1e-5, 0], [2, 0, 0]]",
+        ),
+    ] {
+        parse(&with(line, good)).unwrap();
+    }
+}
+
+#[test]
+fn a_factor_without_color_is_missing() {
+    let message = parse(&with("diffuse = [0.4, 0, 0]", "")).unwrap_err().to_string();
+    let line = GOOD
+        .lines()
+        .position(|line| line.starts_with("[materials.\"dark"))
+        .unwrap()
+        + 1;
+    let told = "is missing; set it or color";
+    assert_eq!(message, format!("s.toml:{line}: materials.\"dark red\".diffuse {told}"));
+}
+
+#[test]
+fn a_scene_may_be_empty_but_not_name_a_material_that_is_not_there() {
+    let empty = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
+    assert_eq!(parse(empty).unwrap().shapes, []);
+    let text = format!("{empty}[[shapes]]\ntype = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'a'\n");
+    let told = "s.toml:7: shapes[0].material: there is no material \"a\"; the scene has none";
+    assert_eq!(parse(&text).unwrap_err().to_string(), told);
+}
+
+#[test]
+fn the_page_has_the_limits() {
+    let page = include_str!("../../../../docs/scene-format.md").replace('\n', " ");
+    let (shortest, longest) = LENGTHS;
+    for limit in [
+        format!("each finite and from -{0} to {0}", number(FARTHEST)),
+        format!("any length from {} on", number(shortest)),
+        format!("greater than 0, and from {} to {}", number(shortest), number(longest)),
+        format!("each from 0 to {}", number(BRIGHTEST)),
+        format!("| `width` | required | 1 to {MOST} |"),
+        format!(
+            "| `max_depth` | 8 | {} to {}; under `\"path\"` {} to {DEEPEST} |",
+            depths(Integrator::Phong).0,
+            depths(Integrator::Phong).1,
+            depths(Integrator::Path).0
+        ),
+        format!("| `rr_depth` | {RR_DEPTH} | 0 to {DEEPEST} |"),
+        format!("above 0: {} to {} |", number(CLAMPS.0), number(CLAMPS.1)),
+        format!(
+            "| `absorption` | `[0, 0, 0]` | three numbers from 0 to {} |",
+            number(ABSORPTIONS.1)
+        ),
+        format!("| `count` | required | 1 to {MOST} |"),
+        format!("sine of their angle must be above {}", number(FLATTEST)),
+        format!("unit vectors span must be above {}", number(FLATTEST)),
+        format!("twice the area must be above {} times", number(FLATTEST)),
+        format!("six times the volume must be above {} times", number(FLATTEST)),
+    ] {
+        assert!(page.contains(&limit), "{limit}");
+    }
+}
+
+#[test]
+fn a_disk_has_the_radii_that_lengths_have() {
+    let scene = |radius: &str, normal: &str| {
+        let text = format!(
+            "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\
+             materials.m = {{ type = 'mirror' }}\nshapes = [{{ type = 'disk', material = 'm', center = [0, 0, 0], \
+             radius = {radius}, normal = {normal} }}]\n"
+        );
+        crate::Scene::parse(&text, "s.toml").map_err(|error| error.to_string())
+    };
+    for radius in ["1e-9", "1", "1e9"] {
+        for normal in ["[1, 0, 0]", "[-1, 0, 0]", "[0, 1, 0]", "[0, 0, -1]", "[0.9, 0.1, 0.42]"] {
+            let scene = scene(radius, normal).unwrap();
+            let Geometry::Disk(disk) = &scene.shapes[0].geometry else {
+                panic!("a disk");
+            };
+            let radius: f64 = radius.parse().unwrap();
+            assert!((disk.u.length() / radius - 1.0).abs() < 1e-12 && (disk.v.length() / radius - 1.0).abs() < 1e-12);
+        }
+    }
+    let told = scene("1.1e9", "[0, 0, 1]").unwrap_err();
+    assert!(told.contains("shapes[0].radius: 1.1e9 must be"), "{told}");
+}
+
+/// Returns the messages of a text, line by line.
+fn errors(text: &str) -> Vec<String> {
+    let error = Scene::parse(text, "s.toml").unwrap_err().to_string();
+    error.lines().map(str::to_owned).collect()
+}
+
+/// A scene whose first line is the size of the image.
+const SMALL: &str = "\
+image = { width = 4, height = 4 }
+camera = { position = [0, -4, 1], look_at = [0, 0, 1], fov = 40 }
+";
+
+#[test]
+fn all_invalid_values_are_reported_in_the_order_of_the_lines() {
+    let text = "\
+[materials.z]
+type = 'phong'
+color = [1, 1, 1]
+shininess = -1
+[materials.a]
+type = 'mirror'
+tint = [2, 1, 1]
+[[shapes]]
+type = 'sphere'
+material = 'z'
+center = [0, 0, 0]
+radius = -3
+[[shapes]]
+type = 'sphere'
+material = 'b'
+center = [0, 0, 0]
+radius = 1
+[[lights]]
+type = 'point'
+position = [0, 0, 2e9]
+color = [1, 1, 1]
+[environment]
+color = [1, 1, -1]
+[textures.t]
+type = 'constant'
+color = [-1, 0, 0]
+[meshes.m]
+file = 'none.obj'
+[[instances]]
+mesh = 'n'
+material = 'z'
+[render]
+max_depth = 70000
+clamp = -1
+pixel_samples = 0
+adaptive = { error = 2 }
+filter = { type = 'box', radius = -1 }
+[image]
+width = 0
+height = 70000
+exposure = 300
+[camera]
+position = [0, 0, 2e9]
+look_at = [0, 0, 1]
+up = [0, 0, 0]
+fov = 190
+blades = 1
+";
+    let found = errors(text);
+    let places: Vec<_> = found.iter().map(|line| line.rsplitn(2, ": ").last().unwrap()).collect();
+    let wanted = [
+        "4: materials.z.shininess",
+        "7: materials.a.tint",
+        "12: shapes[0].radius",
+        "15: shapes[1].material",
+        "20: lights[0].position",
+        "23: environment.color",
+        "26: textures.t.color",
+        "28: meshes.m.file",
+        "30: instances[0].mesh",
+        "33: render.max_depth",
+        "34: render.clamp",
+        "35: render.pixel_samples.count",
+        "37: render.filter.radius",
+        "39: image.width",
+        "40: image.height",
+        "41: image.exposure",
+        "43: camera.position",
+        "45: camera.up",
+        "46: camera.fov",
+        "47: camera.blades",
+    ];
+    let places: Vec<_> = places
+        .iter()
+        .map(|place| place.split(": ").take(2).collect::<Vec<_>>().join(": "))
+        .collect();
+    assert_eq!(places, wanted.map(|place| format!("s.toml:{place}")), "{found:#?}");
+    // `adaptive` depends on `pixel_samples`, and is checked once that is valid.
+    let found = errors(&text.replace("pixel_samples = 0", "pixel_samples = 9"));
+    assert!(
+        found
+            .iter()
+            .any(|line| line.contains("render.adaptive.error: 2 must be")),
+        "{found:#?}"
+    );
+}
+
+#[test]
+fn keys_and_types_of_all_entries_are_reported() {
+    let text = "\
+[image]
+width = 4
+hight = 4
+[camera]
+fovv = 40
+[render]
+seed = 'x'
+[[shapes]]
+type = 'sphere'
+raduis = 1
+[[shapes]]
+type = 'spere'
+[materials.a]
+color = [1, 1, 1]
+[[lights]]
+type = 'point'
+position = [0, 0]
+color = [1, 1, 1]
+";
+    let wanted = [
+        "s.toml:3: image.hight: unknown key; did you mean \"height\"?",
+        "s.toml:5: camera.fovv: unknown key; did you mean \"fov\"?",
+        "s.toml:7: render.seed: \"x\" must be a whole number from 0 to 4294967295",
+        "s.toml:10: shapes[0].raduis: unknown key; did you mean \"radius\"?",
+        "s.toml:12: shapes[1].type: \"spere\" must be one of",
+        "s.toml:13: materials.a.type is missing",
+        "s.toml:17: lights[0].position: [0, 0] must be a list of 3 numbers",
+    ];
+    let found = errors(text);
+    assert_eq!(found.len(), wanted.len(), "{found:#?}");
+    for (found, wanted) in found.iter().zip(wanted) {
+        assert!(found.starts_with(wanted), "{found}\n{wanted}");
+    }
+    // The same without headers of their own, which is read as a whole.
+    let text = format!("{SMALL}shapes = [{{ type = 'a' }}, {{ type = 'sphere', raduis = 1 }}]\n[render]\nseeds = 3\n");
+    assert_eq!(errors(&text).len(), 3);
+}
+
+/// A texture, material or mesh with an error has no other errors follow from it.
+#[test]
+fn an_error_is_reported_once() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("a.obj"),
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",
+    )
+    .unwrap();
+    let origin = folder.path().join("s.toml").display().to_string();
+    let image = "type = 'image'\nfile = 'none.png'\n";
+    let uses = "\
+[materials.m]
+type = 'principled'
+base_color = { texture = 't' }
+roughness = { texture = 't', channel = 'a' }
+normal_map = { texture = 't' }
+emission = { texture = 't' }
+[[shapes]]
+type = 'plane'
+material = 'm'
+point = [0, 0, 0]
+normal = [0, 0, 1]
+[[shapes]]
+type = 'triangle'
+material = 'm'
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+[[shapes]]
+type = 'mesh'
+file = 'a.obj'
+material = 'm'
+";
+    let count = |text: &str| match Scene::parse(&format!("{SMALL}{text}"), &origin) {
+        Ok(_) => 0,
+        Err(error) => {
+            assert!(
+                matches!(error.each(), ([SceneError::Invalid { .. }, ..], None)),
+                "{error}"
+            );
+            error.to_string().lines().count()
+        }
+    };
+    // The image is absent, or its description is invalid; the materials and shapes are valid.
+    let texture = |more: &str| format!("[textures.t]\n{image}{more}\n{uses}");
+    assert_eq!(count(&texture("")), 0, "a warning");
+    assert_eq!(count(&texture("max_anisotropy = 99")), 1);
+    assert_eq!(count(&format!("{}\n[render]\nmax_depth = 9999999", texture(""))), 1);
+    assert_eq!(
+        count(&format!(
+            "{}\n[render]\nmax_depth = 9999999",
+            texture("max_anisotropy = 99")
+        )),
+        2
+    );
+    let material = uses.replace("type = 'principled'\n", "type = 'principled'\nmetallic = 3\n");
+    assert_eq!(
+        count(&format!(
+            "[textures.t]\ntype = 'constant'\ncolor = [1, 1, 1]\n{material}"
+        )),
+        1
+    );
+    let mesh = "[meshes.n]\nfile = 'none.obj'\n[[instances]]\nmesh = 'n'\n";
+    assert_eq!(count(mesh), 1);
+    assert_eq!(count(&mesh.replace("none.obj", "a.obj")), 0);
+    assert_eq!(count(&format!("{mesh}scale = 0\n")), 2);
+    assert_eq!(count(&format!("{mesh}material = 'none'\n")), 2);
+    let gltf = "[[shapes]]\ntype = 'gltf'\nfile = 'none.glb'\n";
+    assert_eq!(
+        count(&format!("{gltf}[materials.m]\ntype = 'mirror'\ntint = [2, 2, 2]\n")),
+        2
+    );
+    assert_eq!(
+        count(&format!("{gltf}scale = 0\n[environment]\ncolor = [-1, 0, 0]\n")),
+        2
+    );
+}
+
+/// Files are not read if the sections without files have errors: a typo is reported before gigabytes are read.
+#[test]
+fn files_are_not_read_for_a_scene_with_invalid_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.png", "a.obj", "a.glb", "a.hdr"] {
+        std::fs::write(folder.path().join(name), "broken").unwrap();
+    }
+    let text = format!(
+        "{SMALL}textures.t = {{ type = 'image', file = 'a.png' }}\nmeshes.m = {{ file = 'a.obj' }}\n\
+         shapes = [{{ type = 'mesh', file = 'a.obj' }}, {{ type = 'gltf', file = 'a.glb' }}]\nenvironment.file = 'a.hdr'\n"
+    );
+    let origin = folder.path().join("s.toml").display().to_string();
+    let count = |text: &str| Scene::parse(text, &origin).unwrap_err().to_string().lines().count();
+    assert_eq!(count(&text.replace("fov = 40", "fov = 400")), 1);
+    // A missing file is found without reading it.
+    assert_eq!(
+        count(&text.replace("fov = 40", "fov = 400").replace("a.hdr", "b.hdr")),
+        2
+    );
+    assert!(
+        count(&text.replace("{ type = 'gltf', file = 'a.glb' }", "")) > 2,
+        "control"
+    );
+}
+
+#[test]
+fn all_keys_of_a_table_with_errors_are_reported() {
+    let text = "\
+[render]
+seed = -5
+max_depth = 'deep'
+colour = 1
+pixel_samples = -3
+[[shapes]]
+type = 'sphere'
+size = 3
+center = [0, 0]
+material = 7
+radius = 1
+";
+    assert_eq!(
+        errors(&format!("{SMALL}{text}")),
+        [
+            "s.toml:4: render.seed: -5 must be a whole number from 0 to 4294967295",
+            "s.toml:5: render.max_depth: \"deep\" must be a whole number from 1 to 64",
+            "s.toml:6: render.colour: unknown key; expected one of \"integrator\", \"ambient\", \"background\", \"shadow_epsilon\", \
+             \"shadows\", \"max_depth\", \"rr_depth\", \"clamp\", \"alpha\", \"ray_differentials\", \"seed\", \"pixel_samples\", \
+             \"light_samples\", \"filter\", \"adaptive\"",
+            "s.toml:7: render.pixel_samples: -3 must be a whole number from 1 to 65536, or a table such as { pattern = \"grid\", count = 16 }",
+            "s.toml:10: shapes[0].size: unknown key; expected one of \"type\", \"material\", \"center\", \"radius\"",
+            "s.toml:11: shapes[0].center: [0, 0] must be a list of 3 numbers",
+            "s.toml:12: shapes[0].material: 7 must be a string",
+        ]
+    );
+    // Also beside a section that is unknown.
+    let found = errors(&format!("{SMALL}{text}[shape]\n[environment]\nrotate = 'x'\n"));
+    assert_eq!(found.len(), 9, "{found:#?}");
+    assert_eq!(found[7], "s.toml:14: shape: unknown key; did you mean \"shapes\"?");
+    // A key that is missing may be one that is unknown.
+    assert_eq!(
+        errors(&format!(
+            "{SMALL}[[shapes]]\ntype = 'sphere'\ncentre = [0, 0, 0]\nradius = 'x'\nmaterial = 'm'\n"
+        )),
+        [
+            "s.toml:5: shapes[0].centre: unknown key; did you mean \"center\"?",
+            "s.toml:6: shapes[0].radius: \"x\" must be a number",
+        ]
+    );
+}
+
+#[test]
+fn of_many_errors_the_first_are_reported() {
+    let shape = "[[shapes]]\ntype = 'sphere'\nmaterial = 'none'\ncenter = [0, 0, 0]\nradius = 1\n";
+    for (count, last) in [
+        (20, None),
+        (21, Some("and 1 more error")),
+        (300, Some("and 280 more errors")),
+    ] {
+        let error = Scene::parse(&format!("{SMALL}{}", shape.repeat(count)), "s.toml").unwrap_err();
+        let (errors, more) = error.each();
+        assert_eq!((errors.len(), more.as_deref()), (20, last));
+        assert_eq!(errors[19].place().key.as_deref(), Some("shapes[19].material"));
+    }
+    // Also if the errors of another section are before them in the file, or behind.
+    let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 0]\ncolor = [-1, 0, 0]\n";
+    let [lights, shapes] = [light.repeat(15), shape.repeat(15)];
+    for (text, key) in [
+        (format!("{SMALL}{lights}{shapes}"), "lights[0].color"),
+        (format!("{SMALL}{shapes}{lights}"), "shapes[0].material"),
+    ] {
+        let error = Scene::parse(&text, "s.toml").unwrap_err();
+        let (errors, more) = error.each();
+        assert_eq!((errors.len(), more.as_deref()), (20, Some("and 10 more errors")));
+        assert_eq!(error.place().key.as_deref(), Some(key));
+    }
+    // Similar names are searched for the first only: all of them would take minutes.
+    let materials = (0..50_000)
+        .map(|i| format!("m{i}.type = 'mirror'\n"))
+        .collect::<String>();
+    let unknown = (0..50_000)
+        .map(|i| shape.replace("none", &format!("n{i}")))
+        .collect::<String>();
+    let error = Scene::parse(&format!("{SMALL}[materials]\n{materials}{unknown}"), "s.toml").unwrap_err();
+    let (errors, more) = error.each();
+    assert_eq!(more.as_deref(), Some("and 49980 more errors"));
+    assert!(
+        errors[0]
+            .to_string()
+            .ends_with("there is no material \"n0\"; did you mean \"m0\"?"),
+        "{}",
+        errors[0]
+    );
+    // Keys that are unknown.
+    let error = Scene::parse(&format!("{SMALL}{}", "[[lights]]\nx = 1\n".repeat(5000)), "s.toml").unwrap_err();
+    assert_eq!(error.to_string().lines().last(), Some("and 4980 more errors"));
+}
+
+#[test]
+fn a_value_of_a_define_is_the_only_error() {
+    let overrides = super::super::Overrides {
+        define: vec!["camera.fov=190".parse().unwrap()],
+        ..Default::default()
+    };
+    let text = format!("{SMALL}[render]\nmax_depth = 9999999\n");
+    let error = Scene::parse_with(&text, "s.toml", &overrides).unwrap_err();
+    assert!(matches!(error, SceneError::Override(_)), "{error}");
+    assert_eq!(
+        error.to_string(),
+        "define.camera.fov: 190 must be from 0.001 to 179.999"
+    );
+}

@@ -1,0 +1,236 @@
+//! Scenes as TOML, in the way that one is written by hand: what has its default is left out, and files are named from where the text will be.
+
+use std::io;
+use std::path::{Component, Path};
+
+use serde::Serialize;
+use toml::{Table, Value};
+
+use super::{Description, RenderDescription, ShapeDescription, TextureDescription, ViewTransform};
+
+/// What cameras and pictures have if nothing is said.
+const DEFAULTS: &str = "up = [0.0, 0.0, 1.0]\nfocal_length = 1.0\nblades = 0\nblade_rotation = 0.0\nexposure = 0.0\n\
+                        lights = true\nscale = 1.0\nvisible = true\n";
+
+impl Description {
+    /// The text of a scene file that reads back as this description.
+    ///
+    /// # Errors
+    ///
+    /// Values that TOML has no words for.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        let text = self.sections()?;
+        match Description::parse(&text, "") {
+            Ok(read) if read == *self => Ok(text),
+            _ => toml::to_string(self), // all of it, word for word
+        }
+    }
+
+    fn sections(&self) -> Result<String, toml::ser::Error> {
+        let mut defaults: Table = toml::from_str(DEFAULTS).unwrap_or_default();
+        let transform = Value::try_from(ViewTransform::default())?;
+        defaults.insert("view_transform".to_owned(), transform);
+        let render = Table::try_from(RenderDescription::default())?;
+        let none = Table::new();
+        let mut sections = vec![
+            section("image", &self.image, &defaults)?,
+            section("camera", &self.camera, &defaults)?,
+            section("render", &self.render, &render)?,
+        ];
+        if let Some(environment) = &self.environment {
+            sections.push(section("environment", environment, &defaults)?);
+        }
+        for (kind, all) in [
+            ("textures", Table::try_from(&self.textures)?),
+            ("materials", Table::try_from(&self.materials)?),
+            ("meshes", Table::try_from(&self.meshes)?),
+        ] {
+            if !all.is_empty() {
+                sections.push(toml::to_string(&Table::from_iter([(
+                    kind.to_owned(),
+                    Value::Table(all),
+                )]))?);
+            }
+        }
+        for light in &self.lights {
+            sections.push(element("lights", light, &none)?);
+        }
+        for shape in &self.shapes {
+            let is_gltf = matches!(shape, ShapeDescription::Gltf(_));
+            let text = element("shapes", shape, if is_gltf { &defaults } else { &none })?;
+            let told = "# Meshes with their materials, and lights. A table `materials` replaces materials of the file by those of\n\
+                        # this scene, by name.\n";
+            sections.push(format!("{}{text}", if is_gltf { told } else { "" }));
+        }
+        for instance in &self.instances {
+            sections.push(element("instances", instance, &none)?);
+        }
+        Ok(sections.join("\n"))
+    }
+
+    /// The same scene in another folder: the files that it names are named from there. What are no files here keeps its name.
+    ///
+    /// # Errors
+    ///
+    /// Folders that are not there, and names that are not UTF-8.
+    pub fn in_folder(mut self, before: &Path, folder: &Path) -> io::Result<Description> {
+        let here = Path::new(".");
+        let whole = |folder: &Path| if folder.as_os_str().is_empty() { here } else { folder }.canonicalize();
+        let (before, folder) = (whole(before)?, whole(folder)?);
+        for name in self.names() {
+            if before == folder && !Path::new(name).is_absolute() {
+                continue;
+            }
+            let path = before.join(&*name);
+            let (Some(parent), Some(file)) = (path.parent(), path.file_name()) else {
+                continue;
+            };
+            let path = parent.canonicalize()?.join(file);
+            *name = from(&folder, &path).ok_or_else(|| {
+                let message = format!("{} must be UTF-8 to be named in a scene", path.display());
+                io::Error::new(io::ErrorKind::InvalidData, message)
+            })?;
+        }
+        Ok(self)
+    }
+
+    /// The names of all files.
+    fn names(&mut self) -> Vec<&mut String> {
+        let mut names = Vec::new();
+        names.extend(self.textures.values_mut().filter_map(|texture| match texture {
+            TextureDescription::Image(image) => Some(&mut image.file),
+            _ => None,
+        }));
+        names.extend(self.shapes.iter_mut().filter_map(|shape| match shape {
+            ShapeDescription::Mesh(mesh) => Some(&mut mesh.file),
+            ShapeDescription::Gltf(gltf) => Some(&mut gltf.file),
+            _ => None,
+        }));
+        names.extend(self.meshes.values_mut().map(|mesh| &mut mesh.file));
+        names.extend(
+            self.environment
+                .iter_mut()
+                .filter_map(|environment| environment.file.as_mut()),
+        );
+        names
+    }
+}
+
+/// The keys that a reader looks for first, in this order; all others follow in that of the alphabet.
+const FIRST: [&str; 5] = ["type", "file", "width", "position", "integrator"];
+
+/// A table of the file, without what the defaults say too.
+fn section(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
+    written(&format!("[{name}]\n"), name, value, defaults, Value::Table)
+}
+
+/// An element of a list of tables.
+fn element(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
+    let list = |table| Value::Array(vec![Value::Table(table)]);
+    written(&format!("[[{name}]]\n"), name, value, defaults, list)
+}
+
+fn written(
+    head: &str,
+    name: &str,
+    value: &impl Serialize,
+    defaults: &Table,
+    nested: impl Fn(Table) -> Value,
+) -> Result<String, toml::ser::Error> {
+    let mut table = Table::try_from(value)?;
+    table.retain(|key, value| defaults.get(key) != Some(value));
+    let mut text = head.to_owned();
+    for key in FIRST {
+        if let Some(value) = table.remove(key) {
+            text += &toml::to_string(&Table::from_iter([(key.to_owned(), value)]))?;
+        }
+    }
+    let rest = toml::to_string(&Table::from_iter([(name.to_owned(), nested(table))]))?;
+    Ok(text + rest.strip_prefix(head).unwrap_or(&rest))
+}
+
+/// The name of a file as seen from a folder, both without links.
+fn from(folder: &Path, path: &Path) -> Option<String> {
+    let (folder, path): (Vec<_>, Vec<_>) = (folder.components().collect(), path.components().collect());
+    let same = folder.iter().zip(&path).take_while(|(a, b)| a == b).count();
+    let up = folder[same..].iter().map(|_| Some(".."));
+    let down = path[same..].iter().map(|part| match part {
+        Component::Normal(name) => name.to_str(),
+        _ => None, // another drive
+    });
+    let parts: Vec<&str> = up.chain(down).collect::<Option<_>>()?;
+    Some(parts.join("/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every scene of the project reads back as it was, with its defaults left out.
+    #[test]
+    fn texts_read_back_as_the_same_scene() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let mut count = 0;
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_none_or(|ending| ending != "toml") {
+                continue;
+            }
+            let description = Description::parse(&std::fs::read_to_string(&path).unwrap(), "s.toml").unwrap();
+            let text = description.sections().unwrap();
+            assert_eq!(Description::parse(&text, "s.toml").unwrap(), description, "{text}");
+            assert_eq!(description.to_toml().unwrap(), text);
+            count += 1;
+        }
+        assert!(count > 10);
+    }
+
+    #[test]
+    fn a_gltf_file_is_a_few_lines() {
+        let camera = crate::PerspectiveDescription::new([0.1, -5.0, 1e-7], [0.0; 3], 35.0);
+        let description = Description::new(1024, 512, camera)
+            .with_environment(super::super::EnvironmentDescription::named(
+                super::super::EnvironmentName::Studio,
+            ))
+            .with_shape(ShapeDescription::Gltf(super::super::GltfDescription::new("a b.glb")));
+        let text = description.to_toml().unwrap();
+        assert_eq!(
+            text,
+            "[image]\nwidth = 1024\nheight = 512\n\n\
+             [camera]\ntype = \"perspective\"\nposition = [0.1, -5.0, 0.0000001]\nfov = 35.0\nlook_at = [0.0, 0.0, 0.0]\n\n\
+             [render]\n\n[environment]\nname = \"studio\"\n\n\
+             # Meshes with their materials, and lights. A table `materials` replaces materials of the file by those of\n\
+             # this scene, by name.\n\
+             [[shapes]]\ntype = \"gltf\"\nfile = \"a b.glb\"\n"
+        );
+        assert_eq!(Description::parse(&text, "s.toml").unwrap(), description);
+    }
+
+    #[test]
+    fn files_are_named_from_another_folder() {
+        let root = tempfile::tempdir().unwrap();
+        for folder in ["a/b", "c"] {
+            std::fs::create_dir_all(root.path().join(folder)).unwrap();
+        }
+        let named = |file: &str, before: &str, folder: &str| {
+            let camera = crate::PerspectiveDescription::new([0.0, -5.0, 0.0], [0.0; 3], 35.0);
+            let shape = ShapeDescription::Gltf(super::super::GltfDescription::new(file));
+            let description = Description::new(1, 1, camera).with_shape(shape);
+            let moved = description.in_folder(&root.path().join(before), &root.path().join(folder));
+            match moved.unwrap().shapes.remove(0) {
+                ShapeDescription::Gltf(gltf) => gltf.file,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(named("x.glb", "a", "a"), "x.glb");
+        assert_eq!(named("b/../x.glb", "a", "a"), "b/../x.glb");
+        assert_eq!(named("x.glb", "a/b", "a"), "b/x.glb");
+        assert_eq!(named("x.glb", "a/b", ""), "a/b/x.glb");
+        assert_eq!(named("x.glb", "a", "a/b"), "../x.glb");
+        assert_eq!(named("x.glb", "a/b", "c"), "../a/b/x.glb");
+        assert_eq!(named("../x.glb", "a/b", "c"), "../a/x.glb");
+        let whole = root.path().join("a/b/x.glb").display().to_string();
+        assert_eq!(named(&whole, "c", "a"), "b/x.glb");
+        assert_eq!(named(&whole, "a", "a"), "b/x.glb");
+    }
+}

@@ -1,0 +1,159 @@
+//! The WGSL shaders of wgray as text: a table of the files, and their hash, which is part of the identity of a render on every device.
+
+/// A shader file: its name in `shaders/` and its text at build time.
+pub type File = (&'static str, &'static str);
+
+macro_rules! files {
+    ($($name:literal),* $(,)?) => {
+        &[$(($name, include_str!($name))),*]
+    };
+}
+
+/// The shared mathematics: pure functions and records, each with a twin in Rust.
+pub static SHARED: &[File] = files![
+    "math.wgsl",
+    "rng.wgsl",
+    "sampling.wgsl",
+    "sequence.wgsl",
+    "warp.wgsl",
+    "ray.wgsl",
+    "rectangle.wgsl",
+    "triangle.wgsl",
+    "ellipsoid.wgsl",
+    "plane.wgsl",
+    "disk.wgsl",
+    "primitive.wgsl",
+    "camera.wgsl",
+    "lens.wgsl",
+    "panorama.wgsl",
+    "surface.wgsl",
+    "light.wgsl",
+    "light_tree.wgsl",
+    "shadow.wgsl",
+    "phong.wgsl",
+    "differential.wgsl",
+    "specular.wgsl",
+    "path.wgsl",
+    "diffuse.wgsl",
+    "modified_phong.wgsl",
+    "principled.wgsl",
+    "dielectric.wgsl",
+    "ggx.wgsl",
+    "lobe.wgsl",
+    "metal.wgsl",
+    "rough_dielectric.wgsl",
+    "thin.wgsl",
+    "light_sample.wgsl",
+    "surroundings.wgsl",
+    "footprint.wgsl",
+    "procedural.wgsl",
+    "texel.wgsl",
+    "normal_map.wgsl",
+    "filter.wgsl",
+    "adaptive.wgsl",
+    "slab.wgsl",
+    "node.wgsl",
+    "mesh.wgsl",
+];
+/// Software quotients and square roots. First in a kernel, since naga requires functions before their calls.
+pub static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
+/// The buffers and the scene traversal, which every kernel adds to [`SHARED`].
+pub static KERNEL: &[File] = files![
+    "bindings.wgsl",
+    "receipt.wgsl",
+    "traverse.wgsl",
+    "meshes.wgsl",
+    "tree.wgsl",
+    "geometry.wgsl",
+    "vertices.wgsl",
+    "texture.wgsl",
+    "alpha.wgsl",
+];
+/// The sampling of a pixel.
+pub static SAMPLES: &[File] = files!["pixel.wgsl"];
+/// The integrator `phong`.
+pub static PHONG: &[File] = files!["integrators/whole.wgsl", "integrators/phong.wgsl"];
+/// The integrator `path`.
+pub static PATH: &[File] = files![
+    "environment.wgsl",
+    "light_choice.wgsl",
+    "emitter.wgsl",
+    "energy.wgsl",
+    "scattering.wgsl",
+    "integrators/path.wgsl"
+];
+/// Loops that read the scene from buffers. Where the scene is compiled into the kernel, functions with its records as constants take their place.
+pub static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
+/// Access to texels in a single buffer.
+pub static TEXELS: &[File] = files!["texels.wgsl"];
+/// The kernel that accumulates samples.
+pub static RENDER_FILE: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
+/// The kernel that accumulates samples under adaptive sampling.
+pub static ADAPTIVE_FILE: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
+/// The kernel that writes first hits.
+pub static FIRST_HITS_FILE: &[File] = files!["kernels/first_hits.wgsl"];
+
+/// Returns every file, in the order in which [`hash`] reads them.
+pub fn built_in() -> impl Iterator<Item = File> {
+    let scene = [
+        ROUNDING_FILE,
+        SHARED,
+        KERNEL,
+        SAMPLES,
+        PHONG,
+        PATH,
+        FROM_BUFFERS,
+        TEXELS,
+    ];
+    let kernels = [RENDER_FILE, &ADAPTIVE_FILE[1..], FIRST_HITS_FILE];
+    scene.into_iter().chain(kernels).flatten().copied()
+}
+
+/// Returns the BLAKE3 hash of the names and texts of all files, in hexadecimal.
+pub fn hash() -> String {
+    hash_of(built_in())
+}
+
+/// Each name and text is preceded by its length, so that no two lists of files have the same bytes.
+fn hash_of<T: AsRef<str>>(files: impl Iterator<Item = (&'static str, T)>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for (name, text) in files {
+        for bytes in [name.as_bytes(), text.as_ref().as_bytes()] {
+            hasher.update(&(bytes.len() as u64).to_le_bytes());
+            hasher.update(bytes);
+        }
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn the_hash_is_that_of_the_files_on_disk() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let hash_with = |suffix: &str| {
+            let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap() + suffix;
+            hash_of(built_in().map(|(name, _)| (name, read(name))))
+        };
+        assert_eq!(hash(), hash_with(""));
+        assert_ne!(hash(), hash_with(" "));
+    }
+
+    #[test]
+    fn the_table_lists_every_shader() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let files = ["", "kernels", "integrators"].into_iter().flat_map(|below| {
+            let entries = std::fs::read_dir(folder.join(below)).unwrap().map(Result::unwrap);
+            entries.map(move |entry| Path::new(below).join(entry.file_name()).to_str().unwrap().to_owned())
+        });
+        let shaders: BTreeSet<String> = files.filter(|name| name.ends_with(".wgsl")).collect();
+        let table: BTreeSet<String> = built_in().map(|(name, _)| name.to_owned()).collect();
+        assert_eq!(table, shaders);
+        assert_eq!(table.len(), built_in().count());
+    }
+}
