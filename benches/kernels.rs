@@ -19,7 +19,8 @@ use wgray_render::cpu::surface::surface_at;
 use wgray_render::cpu::triangle::intersect_triangle;
 use wgray_render::gpu::{self, Choice, Gpu, Options, compose::Shaders};
 use wgray_render::job::{self, Cut};
-use wgray_render::pack::{ELLIPSOID, FAR, GRID, Packed, RECTANGLE, TRIANGLE, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::{ELLIPSOID, FAR, GRID, Packed, RECTANGLE, TRIANGLE};
 
 fn scene(path: &str, size: u32) -> Packed {
     let overrides = Overrides {

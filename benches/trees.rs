@@ -5,8 +5,8 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use rayon::prelude::*;
+use wgray_render::bvh::{Aabb, MOST_IN_LEAF, Tree, build};
 use wgray_render::cpu::walk::{Directions, Level, Line, Mesh, Nearest, Segments, closest, hidden};
-use wgray_render::pack::tree::{Aabb, MOST_IN_LEAF, Tree, build};
 
 /// Triangles, three corners each.
 struct Surface {

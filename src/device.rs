@@ -13,7 +13,7 @@ use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 #[cfg(feature = "gpu")]
 use wgray_render::gpu::{self, Gpu, Rounding, compose::Shaders};
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 #[cfg(feature = "gpu")]
 use wgray_scene::Problem;
 

@@ -8,7 +8,7 @@ use crate::error::{Error, RenderError};
 use crate::image::{self, Aov, Band, Format, Layout, Output, Pending, Pixels, SaveOptions, Target};
 use wgray_image::Region;
 use wgray_render::film::Film;
-use wgray_render::pack::FirstHit;
+use wgray_render::records::FirstHit;
 
 /// A rendered picture, or the part of one that was asked for: linear radiance, and the layers beside it.
 #[derive(Clone, Debug, PartialEq)]

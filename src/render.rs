@@ -12,7 +12,8 @@ use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::film::{Film, Form};
 use wgray_render::job::{self, Bands, Cut, Flow, NoCheckpoint, Order};
-use wgray_render::pack::{FirstHit, Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::{FirstHit, Packed};
 use wgray_scene::{Problem, Scene};
 
 /// How a scene is rendered. Size, samples and seed are the scene's, which [`Overrides`](crate::Overrides) can change.

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use wgray::scene::{Description, Pattern, SamplesDescription};
-use wgray_render::pack::{FirstHit, NOTHING};
+use wgray_render::records::{FirstHit, NOTHING};
 
 use crate::oracle::{Flaw, Meeting, Oracle};
 use crate::pictures::{both, first_hits, means, render};

@@ -9,7 +9,7 @@ use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 use wgray_render::film::Film;
-use wgray_render::pack::{FirstHit, Packed};
+use wgray_render::records::{FirstHit, Packed};
 
 use crate::pictures::{backend, exact_ways};
 use crate::{patterns, scenes};

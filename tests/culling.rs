@@ -6,7 +6,7 @@ use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use wgray_render::cpu::ray::vector_to_local;
 use wgray_render::cpu::shadow::{Block, cone_to_light, may_block, shadow_bits};
-use wgray_render::pack::{ENVIRONMENT, Packed, RANDOM, Sphere};
+use wgray_render::records::{ENVIRONMENT, Packed, RANDOM, Sphere};
 
 use crate::random::Random;
 use crate::random_scenes::any_scene;

@@ -6,7 +6,7 @@ use wgray::scene::Description;
 use wgray_render::cpu::camera::camera_ray;
 use wgray_render::cpu::geometry::closest_hit;
 use wgray_render::cpu::surface::surface_at;
-use wgray_render::pack::{NOTHING, NOWHERE};
+use wgray_render::records::{NOTHING, NOWHERE};
 
 use crate::oracle::{Flaw, Oracle};
 use crate::pictures::{differing, exact_ways, means, reference, render};

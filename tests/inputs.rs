@@ -4,6 +4,7 @@
 
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
+use wgray_render::bvh::{Aabb, build};
 use wgray_render::cpu::differential::{Arrival, Derivative, Differential};
 use wgray_render::cpu::diffuse::Angles;
 use wgray_render::cpu::footprint::Footprint;
@@ -18,8 +19,7 @@ use wgray_render::cpu::shadow::{Block, cone_to_light};
 use wgray_render::cpu::slab::{fan, slabs};
 use wgray_render::cpu::surface::Surface;
 use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type};
-use wgray_render::pack::tree::{Aabb, build};
-use wgray_render::pack::{
+use wgray_render::records::{
     Camera, ELLIPSOID, FAR, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material, NOTHING, NOWHERE, Node, PAD,
     Primitive, SMALLEST_ALPHA, Sphere, Texture,
 };

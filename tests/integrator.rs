@@ -11,7 +11,7 @@ use wgray_render::cpu::ray::Ray;
 use wgray_render::cpu::rng::unit_float;
 use wgray_render::cpu::sampling::{decision_bits, sample_key, sample_square};
 use wgray_render::cpu::shadow::Block;
-use wgray_render::pack::{NOTHING, NOWHERE, Packed, RANDOM};
+use wgray_render::records::{NOTHING, NOWHERE, Packed, RANDOM};
 
 use crate::pictures::{Way, differing, exact_ways, reference, render_with};
 use crate::{scenes, sources};

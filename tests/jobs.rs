@@ -12,7 +12,7 @@ use wgray_render::cpu::Cpu;
 use wgray_render::film::Film;
 use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, Opening};
 use wgray_render::job::{Bands, CheckpointStore, Cut, Flow, Identity, NoCheckpoint, Order, Piece, StoredPiece, Tile};
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use crate::contract::{bits, subjects};
 use crate::pictures::{self, Way, whole};

@@ -7,7 +7,7 @@ use wgray_image::Region;
 use wgray_render::film::{Film, Form, Layer};
 use wgray_render::gpu::{Gpu, Options as GpuOptions};
 use wgray_render::job::Cut;
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, whole};
 use crate::scenes::parse;

@@ -4,7 +4,7 @@
 use wgray_render::gpu::compose::{KERNELS, Source, built_in};
 use wgray_render::gpu::naga::proc::Layouter;
 use wgray_render::gpu::naga::{Expression, Literal, Module, TypeInner};
-use wgray_render::pack::{
+use wgray_render::records::{
     Camera, Counts, Emitter, Environment, FirstHit, Instance, Item, Light, LightNode, Lookup, Material, Node,
     Primitive, Record, Specialization, Sphere, Texture, Work,
 };
@@ -67,7 +67,7 @@ fn records_have_the_same_layout() {
         size::<FirstHit>(),
         size::<Work>(),
     ];
-    let declared = wgray_render::pack::declarations().matches("struct ").count();
+    let declared = wgray_render::records::declarations().matches("struct ").count();
     assert_eq!(sizes.len(), declared, "records that are not compared");
     for record in sizes {
         assert_eq!(layout_problems(&module, record), Vec::<String>::new());
@@ -104,10 +104,10 @@ fn constants_have_their_values() {
         }
     };
     assert_eq!(value("FAR"), f32::MAX.to_bits());
-    assert_eq!(value("EVIDENCE"), wgray_render::pack::EVIDENCE.to_bits());
+    assert_eq!(value("EVIDENCE"), wgray_render::records::EVIDENCE.to_bits());
     assert_eq!(value("NOTHING"), u32::MAX);
-    assert_eq!(value("PLANE"), wgray_render::pack::PLANE);
-    assert_eq!(value("FOR_NORMAL"), wgray_render::pack::FOR_NORMAL);
+    assert_eq!(value("PLANE"), wgray_render::records::PLANE);
+    assert_eq!(value("FOR_NORMAL"), wgray_render::records::FOR_NORMAL);
 }
 
 #[test]

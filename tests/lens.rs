@@ -5,7 +5,7 @@ use wgray::Scene;
 use wgray_render::cpu::camera::camera_ray;
 use wgray_render::cpu::lens::{lens_ray, lens_sample};
 use wgray_render::cpu::sequence::sobol_sample;
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use crate::pictures::{both, differing, exact_ways, means, render};
 use crate::scenes::{self, parse};

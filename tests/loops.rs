@@ -6,7 +6,7 @@ use wgray::scene::{AdaptiveDescription, Description, Pattern, PlaneDescription, 
 use wgray_render::film::Film;
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::job::{self, Cut};
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use crate::pictures::{Way, backend_with, differing, exact_ways, reference, render, whole};
 use crate::sources::{self, edited, edited_shaders, with};

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use wgray_render::film::Film;
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 /// A pixel is within this of its value, as a part of the largest of its colours: a pattern's share of a dark one is a difference of nearly
 /// equal integrals ...

@@ -5,7 +5,7 @@ use wgray::Scene;
 use wgray_image::Region;
 use wgray_render::cpu::panorama::{panorama_differential, panorama_ray};
 use wgray_render::job::Cut;
-use wgray_render::pack::{NOTHING, Packed};
+use wgray_render::records::{NOTHING, Packed};
 
 use crate::pictures::{backend, both, crop, differing, film, first_hits, means, render};
 use crate::scenes::parse;

@@ -8,7 +8,7 @@ use wgray_render::film::Film;
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::{Gpu, Options, Rounding};
 use wgray_render::job::Cut;
-use wgray_render::pack::{FirstHit, Packed};
+use wgray_render::records::{FirstHit, Packed};
 
 use crate::{adapter, sources};
 

@@ -102,7 +102,7 @@ use wgray_render::cpu::warp::{
 };
 use wgray_render::gpu::Device;
 use wgray_render::gpu::naga::ScalarKind;
-use wgray_render::pack::{
+use wgray_render::records::{
     Camera, FirstHit, Instance, Light, LightNode, Material, NOTHING, Node, Primitive, Sphere, Texture,
 };
 

@@ -1,7 +1,7 @@
 //! Pictures whose values are known in closed form.
 
 use wgray_render::film::Film;
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use crate::pictures::{both, render};
 use crate::scenes::parse;

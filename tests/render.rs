@@ -9,7 +9,7 @@ use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::film::Film;
 use wgray_render::job::Cut;
-use wgray_render::pack::{FirstHit, Packed};
+use wgray_render::records::{FirstHit, Packed};
 
 use crate::adapter::{self, KNOWN, allowed, bit_exact, judge};
 use crate::nearly::{EDGES, Nearly};

@@ -3,7 +3,8 @@
 use std::fs;
 
 use wgray::scene::{Assets, Description};
-use wgray_render::pack::{Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::Packed;
 
 use crate::sources;
 

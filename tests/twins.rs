@@ -7,7 +7,7 @@ use wgray::scene::Integrator;
 use wgray_render::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source, built_in};
 use wgray_render::gpu::spirv::instructions;
 use wgray_render::gpu::{FloatControls, Rounding, bake, check};
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use crate::scenes;
 use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};

@@ -18,7 +18,7 @@ use wgray_render::cpu::shadow::{Block, Cone};
 use wgray_render::cpu::slab::{Fan, Slabs};
 use wgray_render::cpu::surface::Surface;
 use wgray_render::cpu::surroundings::MapCell;
-use wgray_render::pack::{
+use wgray_render::records::{
     Camera, Environment, FirstHit, Instance, Light, LightNode, Material, Node, Primitive, Sphere, Texture,
 };
 

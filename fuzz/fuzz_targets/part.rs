@@ -48,7 +48,7 @@ fn written(header: &Value, pieces: &[[u32; 14]], data: &[u8]) -> Vec<u8> {
 }
 
 /// The bytes of a first hit.
-const HIT: u64 = size_of::<wgray_render::pack::FirstHit>() as u64;
+const HIT: u64 = size_of::<wgray_render::records::FirstHit>() as u64;
 
 fuzz_target!(|bytes: &[u8]| {
     let mut choices = Choices(bytes);

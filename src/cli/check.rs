@@ -10,7 +10,8 @@ use clap::ValueHint;
 use wgray_image::visible::visible;
 #[cfg(feature = "gpu")]
 use wgray_render::gpu::{Forms, check_kernels, compose::Shaders};
-use wgray_render::pack::{Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::Packed;
 
 use super::log::{self, Level};
 use super::scene_options::SceneOptions;

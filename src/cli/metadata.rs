@@ -7,7 +7,7 @@ use crate::device::DeviceInfo;
 use crate::image::{Metadata, is_complete, read_metadata};
 use crate::scene::Scene;
 use wgray_render::job::hash_of_scene;
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 /// Name of the mark of an image that was written before it was complete: `32 of 64 samples`.
 const PARTIAL: &str = "partial";

@@ -15,7 +15,8 @@ use wgray_render::film::{Film, mean};
 use wgray_render::gpu::compose::{Shaders, built_in};
 use wgray_render::gpu::{AdapterChoice, Gpu, Options, choose};
 use wgray_render::job::{self, Cut};
-use wgray_render::pack::{Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::Packed;
 
 /// However busy the machine is, what is waited for comes within this time, or never.
 pub const LONGEST: Duration = Duration::from_secs(40);

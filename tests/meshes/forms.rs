@@ -7,7 +7,8 @@ use std::path::Path;
 
 use glam::DVec3;
 use wgray::scene::{Assets, Description};
-use wgray_render::pack::{Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::Packed;
 
 use crate::random::Random;
 

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use wgray_render::cpu::camera::camera_ray;
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use super::forms::{Form, scene};
 use crate::pictures::{Way, first_hits, reference, render};

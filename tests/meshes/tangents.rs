@@ -12,7 +12,7 @@ use wgray_render::cpu::normal_map::mapped_normal;
 use wgray_render::cpu::primitive::Tangents;
 use wgray_render::cpu::ray::{Hit, Ray};
 use wgray_render::cpu::texture::appearance;
-use wgray_render::pack::{NOTHING, Packed};
+use wgray_render::records::{NOTHING, Packed};
 
 use super::forms::{HEAD, Sheet, scene};
 use crate::pictures::reference;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use wgray_render::bvh::{self, Aabb};
 use wgray_render::cpu::geometry::{closest_hit, hidden_samples};
 use wgray_render::cpu::light::{segment, segments_to_light};
 use wgray_render::cpu::mesh::{highest, lowest, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
@@ -15,8 +16,7 @@ use wgray_render::cpu::shadow::{Block, block_sample, shadow_bits};
 use wgray_render::cpu::slab::{box_passage, is_passed, slabs};
 use wgray_render::cpu::surface::{Surface, largest};
 use wgray_render::cpu::traverse::{closest_primitive, hidden_by_primitives};
-use wgray_render::pack::tree::{self, Aabb};
-use wgray_render::pack::{
+use wgray_render::records::{
     BLOCK, CASTS_SHADOW, FAR, INSTANCE, Instance, Item, Light, NO_SHADOW, NOTHING, NOWHERE, Packed, RANDOM,
 };
 
@@ -295,7 +295,7 @@ fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
 }
 
 /// The nodes of a tree over these boxes, and the boxes' order.
-type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<tree::Node>, Vec<u32>);
+type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<bvh::Node>, Vec<u32>);
 
 /// A scene with other trees.
 fn with_trees(scene: &Packed, tree: Builder) -> Packed {
@@ -332,14 +332,14 @@ fn with_trees(scene: &Packed, tree: Builder) -> Packed {
     scene
 }
 
-fn built(boxes: &[Aabb], most_in_leaf: u32) -> (Vec<tree::Node>, Vec<u32>) {
-    let tree = tree::build(boxes, most_in_leaf);
+fn built(boxes: &[Aabb], most_in_leaf: u32) -> (Vec<bvh::Node>, Vec<u32>) {
+    let tree = bvh::build(boxes, most_in_leaf);
     (tree.nodes, tree.order)
 }
 
 /// A tree that has nothing to do with where the boxes are: any of them together, in any slots.
-fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<tree::Node>, Vec<u32>) {
-    let empty: tree::Node = bytemuck::Zeroable::zeroed();
+fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
+    let empty: bvh::Node = bytemuck::Zeroable::zeroed();
     let (mut nodes, mut order) = (vec![empty], Vec::new());
     let mut waiting = std::collections::VecDeque::from([(0, (0..boxes.len() as u32).collect::<Vec<_>>())]);
     while let Some((number, items)) = waiting.pop_front() {
@@ -374,8 +374,8 @@ fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<tree::Node>, Vec<u32>) {
 }
 
 /// A node without children whose grid reaches over a box.
-fn grid(bounds: &Aabb) -> tree::Node {
-    let mut node: tree::Node = bytemuck::Zeroable::zeroed();
+fn grid(bounds: &Aabb) -> bvh::Node {
+    let mut node: bvh::Node = bytemuck::Zeroable::zeroed();
     node.base = bounds.low.to_array();
     node.exponents = [0, 1, 2].map(|axis| {
         let reaches = |e: &u8| bounds.low[axis] + 255.0 * f32::from_bits(u32::from(*e) << 23) >= bounds.high[axis];
@@ -384,7 +384,7 @@ fn grid(bounds: &Aabb) -> tree::Node {
     node
 }
 
-fn set_bounds(node: &mut tree::Node, slot: usize, bounds: &Aabb) {
+fn set_bounds(node: &mut bvh::Node, slot: usize, bounds: &Aabb) {
     for axis in 0..3 {
         let step = f32::from_bits(u32::from(node.exponents[axis]) << 23);
         let at = |q: u8| node.base[axis] + f32::from(q) * step;
@@ -396,7 +396,7 @@ fn set_bounds(node: &mut tree::Node, slot: usize, bounds: &Aabb) {
 }
 
 /// The same tree with its boxes one step too small on their upper sides.
-fn too_small(boxes: &[Aabb]) -> (Vec<tree::Node>, Vec<u32>) {
+fn too_small(boxes: &[Aabb]) -> (Vec<bvh::Node>, Vec<u32>) {
     let (mut nodes, order) = built(boxes, 2);
     for node in &mut nodes {
         for (low, high) in node.low.iter().zip(&mut node.high) {

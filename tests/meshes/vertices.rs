@@ -7,7 +7,8 @@ use std::sync::Arc;
 use glam::{Vec2, Vec4};
 use wgray::mesh::Mesh;
 use wgray::scene::{Assets, Description, Geometry};
-use wgray_render::pack::{Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::Packed;
 
 use super::load;
 use crate::pictures::{Way, both, differing, exact_ways, first_hits, means, reference, render};

@@ -7,7 +7,7 @@ use wgray_render::cpu::geometry::{closest_hit, hidden_samples};
 use wgray_render::cpu::ray::Ray;
 use wgray_render::cpu::shadow::Block;
 use wgray_render::cpu::surface::Surface;
-use wgray_render::pack::{CASTS_SHADOW, FAR, GRID, Instance, Light, NOTHING, NOWHERE, Packed};
+use wgray_render::records::{CASTS_SHADOW, FAR, GRID, Instance, Light, NOTHING, NOWHERE, Packed};
 
 use super::forms::{Form, HEAD, scene};
 use crate::random::Random;

@@ -1,7 +1,8 @@
 //! Surfaces that are there for some rays: closed forms, shadows of the shape of a mask, and the same bits on both paths.
 
 use wgray::scene::{Assets, Description};
-use wgray_render::pack::{Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::Packed;
 
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_ways, first_hits, means, reference, render};

@@ -13,7 +13,7 @@ use wgray_render::cpu::scattering::facets_of;
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::cpu::surface::Surface;
 use wgray_render::cpu::thin::{thin_eval, thin_pdf};
-use wgray_render::pack::{METAL, Material, NOWHERE, Packed, ROUGH_GLASS};
+use wgray_render::records::{METAL, Material, NOWHERE, Packed, ROUGH_GLASS};
 
 use crate::pictures::{both, render};
 

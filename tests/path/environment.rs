@@ -8,7 +8,8 @@ use glam::{DVec3, UVec2, Vec3};
 use wgray::scene::{Assets, Description, Image, Texels};
 use wgray_render::cpu::environment::{arriving_from, sample_environment};
 use wgray_render::cpu::sequence::sobol_sample;
-use wgray_render::pack::{ENVIRONMENT, Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::{ENVIRONMENT, Packed};
 
 use super::mean;
 use crate::pictures::{Way, both, differing, exact_ways, render, render_with};

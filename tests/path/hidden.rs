@@ -2,7 +2,7 @@
 
 use glam::UVec2;
 use wgray_render::cpu::geometry::pixel_first_hit;
-use wgray_render::pack::{NOTHING, Packed};
+use wgray_render::records::{NOTHING, Packed};
 
 use crate::pictures::{both, differing, exact_ways, means, reference, render};
 use crate::scenes;

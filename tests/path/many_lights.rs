@@ -7,7 +7,7 @@ use wgray::scene::{Description, PointLightDescription};
 use wgray_render::cpu::light_choice::{chosen_light, met_density};
 use wgray_render::cpu::ray::Hit;
 use wgray_render::cpu::rng::hash4;
-use wgray_render::pack::{NOTHING, Packed};
+use wgray_render::records::{NOTHING, Packed};
 
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_ways, reference, render};

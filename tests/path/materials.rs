@@ -12,7 +12,7 @@ use wgray_render::cpu::modified_phong::{modified_phong_eval, modified_phong_pdf,
 use wgray_render::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample};
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_sample};
-use wgray_render::pack::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
+use wgray_render::records::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
 
 /// What a material is: its functions.
 struct Lobes {

@@ -15,7 +15,7 @@ mod principled;
 mod spots;
 mod strategies;
 
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use crate::scenes;
 

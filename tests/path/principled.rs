@@ -9,7 +9,7 @@ use wgray_render::cpu::diffuse::{angles_at, diffuse_eval};
 use wgray_render::cpu::principled::{Mixture, principled_eval, principled_mixture, principled_pdf, principled_sample};
 use wgray_render::cpu::rng::{hash4, unit_float};
 use wgray_render::cpu::sequence::sobol_sample;
-use wgray_render::pack::{DIFFUSE, Material, PRINCIPLED};
+use wgray_render::records::{DIFFUSE, Material, PRINCIPLED};
 
 /// All lobes.
 const ALL: u32 = 31;
@@ -398,7 +398,7 @@ fn flat_lobes_are_deltas_and_nothing_is_ever_no_number() {
 }
 
 /// A sphere of a principled material with these keys, under light from above.
-fn picture_of(keys: &str, textures: &str) -> wgray_render::pack::Packed {
+fn picture_of(keys: &str, textures: &str) -> wgray_render::records::Packed {
     super::scene(
         16,
         4,

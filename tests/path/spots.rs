@@ -1,6 +1,6 @@
 //! Spot lights against closed forms.
 
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use super::mean;
 use crate::pictures::{both, means, render};

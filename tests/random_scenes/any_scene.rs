@@ -12,7 +12,8 @@ use glam::DVec3;
 use proptest::prelude::*;
 use proptest::sample::select;
 use wgray::scene::*;
-use wgray_render::pack::{Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::Packed;
 
 use self::files::AROUND;
 pub use self::files::folder;

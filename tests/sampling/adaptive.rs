@@ -9,7 +9,7 @@ use wgray_render::cpu::adaptive::{
 };
 use wgray_render::cpu::pixel::pixel_radiance;
 use wgray_render::job::Cut;
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use super::cornell;
 use crate::pictures::{backend, crop, differing, exact_ways, film, reference, render, whole};

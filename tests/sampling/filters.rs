@@ -6,7 +6,7 @@ use wgray_render::cpu::pixel::filtered;
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::film::mean;
 use wgray_render::pack::filter::{height, table};
-use wgray_render::pack::{BINS, Packed};
+use wgray_render::records::{BINS, Packed};
 
 use super::cornell;
 use crate::pictures::{Way, differing, exact_ways, render};

@@ -6,7 +6,7 @@ mod sequences;
 mod unbiased;
 
 use wgray::scene::{Description, Pattern};
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use crate::{patterns, scenes};
 

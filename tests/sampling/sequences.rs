@@ -3,7 +3,7 @@
 use glam::{UVec2, Vec2};
 use wgray_render::cpu::sampling::{sample_key, sample_square};
 use wgray_render::cpu::sequence::{halton_sample, radical_inverse_3, shuffled_index, sobol_reversed, sobol_sample};
-use wgray_render::pack::{GRID, HALTON, JITTERED, RANDOM, ROTATED_GRID, SOBOL};
+use wgray_render::records::{GRID, HALTON, JITTERED, RANDOM, ROTATED_GRID, SOBOL};
 
 /// The first points of Sobol's sequence in two dimensions, times 32: scipy 1.17.1, `qmc.Sobol(2, scramble=False)`, which
 /// has the direction numbers of Joe and Kuo, 2008.

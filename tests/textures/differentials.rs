@@ -11,7 +11,7 @@ use wgray_render::cpu::integrators::phong::scatter;
 use wgray_render::cpu::path::Path;
 use wgray_render::cpu::path::is_specular;
 use wgray_render::cpu::surface::{Surface, with_coordinates};
-use wgray_render::pack::{NOTHING, NOWHERE, Packed, Primitive};
+use wgray_render::records::{NOTHING, NOWHERE, Packed, Primitive};
 
 use super::scene;
 use crate::meshes::forms::Sheet;
@@ -85,7 +85,7 @@ impl Exact<'_> {
             1.0 - at.y * 2.0 / f64::from(camera.height),
         );
         let offset = right * x + up * y;
-        if camera.projection == wgray_render::pack::ORTHOGRAPHIC {
+        if camera.projection == wgray_render::records::ORTHOGRAPHIC {
             return (camera.position.as_dvec3() + offset, forward);
         }
         (camera.position.as_dvec3(), (forward + offset).normalize())
@@ -238,7 +238,7 @@ fn texture_coordinates_on_an_ellipsoid_change_as_on_neighbouring_rays() {
             let Some((q, surface, arrival, _)) = arrive(&scene, at) else {
                 continue;
             };
-            if q.kind != wgray_render::pack::ELLIPSOID {
+            if q.kind != wgray_render::records::ELLIPSOID {
                 continue;
             }
             let found = surface_footprint(&q, surface, arrival.x.position, arrival.y.position);

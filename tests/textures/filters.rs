@@ -7,7 +7,7 @@ use glam::{DMat2, DVec2, DVec3, Vec2, Vec3};
 use wgray_render::cpu::footprint::{Footprint, footprint_ellipse, texture_footprint};
 use wgray_render::cpu::texel::{near_coordinate, srgb_to_linear, wrapped_index};
 use wgray_render::cpu::texture::{ewa_color, texture_color};
-use wgray_render::pack::{CLAMP, MIRRORED, Packed, REPEAT};
+use wgray_render::records::{CLAMP, MIRRORED, Packed, REPEAT};
 
 use super::{scene, write_exr, write_png};
 use crate::random::Random;

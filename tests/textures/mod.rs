@@ -16,7 +16,8 @@ mod specular;
 use std::path::Path;
 
 use wgray::scene::{Assets, Description};
-use wgray_render::pack::{Packed, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::Packed;
 
 use crate::pictures::reference;
 

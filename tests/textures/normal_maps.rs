@@ -8,7 +8,7 @@ use wgray_render::cpu::phong::phong_lobes;
 use wgray_render::cpu::ray::{Hit, Ray, no_hit};
 use wgray_render::cpu::surface::surface_at;
 use wgray_render::cpu::texture::appearance;
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use super::{scene, write_exr};
 use crate::random::Random;

@@ -7,7 +7,7 @@ use glam::{DVec2, Vec2};
 use wgray_render::cpu::footprint::Footprint;
 use wgray_render::cpu::procedural::procedural_share;
 use wgray_render::cpu::texture::texture_color;
-use wgray_render::pack::{CHECKER, LINES};
+use wgray_render::records::{CHECKER, LINES};
 
 use super::filters::textured;
 use crate::random::Random;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::UVec4;
 use wgray_render::cpu::specular::{fresnel, refracted_cosine};
-use wgray_render::pack::{ELLIPSOID, Packed};
+use wgray_render::records::{ELLIPSOID, Packed};
 
 use super::{cpu_picture, scene};
 

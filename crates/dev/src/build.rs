@@ -13,7 +13,7 @@ use wgray_render::error::{RenderError, ShaderErrors};
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::marks::Layer;
 use wgray_render::gpu::{AdapterChoice, Device, Forms, Gpu, Live, Options, check_kernels, choose};
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 /// A request to compile a kernel.
 pub struct Request {

@@ -12,7 +12,7 @@ use wgray_render::film::Film;
 use wgray_render::gpu::{Call, Gpu, Live};
 use wgray_render::job::{Cut, Order, Steps};
 use wgray_render::output::Aov;
-use wgray_render::pack::{Camera, FirstHit, Packed};
+use wgray_render::records::{Camera, FirstHit, Packed};
 
 use super::film_layer::FilmLayer;
 use super::picture::{Content, View, means};
@@ -352,7 +352,7 @@ impl Canvas {
 
     fn hits_so_far(&self, aov: Aov) -> Content {
         let nothing = FirstHit {
-            shape: wgray_render::pack::NOTHING,
+            shape: wgray_render::records::NOTHING,
             ..bytemuck::Zeroable::zeroed()
         };
         let mut hits = self.hits.clone();

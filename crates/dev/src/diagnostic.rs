@@ -264,7 +264,7 @@ mod tests {
         assert_eq!((inside.place.as_deref(), inside.file), (Some("phong.wgsl:3:10"), None));
         // Generated code has no file that can be opened.
         let own = Diagnostic::shader(
-            &error("crates/render/src/pack/layout.rs:3:10"),
+            &error("crates/render/src/records/layout.rs:3:10"),
             &shaders,
             Some(Path::new("/s")),
         );

@@ -12,7 +12,7 @@ use wgray_image::{Pixels, difference};
 use wgray_render::film::{Film, mean};
 use wgray_render::gpu::marks::MAX_NAME_LEN;
 use wgray_render::output::{self as image, Aov, AovSource};
-use wgray_render::pack::{FirstHit, NOTHING};
+use wgray_render::records::{FirstHit, NOTHING};
 use wgray_scene::Integrator;
 
 /// The view of the scene.

@@ -10,7 +10,8 @@ use super::diagnostic::Diagnostic;
 use super::picture::{LayerName, View};
 use wgray_render::gpu::compose::{self, Shaders};
 use wgray_render::output::AovSource;
-use wgray_render::pack::{Packed, Specialization, pack};
+use wgray_render::pack::pack;
+use wgray_render::records::{Packed, Specialization};
 use wgray_scene::{
     CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_course, is_gltf,
     is_mesh, is_model, read_bytes, read_text,

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::error::RenderError;
 use crate::film::{Film, Form};
-use crate::pack::{FirstHit, Packed};
+use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
 
 /// A scene on a device, with one film at a time.

@@ -12,7 +12,7 @@ use glam::DVec3;
 use serde::Serialize;
 use wgray_image::Region;
 use wgray_render::job::{Cut, bands};
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use super::kernel::features;
 

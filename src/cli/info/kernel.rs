@@ -1,7 +1,7 @@
 //! Names of the optional features of a kernel.
 
 use crate::scene::Integrator;
-use wgray_render::pack::{
+use wgray_render::records::{
     BACKGROUND, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Packed, Specialization,
 };
 

@@ -13,7 +13,7 @@ use tracing::info;
 use wgray_image::Region;
 use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, Opening};
 use wgray_render::job::{self, Identity, PartHeader, Tile};
-use wgray_render::pack::Packed;
+use wgray_render::records::Packed;
 
 use super::args::Args;
 use super::once_log::OnceLog;

@@ -9,7 +9,8 @@ use crate::canvas::Limits;
 use crate::messages::{Command, Notice};
 use crate::picture::{LayerName, View};
 use crate::source::{Constants, Loaded, constants};
-use wgray_render::pack::{Camera, Packed, pack_camera};
+use wgray_render::pack::pack_camera;
+use wgray_render::records::{Camera, Packed};
 
 impl Painter {
     pub(super) fn take_command(&mut self, command: Command) {

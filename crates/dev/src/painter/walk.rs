@@ -9,7 +9,7 @@ use crate::camera::{Move, Viewpoint, dollied, framed, moved, placed};
 use wgray_image::Region;
 use wgray_render::backend::Backend as _;
 use wgray_render::cpu::Cpu;
-use wgray_render::pack::NOTHING;
+use wgray_render::records::NOTHING;
 use wgray_scene::{Bounds, CameraDescription, Geometry, Light, Scene};
 
 /// Maximum number of viewpoints that are kept.

@@ -5,7 +5,7 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 
 use super::math::{max, min, power};
 use crate::film;
-use crate::pack::EVIDENCE;
+use crate::records::EVIDENCE;
 
 pub fn moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
     moments + squared_deviation(sum, sample).extend(1.0)

@@ -11,7 +11,7 @@ use super::rng::{hash4, unit_float};
 use super::surface::Surface;
 use super::texture::{channel_of, texture_color};
 use super::vertices::{uv_in_set, with_vertex_colors};
-use crate::pack::{FOR_OPACITY, MASK, MOST_PASSED, Material, NOTHING, OPACITY_CHANNEL, OPAQUE, Packed};
+use crate::records::{FOR_OPACITY, MASK, MOST_PASSED, Material, NOTHING, OPACITY_CHANNEL, OPAQUE, Packed};
 
 pub const ONWARD: u32 = 0;
 pub const TO_LIGHT: u32 = 1;

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::differential::{Derivative, Differential};
 use super::math::{dot, normalize};
 use super::ray::Ray;
-use crate::pack::{Camera, ORTHOGRAPHIC};
+use crate::records::{Camera, ORTHOGRAPHIC};
 
 pub fn camera_ray(camera: &Camera, at: Vec2) -> Ray {
     let offset = image_plane_offset(camera, at);
@@ -55,7 +55,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::pack::PERSPECTIVE;
+    use crate::records::PERSPECTIVE;
 
     /// Looks along +y, right is +x, up is +z; the image plane is 4 x 2, one unit ahead.
     fn camera(projection: u32) -> Camera {

@@ -9,7 +9,7 @@ use super::math::{dot, exp2, max};
 use super::path::{Path, reflected_path, refracted_path};
 use super::specular::{fresnel, refracted_cosine, refracted_direction};
 use super::surface::Surface;
-use crate::pack::Material;
+use crate::records::Material;
 
 pub fn transmittance(absorption: Vec3, distance: f32) -> Vec3 {
     let d = absorption * (distance * -LOG2_E);

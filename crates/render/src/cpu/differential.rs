@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::math::dot;
 use super::ray::{Ray, point_to_local, vector_to_local};
 use super::surface::Surface;
-use crate::pack::{ELLIPSOID, Primitive};
+use crate::records::{ELLIPSOID, Primitive};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Derivative {

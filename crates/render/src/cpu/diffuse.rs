@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::math::{atan2, dot, max};
 use super::warp::hemisphere_sample;
-use crate::pack::Material;
+use crate::records::Material;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angles {

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::math::dot;
 use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
-use crate::pack::Primitive;
+use crate::records::Primitive;
 
 pub fn intersect_disk(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
@@ -28,7 +28,8 @@ mod tests {
     use glam::{DMat3, DVec3};
 
     use super::*;
-    use crate::pack::{DISK, FAR, primitive};
+    use crate::pack::primitive;
+    use crate::records::{DISK, FAR};
 
     /// Of radius 2 around (1, 1, 3), seen from above.
     fn from_above(x: f32, y: f32) -> f32 {

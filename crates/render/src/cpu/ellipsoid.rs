@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::math::{cross, dot, max, min};
 use super::ray::{Ray, vector_to_local};
-use crate::pack::Primitive;
+use crate::records::Primitive;
 
 pub fn ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32 {
     dot(from_anchor, from_anchor - q.middle * 2.0) + q.level
@@ -60,7 +60,8 @@ mod tests {
     use crate::cpu::math::normalize;
     use crate::cpu::primitive::primitive_normal;
     use crate::cpu::ray::point_to_local;
-    use crate::pack::{ELLIPSOID, FAR, primitive};
+    use crate::pack::primitive;
+    use crate::records::{ELLIPSOID, FAR};
 
     fn ellipsoid(center: DVec3, axes: DMat3) -> Primitive {
         primitive(ELLIPSOID, center, axes, 0, 0)

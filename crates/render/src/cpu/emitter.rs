@@ -17,7 +17,7 @@ use super::rng::unit_float;
 use super::texture::texture_color;
 use super::vertices::{uv_in_set, vertex_color};
 use super::warp::{disk_sample, triangle_sample};
-use crate::pack::{
+use crate::records::{
     COLORS_OF_EMISSION, DISK, ELLIPSOID, ENVIRONMENT, Emitter, FOR_EMISSION, Light, Material, NOTHING, POINT, Packed,
     RECTANGLE, SPOT, TRIANGLE,
 };

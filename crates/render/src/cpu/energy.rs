@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::lobe::{facet_alpha, streak_place};
 use super::math::{floor, max, min};
-use crate::pack::{ENERGY_SIZE, Material, Packed, ROUGH_GLASS, STREAK_COLUMNS, STREAK_LINES};
+use crate::records::{ENERGY_SIZE, Material, Packed, ROUGH_GLASS, STREAK_COLUMNS, STREAK_LINES};
 
 pub fn energy_kept(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
     let last = (ENERGY_SIZE - 1) as f32;

@@ -7,7 +7,7 @@ use super::light_sample::power_heuristic;
 use super::math::{dot, min, normalize};
 use super::rng::{hash4, unit_float};
 use super::surroundings::{cell_towards, column_after, direction_in_cell, normal_bin};
-use crate::pack::{ENVIRONMENT_BLOCKS, Light, NOTHING, Packed};
+use crate::records::{ENVIRONMENT_BLOCKS, Light, NOTHING, Packed};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arriving {

@@ -10,7 +10,7 @@ use super::footprint::{Footprint, footprint_ellipse, wrap_u, wrap_v};
 use super::math::{floor, max};
 use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
 use super::texture::level_of_length;
-use crate::pack::{FLOAT, LINEAR8, Packed, SRGB8, Texture};
+use crate::records::{FLOAT, LINEAR8, Packed, SRGB8, Texture};
 
 /// Returns `ewa_color` of `shaders/texture.wgsl`.
 pub fn color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {

@@ -6,7 +6,7 @@ use super::math::{max, min};
 use super::primitive::uv_derivative;
 use super::ray::{point_to_local, vector_to_local};
 use super::surface::Surface;
-use crate::pack::{CLAMP, Primitive, Texture};
+use crate::records::{CLAMP, Primitive, Texture};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {

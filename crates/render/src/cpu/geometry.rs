@@ -20,7 +20,7 @@ use super::shadow::Block;
 use super::surface::{Surface, first_hit, surface_at, with_coordinates};
 use super::traverse::{closest_primitive, hidden_by_primitives, is_hidden_by_primitives};
 use super::tree::{closest_in_tree, hidden_by_tree, is_hidden_by_tree};
-use crate::pack::{
+use crate::records::{
     FirstHit, HIDDEN_BACK, Instance, Light, MOST_HIDDEN, Material, NO_SHADOW, NOTHING, NOWHERE, Packed, SOME_SHADOWS,
 };
 

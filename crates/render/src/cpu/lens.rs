@@ -6,7 +6,7 @@ use super::camera::image_plane_offset;
 use super::math::{floor, normalize, sine};
 use super::ray::Ray;
 use super::warp::{disk_sample, triangle_sample};
-use crate::pack::Camera;
+use crate::records::Camera;
 
 pub fn lens_ray(camera: &Camera, at: Vec2, p: Vec2) -> Ray {
     let start = camera.lens_u * p.x + camera.lens_v * p.y;

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::math::{dot, max, min, normalize};
 use super::ray::vector_to_local;
-use crate::pack::{Light, Primitive};
+use crate::records::{Light, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segments {

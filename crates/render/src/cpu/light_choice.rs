@@ -6,7 +6,7 @@ use super::integrators::path::decision_set;
 use super::light_tree::{light_child, light_importances, light_shares};
 use super::ray::Hit;
 use super::rng::{hash4, unit_float};
-use crate::pack::{Emitter, NOTHING, Packed};
+use crate::records::{Emitter, NOTHING, Packed};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chosen {

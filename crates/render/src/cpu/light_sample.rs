@@ -6,7 +6,7 @@ use super::ellipsoid::{ellipsoid_discriminant, ellipsoid_level};
 use super::math::{dot, max, normalize};
 use super::ray::{vector_to_local, vector_to_world};
 use super::warp::{cap_sample, disk_sample, vector_around};
-use crate::pack::Primitive;
+use crate::records::Primitive;
 
 pub fn solid_angle_pdf(density: f32, to: Vec3, normal: Vec3) -> f32 {
     let d2 = dot(to, to);

@@ -3,7 +3,7 @@
 use glam::{BVec4A, Vec3, Vec4};
 
 use super::math::{dot, max4};
-use crate::pack::LightNode;
+use crate::records::LightNode;
 
 #[inline(always)]
 pub fn mean_above(m: Vec4, r: Vec4) -> Vec4 {

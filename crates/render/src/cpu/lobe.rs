@@ -7,7 +7,7 @@ use super::math::{atan2, cross, dot, max, min, normalize, sine};
 use super::primitive::Tangents;
 use super::surface::Surface;
 use super::warp::frame_around;
-use crate::pack::{Material, SMALLEST_ALPHA};
+use crate::records::{Material, SMALLEST_ALPHA};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LobeSample {

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::math::{dot, power};
 use super::surface::Surface;
 use super::walk::{Directions, MOST};
-use crate::pack::Material;
+use crate::records::Material;
 
 /// Bit i is set where direction i lights the surface: [`is_lit`](super::phong::is_lit) for each.
 pub fn lit_bits(level: Level, surface: &Surface, to: &Directions) -> u32 {
@@ -109,7 +109,7 @@ mod tests {
     use crate::cpu::samples::Samples;
     use crate::cpu::shadow::{Block, block_sample};
     use crate::cpu::walk::levels;
-    use crate::pack::{GRID, JITTERED, NOWHERE, SOBOL};
+    use crate::records::{GRID, JITTERED, NOWHERE, SOBOL};
 
     fn surface(smooth_normal: Vec3, shading_normal: Vec3) -> Surface {
         let zero = Vec3::ZERO;

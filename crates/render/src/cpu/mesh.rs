@@ -9,7 +9,7 @@ use super::primitive::Tangents;
 use super::ray::{Hit, Ray, point_to_local, vector_to_local};
 use super::slab::{Slabs, box_passage, is_passed};
 use super::surface::{Surface, largest, with_positive_zeros};
-use crate::pack::{FAR, FirstHit, Instance, PAD, Primitive, TRIANGLE};
+use crate::records::{FAR, FirstHit, Instance, PAD, Primitive, TRIANGLE};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shear {

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::ggx::{ggx_d, ggx_length, ggx_sample};
 use super::lobe::{LobeSample, facet_alpha, facet_eval, facet_pdf, facet_weight, half_vector};
 use super::math::{dot, max, min};
-use crate::pack::Material;
+use crate::records::Material;
 
 pub fn conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32 {
     let c2 = cosine * cosine;

@@ -8,7 +8,7 @@ use super::diffuse::{Angles, diffuse_pdf, diffuse_sample};
 use super::math::{dot, max, min, normalize, power};
 use super::surface::largest;
 use super::warp::{disk_sample, vector_around};
-use crate::pack::Material;
+use crate::records::Material;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhongFactors {

@@ -3,7 +3,7 @@
 use glam::{UVec2, UVec3, Vec3, Vec4};
 
 use super::slab::{Fan, Slabs};
-use crate::pack::{FAR, Node};
+use crate::records::{FAR, Node};
 
 pub fn steps(word: u32) -> Vec4 {
     Vec4::from(word.to_le_bytes().map(f32::from))

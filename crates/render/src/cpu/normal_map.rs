@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::math::{cross, dot, max, normalize};
 use super::surface::Surface;
-use crate::pack::Texture;
+use crate::records::Texture;
 
 pub fn mapped_normal(surface: Surface, t: &Texture, n: Vec3) -> Vec3 {
     let sign = if t.u.x * t.v.y - t.u.y * t.v.x > 0.0 { 1.0 } else { -1.0 };

@@ -8,7 +8,7 @@ use super::differential::{Derivative, Differential};
 use super::lens::circle_point;
 use super::math::normalize;
 use super::ray::Ray;
-use crate::pack::Camera;
+use crate::records::Camera;
 
 pub fn panorama_ray(camera: &Camera, at: Vec2) -> Ray {
     let east = circle_point(panorama_angles(camera, at).x);

@@ -7,7 +7,7 @@ use super::math::{dot, max};
 use super::ray::Ray;
 use super::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use super::surface::Surface;
-use crate::pack::{GLASS, MIRROR, Material, SPLITS};
+use crate::records::{GLASS, MIRROR, Material, SPLITS};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Path {
@@ -158,7 +158,7 @@ pub fn passed_path(path: Path, surface: Surface, at: Arrival) -> Path {
 mod tests {
     use super::*;
     use crate::cpu::math::normalize;
-    use crate::pack::NOWHERE;
+    use crate::records::NOWHERE;
 
     #[test]
     fn what_cannot_be_reflected_by_falls_back_to_the_smooth_normal() {

@@ -9,7 +9,7 @@ use super::mesh::{Spot, face_lets_pass};
 use super::samples::{LEVEL, Samples};
 use super::shadow::Block;
 use super::surface::Surface;
-use crate::pack::Material;
+use crate::records::Material;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lobes {

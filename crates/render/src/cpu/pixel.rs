@@ -13,7 +13,7 @@ use super::ray::Ray;
 use super::rng::hash4;
 use super::sampling::{random_sample, sample_key, sample_square};
 use super::sequence::sobol_sample;
-use crate::pack::{Packed, RANDOM};
+use crate::records::{Packed, RANDOM};
 use wgray_scene::Integrator;
 
 /// One sample of a pixel: its radiance times its weight, and its weight; and where layers are wanted its part of these.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::ray::{Ray, crosses_plane, plane_distance};
-use crate::pack::Primitive;
+use crate::records::Primitive;
 
 pub fn intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
@@ -19,7 +19,8 @@ mod tests {
     use glam::{DMat3, DVec3};
 
     use super::*;
-    use crate::pack::{FAR, PLANE, primitive};
+    use crate::pack::primitive;
+    use crate::records::{FAR, PLANE};
 
     /// z = 1.
     fn hit(origin: [f32; 3], direction: [f32; 3]) -> f32 {

@@ -11,7 +11,7 @@ use super::plane::{intersect_plane, plane_blocks};
 use super::ray::Ray;
 use super::rectangle::{intersect_rectangle, rectangle_blocks};
 use super::triangle::{intersect_triangle, triangle_blocks};
-use crate::pack::{DISK, ELLIPSOID, Primitive, RECTANGLE, TRIANGLE};
+use crate::records::{DISK, ELLIPSOID, Primitive, RECTANGLE, TRIANGLE};
 
 #[inline(always)] // compiled for each kind
 pub fn intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {

@@ -8,7 +8,7 @@ use super::math::{dot, exp2, max, min, normalize, power};
 use super::specular::{fresnel, refracted_cosine, refracted_direction};
 use super::surface::largest;
 use super::warp::{disk_sample, frame_around, vector_around};
-use crate::pack::{
+use crate::records::{
     COAT_F0, LEAST_SHEEN, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Material,
     SMALLEST_ALPHA,
 };

@@ -6,7 +6,7 @@ use glam::Vec2;
 
 use super::footprint::Footprint;
 use super::math::{floor, max, min, sine};
-use crate::pack::CHECKER;
+use crate::records::CHECKER;
 
 pub fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let checker = kind == CHECKER;

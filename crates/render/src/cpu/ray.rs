@@ -3,7 +3,7 @@
 use glam::{UVec2, Vec2, Vec3};
 
 use super::math::{cross, dot};
-use crate::pack::{FAR, NOTHING, Primitive};
+use crate::records::{FAR, NOTHING, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {

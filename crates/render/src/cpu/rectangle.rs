@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::math::dot;
 use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
-use crate::pack::Primitive;
+use crate::records::Primitive;
 
 pub fn intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
@@ -23,7 +23,8 @@ mod tests {
     use glam::{DMat3, DVec3};
 
     use super::*;
-    use crate::pack::{FAR, RECTANGLE, primitive};
+    use crate::pack::primitive;
+    use crate::records::{FAR, RECTANGLE};
 
     /// Half edges (2, 0, 0) and (0, 0, 1), in the plane y = 1.
     fn rectangle() -> Primitive {

@@ -11,7 +11,7 @@ use super::pixel::{Layers, pixel_radiance};
 use crate::backend::{Backend, Rules, Started};
 use crate::error::RenderError;
 use crate::film::{Film, Layer};
-use crate::pack::{FirstHit, Packed};
+use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
 
 /// A scene on the CPU. A call does its work in [`Backend::poll`] or [`Backend::wait`], on the current pool of threads.

@@ -6,7 +6,7 @@ use super::ggx::{ggx_d, ggx_g1, ggx_length, ggx_pdf, ggx_sample};
 use super::lobe::{LobeSample, facet_alpha, facet_eval, facet_pdf, facet_weight, half_vector};
 use super::math::{dot, max, normalize};
 use super::specular::{fresnel, refracted_cosine};
-use crate::pack::Material;
+use crate::records::Material;
 
 pub fn dielectric_gain(material: &Material) -> f32 {
     1.0 + material.loss

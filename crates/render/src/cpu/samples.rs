@@ -8,7 +8,7 @@ use fearless_simd::{Level, dispatch};
 use super::light::Segments;
 use super::shadow::{Block, block_sample};
 use super::walk::{Directions, MOST};
-use crate::pack::GRID;
+use crate::records::GRID;
 
 /// The instructions that this processor has for several numbers at once.
 pub static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);

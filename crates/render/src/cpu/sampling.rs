@@ -4,7 +4,7 @@ use glam::{UVec2, UVec4, Vec2};
 
 use super::rng::{hash4, unit_float};
 use super::sequence::{halton_sample, sobol_sample};
-use crate::pack::{GRID, HALTON, JITTERED, ROTATED_GRID, SOBOL};
+use crate::records::{GRID, HALTON, JITTERED, ROTATED_GRID, SOBOL};
 
 pub fn sample_square(pattern: u32, side: u32, index: u32, group: u32, key: UVec2) -> Vec2 {
     if pattern == GRID {

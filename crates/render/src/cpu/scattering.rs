@@ -18,7 +18,7 @@ use super::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough
 use super::surface::Surface;
 use super::thin::{thin_eval, thin_pdf, thin_sample};
 use super::warp::frame_around;
-use crate::pack::{
+use crate::records::{
     DIFFUSE, FACET_KINDS, GLASS, INSTANCE, LOBE_COAT, METAL, Material, NOTHING, PASSING_KINDS, PHONG, PRINCIPLED,
     Packed, ROUGH_GLASS, THIN,
 };

@@ -9,7 +9,7 @@ use super::primitive::blocks;
 use super::ray::vector_to_local;
 use super::samples::{LEVEL, Samples};
 use super::sampling::sample_square;
-use crate::pack::{Light, Primitive, Sphere};
+use crate::records::{Light, Primitive, Sphere};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::math::{max, min};
-use crate::pack::FAR;
+use crate::records::FAR;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slabs {

@@ -6,7 +6,7 @@ use super::ellipsoid::ellipsoid_level;
 use super::math::{dot, max, positive_zero};
 use super::primitive::{is_round, local_tangents, primitive_gradient, primitive_normal, primitive_uv};
 use super::ray::{Ray, point_to_local, vector_to_local, vector_to_world};
-use crate::pack::{FirstHit, NOTHING, Primitive};
+use crate::records::{FirstHit, NOTHING, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::math::{atan2, floor, max, min, sine};
-use crate::pack::NORMAL_BINS;
+use crate::records::NORMAL_BINS;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapCell {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::math::{exp2, floor, max, min, power};
-use crate::pack::{CLAMP, MIRRORED, SRGB8};
+use crate::records::{CLAMP, MIRRORED, SRGB8};
 
 pub fn near_coordinate(u: f32, wrap: u32) -> f32 {
     let small = if u.abs() < 8_388_608.0 { u } else { 0.0 };

@@ -16,7 +16,7 @@ use super::surface::Surface;
 use super::vertices::footprint_in_set;
 
 use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
-use crate::pack::{
+use crate::records::{
     ANISOTROPY_CHANNEL, COAT_CHANNEL, COAT_ROUGHNESS_CHANNEL, EWA, FLOAT, FOR_AMBIENT, FOR_ANISOTROPY, FOR_COAT,
     FOR_COAT_NORMAL, FOR_COAT_ROUGHNESS, FOR_DIFFUSE, FOR_DIRECTION, FOR_EMISSION, FOR_METALLIC, FOR_NORMAL,
     FOR_OPACITY, FOR_ROUGHNESS, FOR_SHEEN, FOR_SHEEN_ROUGHNESS, FOR_SPECULAR, FOR_TINT, FOR_TRANSMISSION, FOR_WEIGHT,

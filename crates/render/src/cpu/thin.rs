@@ -7,7 +7,7 @@ use super::lobe::{LobeSample, facet_alpha, facet_eval, facet_pdf, facet_weight, 
 use super::math::{dot, max, min};
 use super::rough_dielectric::dielectric_gain;
 use super::specular::{fresnel, refracted_cosine};
-use crate::pack::Material;
+use crate::records::Material;
 
 pub fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     let c = min(max(cosine, 1e-6), 1.0);

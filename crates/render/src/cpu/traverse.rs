@@ -8,7 +8,7 @@ use super::primitive::intersect;
 use super::ray::{Hit, Ray, by_itself, closer, no_hit};
 use super::shadow::{Block, Cone, cone_to_light, cuts, may_block, shadow_bits};
 use super::surface::Surface;
-use crate::pack::{DISK, ELLIPSOID, Light, PLANE, Packed, Primitive, RECTANGLE, TRIANGLE};
+use crate::records::{DISK, ELLIPSOID, Light, PLANE, Packed, Primitive, RECTANGLE, TRIANGLE};
 
 /// Calls a function with each kind of primitives as a constant, so that it is compiled for each.
 macro_rules! for_each_kind {

@@ -15,8 +15,8 @@ use super::slab::{Slabs, box_passage, is_passed, slabs};
 use super::surface::{Surface, largest};
 use super::traverse::is_cut;
 use super::walk::{self, Line, Nearest};
-use crate::pack::tree::{Aabb, Node};
-use crate::pack::{
+use crate::bvh::{Aabb, Node};
+use crate::records::{
     CASTS_SHADOW, DISK, ELLIPSOID, FAR, INSTANCE, Instance, Item, Light, NOTHING, Packed, PackedMesh, RECTANGLE,
     SOME_SHADOWS, TRIANGLE,
 };

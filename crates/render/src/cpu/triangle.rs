@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::math::dot;
 use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
-use crate::pack::Primitive;
+use crate::records::Primitive;
 
 pub fn intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
@@ -26,7 +26,8 @@ mod tests {
 
     use super::*;
     use crate::cpu::primitive::primitive_normal;
-    use crate::pack::{FAR, TRIANGLE, primitive};
+    use crate::pack::primitive;
+    use crate::records::{FAR, TRIANGLE};
 
     const CORNERS: [DVec3; 3] = [
         DVec3::new(1.0, 1.0, 2.0),

@@ -7,7 +7,7 @@ use super::footprint::Footprint;
 use super::geometry::{instance_of, is_on_mesh};
 use super::mesh::{Spot, color_between, face_uv, face_uv_derivative};
 use super::ray::Hit;
-use crate::pack::{COLORS_OF_BASE, COLORS_OF_EMISSION, Instance, Material, NO_COLORS, NOTHING, Packed};
+use crate::records::{COLORS_OF_BASE, COLORS_OF_EMISSION, Instance, Material, NO_COLORS, NOTHING, Packed};
 
 pub fn vertex_color(scene: &Packed, hit: Hit) -> Vec4 {
     if is_on_mesh(hit) {

@@ -6,9 +6,9 @@ use std::fmt::Write;
 use bytemuck::cast_slice;
 use glam::UVec4;
 
-use crate::pack::{
-    BLOCK, Emitter, Field as _, Instance, Item, Light, LightNode, Lookup, MOST_OUTSIDE, Material, Node, Packed, Record,
-    Texture,
+use crate::pack::MOST_OUTSIDE;
+use crate::records::{
+    BLOCK, Emitter, Field as _, Instance, Item, Light, LightNode, Lookup, Material, Node, Packed, Record, Texture,
 };
 
 /// Scenes of more materials, lights and textures are read from buffers: compiling grows with every one of them, faster than

@@ -14,7 +14,7 @@ use super::rounding::{Rounding, round_in_software};
 use super::spirv;
 use super::wording;
 use crate::error::ShaderError;
-use crate::pack::Specialization;
+use crate::records::Specialization;
 
 /// A kernel that naga accepts.
 pub struct Checked {

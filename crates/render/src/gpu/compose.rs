@@ -5,7 +5,8 @@ use std::{fs, io, path::Path};
 
 use super::bake::{tables, tree_tables};
 use super::functions::is_same_code;
-use crate::pack::{self, Specialization};
+use crate::records;
+use crate::records::Specialization;
 use wgray_image::waiting;
 use wgray_scene::Integrator;
 use wgray_shaders::{
@@ -141,8 +142,11 @@ impl Shaders {
     /// The shared mathematics by themselves: constants, records and pure functions.
     pub fn shared(&self) -> Source {
         let mut source = Source::default();
-        source.append("crates/render/src/pack/constants.rs", &pack::constant_declarations());
-        source.append("crates/render/src/pack/layout.rs", &pack::declarations());
+        source.append(
+            "crates/render/src/records/constants.rs",
+            &records::constant_declarations(),
+        );
+        source.append("crates/render/src/records/layout.rs", &records::declarations());
         self.append(&mut source, SHARED);
         source
     }
@@ -165,7 +169,7 @@ impl Shaders {
         self.append(&mut source, ROUNDING_FILE);
         source.extend(&self.shared());
         source.append(
-            "crates/render/src/pack/specialization.rs",
+            "crates/render/src/records/specialization.rs",
             &Specialization::declarations(),
         );
         for files in kernel.files {

@@ -4,7 +4,7 @@ use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, RENDER, Shaders};
 use super::device::Info;
 use super::scene::bytes_of_scene;
-use crate::pack::Packed;
+use crate::records::Packed;
 
 /// The kernel of a scene and its memory use.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use super::compose::{Kernel, Source};
 use super::device::Device;
 use super::rounding::Rounding;
 use crate::error::RenderError;
-use crate::pack::Specialization;
+use crate::records::Specialization;
 
 /// Side of a workgroup, as the kernels declare it.
 pub const WORKGROUP: u32 = 8;

@@ -22,7 +22,7 @@ use super::timer::{TIMES, Timer};
 use crate::backend::{Backend, Rules, Started};
 use crate::error::RenderError;
 use crate::film::{Film, Form};
-use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
+use crate::records::{Camera, FirstHit, Packed, Specialization, Work};
 use wgray_image::Region;
 use wgray_scene::Integrator;
 

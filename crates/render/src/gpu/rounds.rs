@@ -1,6 +1,6 @@
 //! How many samples of a pixel one call may have, so that software Vulkan runs it whole.
 
-use crate::pack::{BLOCK, LEAVES, Packed};
+use crate::records::{BLOCK, LEAVES, Packed};
 use wgray_scene::Integrator;
 
 /// After so many rounds of all its loops together, Mesa 22.3's software Vulkan ends every loop of an invocation. Rounds
@@ -69,7 +69,8 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pack::{Specialization, pack};
+    use crate::pack::pack;
+    use crate::records::Specialization;
     use wgray_scene::Scene;
 
     /// A scene of so many spheres and point lights.

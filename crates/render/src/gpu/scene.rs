@@ -10,7 +10,7 @@ use super::memory::Held;
 use super::pipeline::bind_group;
 use super::texels::TexelParts;
 use crate::error::RenderError;
-use crate::pack::{BINS, Camera, Packed};
+use crate::records::{BINS, Camera, Packed};
 
 /// What a scene takes on a device, in bytes.
 pub fn bytes_of_scene(packed: &Packed) -> u64 {

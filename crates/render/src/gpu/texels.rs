@@ -8,7 +8,7 @@ use super::bake::{mesh_rows_count, node_rows_count};
 use super::device::Info;
 use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
 use crate::error::RenderError;
-use crate::pack::Packed;
+use crate::records::Packed;
 
 /// How a scene's texels lie in buffers: all but the last have 2^shift words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use super::functions::functions;
 use super::interface;
 use super::rounding::Rounding;
 use crate::error::{ShaderError, ShaderErrors};
-use crate::pack::Packed;
+use crate::records::Packed;
 
 /// Maximum number of errors that are searched in a kernel.
 const MOST: usize = 16;

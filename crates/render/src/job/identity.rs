@@ -3,7 +3,7 @@
 use bytemuck::{bytes_of, cast_slice};
 use serde::{Deserialize, Serialize};
 
-use crate::pack::{Packed, PackedMesh, Specialization};
+use crate::records::{Packed, PackedMesh, Specialization};
 use wgray_image::Region;
 
 /// Maximum side of an image in pixels, and maximum samples per pixel, as in scenes.

@@ -15,7 +15,7 @@ use std::time::Duration;
 use crate::backend::Backend;
 use crate::error::RenderError;
 use crate::film::{Film, Form};
-use crate::pack::FirstHit;
+use crate::records::FirstHit;
 use wgray_image::Region;
 
 pub use bands::{Bands, Finished, Flow, Watch, there_is_memory};

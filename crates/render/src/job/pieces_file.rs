@@ -19,7 +19,7 @@ use super::part::PartHeader;
 use super::piece::Piece;
 use super::steps::Reached;
 use crate::film::{Film, Form};
-use crate::pack::FirstHit;
+use crate::records::FirstHit;
 use wgray_image::Region;
 
 /// The first bytes of such a file, which no program that moves text leaves as they are.

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::{Band, Layout};
 use crate::film::Layer;
-use crate::pack::{FirstHit, NOTHING};
+use crate::records::{FirstHit, NOTHING};
 use wgray_scene::Integrator;
 
 /// A value of a pixel.

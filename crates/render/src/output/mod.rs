@@ -12,7 +12,7 @@ mod target;
 
 use crate::error::RenderError;
 use crate::film::Film;
-use crate::pack::FirstHit;
+use crate::records::FirstHit;
 use wgray_image::{Pending, Pixels, Region, to_8_bits, to_16_bits};
 use wgray_scene::ViewSettings;
 

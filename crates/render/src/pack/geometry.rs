@@ -6,12 +6,12 @@ use std::sync::Arc;
 use bytemuck::cast_vec;
 use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
 
-use super::mesh::PackedMesh;
-use super::tree::{Aabb, build};
 use super::{
     CASTS_SHADOW, DISK, ELLIPSOID, INSTANCE, Instance, Item, NO_SHADOW, NOTHING, Node, PAD, Primitive, RECTANGLE,
     SOME_SHADOWS, TRIANGLE,
 };
+use crate::bvh::{Aabb, build};
+use crate::records::PackedMesh;
 use wgray_scene::mesh::Mesh;
 use wgray_scene::{Geometry, Scene, Shape};
 

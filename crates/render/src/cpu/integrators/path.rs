@@ -33,7 +33,7 @@ use crate::cpu::surface::{Surface, largest};
 use crate::cpu::texture::appearance;
 use crate::cpu::thin::thin_reflectance;
 use crate::cpu::vertices::with_vertex_colors;
-use crate::pack::{
+use crate::records::{
     BACKGROUND, DIFFUSE, EMITTER, FAR, GLASS, IMAGE_AROUND, INSTANCE, METAL, MOST_PASSED, Material, NOTHING, NOWHERE,
     OPAQUE, PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN, UNSEEN_AROUND,
 };

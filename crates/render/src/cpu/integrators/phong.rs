@@ -14,7 +14,7 @@ use crate::cpu::sampling::{decision_bits, sample_key};
 use crate::cpu::shadow::Block;
 use crate::cpu::surface::Surface;
 use crate::cpu::texture::appearance;
-use crate::pack::{BLOCK, EMITTER, GRID, LEAVES, Light, MIRROR, Material, NOTHING, NOWHERE, Packed, SPLITS, SPOT};
+use crate::records::{BLOCK, EMITTER, GRID, LEAVES, Light, MIRROR, Material, NOTHING, NOWHERE, Packed, SPLITS, SPOT};
 
 pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
     let bounces = scene.specialization.bounces;

@@ -9,7 +9,7 @@ use fearless_simd::prelude::*;
 use super::four::Four;
 use super::line::greater;
 use super::{Line, Mesh, Nearest, limit_from};
-use crate::pack::tree::{MOST_LEVELS, Node};
+use crate::bvh::{MOST_LEVELS, Node};
 
 /// Nodes that wait to be looked at, at most: each level adds 8 and takes one.
 pub const STACK: usize = MOST_LEVELS as usize * 7 + 1;

@@ -10,7 +10,7 @@ use super::closest::{STACK, side};
 use super::four::Four;
 use super::line::{LEAST, axes_from, greater, in_order, less};
 use super::{Directions, Line, MOST, Mesh, Segments};
-use crate::pack::tree::{Aabb, Node};
+use crate::bvh::{Aabb, Node};
 
 /// So many segments are tested against the boxes of a node, or the triangles of a leaf, one by one.
 const FEW: u32 = 6;

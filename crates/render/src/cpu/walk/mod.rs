@@ -22,7 +22,7 @@ use fearless_simd::dispatch;
 use glam::Vec3;
 
 pub use self::line::Line;
-use crate::pack::tree::{Aabb, Node};
+use crate::bvh::{Aabb, Node};
 
 /// Triangles below a tree.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 
 use super::{Directions, Level, Line, Mesh, Nearest, Segments, closest, hidden, hidden_items, leaves, levels};
-use crate::pack::tree::{Aabb, Tree, build};
+use crate::bvh::{Aabb, Tree, build};
 
 const NONE: Nearest = Nearest {
     t: f32::INFINITY,

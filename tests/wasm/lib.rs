@@ -1,0 +1,64 @@
+//! The library as a WebAssembly module without files and threads: renders a scene from bytes on the CPU path.
+//!
+//! `render.test.mjs` calls it in Node, and compares the pixels with `pixels.f32`; the test below compares those of this machine with the same file.
+
+use std::mem::ManuallyDrop;
+
+use wgray::{Device, Error, Options, Scene};
+
+/// Returns the linear RGB of a scene's pixels, row by row from the top.
+fn pixels(scene: &str) -> Result<Vec<f32>, Error> {
+    let scene = Scene::parse(scene, "scene.toml")?;
+    let options = Options {
+        device: Device::Cpu,
+        ..Options::default()
+    };
+    let picture = wgray::render(&scene, &options)?;
+    Ok(picture.pixels().colors.into_iter().flatten().collect())
+}
+
+/// Returns the address of `len` bytes, for the text of a scene.
+#[unsafe(no_mangle)]
+pub extern "C" fn allocate(len: usize) -> *mut u8 {
+    ManuallyDrop::new(vec![0; len]).as_mut_ptr()
+}
+
+/// Renders the scene whose text was written to the result of [`allocate`]. Returns the address of the pixels, preceded by their number.
+///
+/// # Safety
+///
+/// `text` is the result of `allocate(len)`.
+///
+/// # Panics
+///
+/// If the text is not a valid scene.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn render(text: *mut u8, len: usize) -> *const u32 {
+    // SAFETY: the caller passes what `allocate` returned.
+    let text = unsafe { Vec::from_raw_parts(text, len, len) };
+    let pixels = pixels(str::from_utf8(&text).expect("UTF-8")).expect("a valid scene");
+    let mut result = vec![pixels.len() as u32];
+    result.extend(pixels.into_iter().map(f32::to_bits));
+    ManuallyDrop::new(result).as_ptr()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `WGRAY_TEST_RECORD=1` writes the file.
+    #[test]
+    fn this_machine_renders_the_pixels_that_node_is_compared_with() {
+        let bytes: Vec<u8> = pixels(include_str!("scene.toml"))
+            .unwrap()
+            .into_iter()
+            .flat_map(f32::to_le_bytes)
+            .collect();
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/pixels.f32");
+        if std::env::var_os("WGRAY_TEST_RECORD").is_some() {
+            std::fs::write(file, &bytes).unwrap();
+        }
+        assert_eq!(bytes.len(), 8 * 8 * 3 * 4);
+        assert!(bytes == std::fs::read(file).unwrap(), "the pixels differ from {file}");
+    }
+}

@@ -1,0 +1,38 @@
+// Renders 8 x 8 pixels from bytes in Node, on the CPU path compiled to WebAssembly. scripts/test-wasm runs it.
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+
+const here = (name) => readFileSync(new URL(name, import.meta.url));
+const module = new WebAssembly.Module(readFileSync(process.env.WGRAY_WASM));
+
+// The clock is that of the page (crate web-time, by wasm-bindgen), whose imports are the only ones. They are provided by hand here, as a
+// handle of `performance` and its `now`.
+const imports = {};
+for (const { module: from, name } of WebAssembly.Module.imports(module)) {
+    assert.match(from, /^__wbindgen_/, `an import that is not of wasm-bindgen: ${from}.${name}`);
+    imports[from] ??= {};
+    imports[from][name] = /_now_/.test(name) ? () => performance.now() : /is_undefined/.test(name) ? () => 0 : () => 1;
+}
+
+function render(text) {
+    const { exports } = new WebAssembly.Instance(module, imports);
+    const bytes = new TextEncoder().encode(text);
+    const address = exports.allocate(bytes.length);
+    new Uint8Array(exports.memory.buffer, address, bytes.length).set(bytes);
+    const result = exports.render(address, bytes.length);
+    const [count] = new Uint32Array(exports.memory.buffer, result, 1);
+    return Buffer.from(exports.memory.buffer.slice(result + 4, result + 4 + 4 * count));
+}
+
+test("a scene from bytes has the pixels of the other machines", () => {
+    const pixels = render(here("scene.toml").toString());
+    assert.equal(pixels.length, 8 * 8 * 3 * 4);
+    assert.ok(pixels.equals(here("pixels.f32")));
+});
+
+test("another seed has other pixels", () => {
+    const text = here("scene.toml").toString().replace("pixel_samples = 4", "pixel_samples = 4\nseed = 1");
+    assert.ok(!render(text).equals(here("pixels.f32")));
+});
