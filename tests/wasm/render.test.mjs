@@ -7,13 +7,21 @@ import { test } from "node:test";
 const here = (name) => readFileSync(new URL(name, import.meta.url));
 const module = new WebAssembly.Module(readFileSync(process.env.WGRAY_WASM));
 
-// The clock is that of the page (crate web-time, by wasm-bindgen), whose imports are the only ones. They are provided by hand here, as a
-// handle of `performance` and its `now`.
+// The only imports are those of the clock (crate web-time, by wasm-bindgen), which a page gets from the program `wasm-bindgen`. Here they are
+// written by hand: a JavaScript object is a handle, those from 128 to `statics_end` are never dropped, and all are `performance`.
+const intrinsics = [
+    [/_now_/, () => performance.now()],
+    [/static_accessor|performance/, () => 1024],
+    [/is_undefined/, () => 0],
+    [/statics_end$/, () => 2048],
+    [/describe|_ref$|table_|spawn_poll|throw/, () => assert.fail("nothing here uses it")],
+];
 const imports = {};
 for (const { module: from, name } of WebAssembly.Module.imports(module)) {
     assert.match(from, /^__wbindgen_/, `an import that is not of wasm-bindgen: ${from}.${name}`);
+    const [, implementation] = intrinsics.find(([pattern]) => pattern.test(name));
     imports[from] ??= {};
-    imports[from][name] = /_now_/.test(name) ? () => performance.now() : /is_undefined/.test(name) ? () => 0 : () => 1;
+    imports[from][name] = implementation;
 }
 
 function render(text) {
