@@ -64,17 +64,23 @@ struct Readme;
 #[cfg(feature = "cli")]
 pub mod cli;
 mod device;
+#[cfg(feature = "cli")]
+mod device_plan;
 pub mod error;
 pub mod image;
+mod open;
+mod options;
 mod picture;
 mod render;
+mod renderer;
 
 pub use device::{Device, DeviceInfo};
 pub use error::Error;
 pub use glam::DVec3;
 pub use image::{Aov, AovSource, Pixels};
+pub use options::Options;
 pub use picture::{Channel, Picture};
-pub use render::{Growing, Options, render, render_growing};
+pub use render::{Growing, render, render_growing};
 pub use scene::{Description, Overrides, Scene};
 pub use wgray_image::Region;
 pub use wgray_render::film;

@@ -43,7 +43,7 @@ fn tell(line: &str) {
 
 /// Whether this device is software Vulkan, on which every picture must be the same bit for bit.
 pub fn bit_exact(device: &Device) -> bool {
-    device.info.exact && device.info.kind == "software"
+    device.info.exact && device.info.is_software()
 }
 
 /// A difference of one driver that is known and understood.

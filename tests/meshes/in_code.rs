@@ -74,7 +74,7 @@ fn an_edited_clone_is_rendered_as_it_is() {
 #[test]
 fn the_tree_of_a_mesh_is_kept() {
     let mesh = Arc::new(square());
-    let pack = || Options::default().pack(&scene(Arc::clone(&mesh)).unwrap());
+    let pack = || wgray_render::pack::pack(&scene(Arc::clone(&mesh)).unwrap());
     let [a, b] = [pack(), pack()];
     assert!(Arc::ptr_eq(&a.meshes[0], &b.meshes[0]));
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::device::DevicePlan;
+use crate::device_plan::DevicePlan;
 use crate::scene::{
     Camera, CameraPath, Geometry, Light, ModelContents, Projection, Reflection, Scene, Texels, TextureKind,
 };

@@ -8,7 +8,8 @@ use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use crate::device::{Device, plan_device};
+use crate::device::Device;
+use crate::device_plan::plan_device;
 use crate::scene::{Define, Overrides};
 use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::device::Device;
 use crate::image::Aov;
-use crate::render::Options;
+use crate::options::Options;
 use crate::scene::{Define, Integrator, Overrides, Pattern, Scene, is_gltf};
 use clap::ValueHint;
 use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser as _};

@@ -4,10 +4,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::device::{FaultHandler, Recovery, Renderer};
 use crate::error::RenderError;
 use crate::image::Layout;
-use crate::render::Options;
+use crate::options::Options;
+use crate::renderer::{FaultHandler, Recovery, Renderer};
 use crate::scene::{Scene, ViewSettings};
 use tracing::info;
 use wgray_image::Region;

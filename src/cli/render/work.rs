@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use crate::device::Renderer;
 use crate::error::RenderError;
 use crate::image::{self, Band, Layout, Pending, Sink};
 use crate::render::{middle_depth, needs_first_hits};
+use crate::renderer::Renderer;
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::job::{self, Bands, CheckpointStore, Cut, Finished, Flow, Order, PartHeader};

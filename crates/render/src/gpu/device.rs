@@ -50,6 +50,16 @@ pub struct Info {
     pub storage_buffers: u32,
 }
 
+impl Info {
+    /// Whether it computes on the CPU, as lavapipe and SwiftShader do.
+    pub fn is_software(&self) -> bool {
+        self.kind == SOFTWARE
+    }
+}
+
+/// The kind of adapters that compute on the CPU.
+const SOFTWARE: &str = "software";
+
 /// A device that is ready for work; a clone is another handle to it.
 #[derive(Clone)]
 pub struct Device {
@@ -190,7 +200,7 @@ fn info(adapter: &wgpu::Adapter) -> Info {
             DeviceType::DiscreteGpu => "discrete",
             DeviceType::IntegratedGpu => "integrated",
             DeviceType::VirtualGpu => "virtual",
-            DeviceType::Cpu => "software",
+            DeviceType::Cpu => SOFTWARE,
             DeviceType::Other => "other",
         },
         exact: adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS)

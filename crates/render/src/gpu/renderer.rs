@@ -40,7 +40,7 @@ impl Options {
     pub fn best(device: &Device) -> Options {
         Options {
             exact: device.info.exact.then_some(Rounding::Device),
-            baked: device.info.kind == "software",
+            baked: device.info.is_software(),
         }
     }
 }

@@ -1,0 +1,86 @@
+//! The device that a render would use, without opening it.
+
+#[cfg(feature = "gpu")]
+use wgray_render::gpu;
+use wgray_render::records::Packed;
+
+use crate::device::{Device, DeviceInfo};
+use crate::error::RenderError;
+#[cfg(feature = "gpu")]
+use crate::open::choice_of;
+use crate::open::faster_on_cpu;
+#[cfg(not(feature = "gpu"))]
+use crate::{error::Error, open::adapter};
+
+/// The device that a render would use, and the reason.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DevicePlan {
+    /// The device.
+    pub info: DeviceInfo,
+    /// The reason.
+    pub why: String,
+    /// The adapter and its plan, unless it is the CPU.
+    #[cfg(feature = "gpu")]
+    pub adapter: Option<(gpu::Info, gpu::KernelPlan)>,
+}
+
+/// Returns the device that a render would use, without opening it. A render uses the next device, or the CPU, if that one cannot be opened
+/// or is too small for the scene.
+///
+/// # Errors
+///
+/// [`RenderError::NoDevice`] if no device fits.
+pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
+    let on_cpu = |why: String| DevicePlan {
+        info: DeviceInfo::cpu(),
+        why,
+        #[cfg(feature = "gpu")]
+        adapter: None,
+    };
+    match device {
+        Device::Cpu => return Ok(on_cpu("requested".to_owned())),
+        Device::Auto if !cfg!(feature = "gpu") => {
+            return Ok(on_cpu("this build has no GPU support (feature \"gpu\")".to_owned()));
+        }
+        Device::Auto => {
+            if let Some(why) = faster_on_cpu(scene) {
+                return Ok(on_cpu(why));
+            }
+        }
+        _ => {}
+    }
+    match preferred(scene, device) {
+        Err(RenderError::NoDevice(why)) if *device == Device::Auto => Ok(on_cpu(why)),
+        other => other,
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
+    let info = gpu::preferred(&choice_of(device))?;
+    let why = match (device, info.is_software()) {
+        (Device::Named(_), _) => "requested",
+        (_, true) => {
+            "no hardware GPU found, and software Vulkan is faster than the CPU for a scene without a BVH"
+        }
+        _ => "the first hardware GPU",
+    };
+    let why = match device {
+        Device::Gpu if info.is_software() => "no hardware GPU found",
+        _ => why,
+    };
+    let kernel = gpu::plan_kernel(scene, &info);
+    Ok(DevicePlan {
+        info: DeviceInfo::from(&info),
+        why: why.to_owned(),
+        adapter: Some((info, kernel)),
+    })
+}
+
+#[cfg(not(feature = "gpu"))]
+fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
+    match adapter(scene, device, false, &|_, _| true) {
+        Err(Error::Render(error)) => Err(error),
+        _ => Err(RenderError::NoDevice("only the CPU is available".to_owned())),
+    }
+}
