@@ -60,9 +60,7 @@ fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError>
     let info = gpu::preferred(&choice_of(device))?;
     let why = match (device, info.is_software()) {
         (Device::Named(_), _) => "requested",
-        (_, true) => {
-            "no hardware GPU found, and software Vulkan is faster than the CPU for a scene without a BVH"
-        }
+        (_, true) => "no hardware GPU found, and software Vulkan is faster than the CPU for a scene without a BVH",
         _ => "the first hardware GPU",
     };
     let why = match device {

@@ -15,7 +15,8 @@ use wgray_render::output::Aov;
 use wgray_render::records::{Camera, FirstHit, Packed};
 
 use super::film_layer::FilmLayer;
-use super::picture::{Content, View, means};
+use super::picture::{Content, View};
+use super::pixel_values::means;
 
 /// Target duration of a dispatch: a save or a move of the camera waits this long.
 const CALL: Duration = Duration::from_millis(30);

@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::look::DisplaySettings;
-use super::picture::{bits, bytes, numbers, of_film};
+use super::pixel_values::{bits, bytes, numbers, of_film};
 use wgray_image::{Pixels, to_8_bits};
 use wgray_render::film::{Film, Layer, variance_of_mean};
 use wgray_render::output::Aov;

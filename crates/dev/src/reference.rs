@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::picture::Scaled;
+use super::pixel_values::Scaled;
 use wgray_image::Pixels;
 use wgray_image::color::srgb_to_linear;
 use wgray_image::compare::{self, Channel, Kind, PIXELS_PER_DEGREE, Picture, Plane};

@@ -20,17 +20,15 @@ use hyper::server::conn::http1;
 use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::Semaphore;
 use tokio::task::AbortHandle;
 
 use super::download::{exr_file, png_file};
 use super::guard::Guard;
-use super::messages::{self, Command};
-use super::object::SceneView;
 use super::picture::Frame;
 use super::reference::Reference;
-use super::session::{Session, Viewers};
-use super::times::Times;
+use super::session::Session;
+use super::shared::Shared;
 use super::viewer;
 
 /// Maximum number of concurrent viewers.
@@ -143,20 +141,6 @@ async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::R
         let task = task.abort_handle();
         unread.push_back(Unread { task, has_head });
     }
-}
-
-/// The resources of all requests.
-#[derive(Clone)]
-pub(super) struct Shared {
-    guard: Guard,
-    pub(super) state: watch::Receiver<Arc<messages::State>>,
-    pub(super) frames: watch::Receiver<Option<Arc<Frame>>>,
-    pub(super) times: Times,
-    pub(super) seen: watch::Receiver<Option<Arc<SceneView>>>,
-    pub(super) send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
-    give: Arc<dyn Fn(Reference) -> bool + Send + Sync>,
-    seats: Arc<Semaphore>,
-    viewers: Viewers,
 }
 
 /// The modules of the page.

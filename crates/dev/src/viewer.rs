@@ -14,7 +14,7 @@ use tokio::time::{MissedTickBehavior, sleep, timeout};
 use super::messages::{self, Command};
 use super::object::{Listed, Object, SceneView};
 use super::picture::Frame;
-use super::server::Shared;
+use super::shared::Shared;
 use super::times::Time;
 use wgray_image::visible::visible;
 use wgray_scene::cut;

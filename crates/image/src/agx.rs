@@ -9,7 +9,8 @@ use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3};
 
-use super::view::Rgb;
+/// A color in 64-bit floats.
+pub(super) type Rgb = [f64; 3];
 
 /// From linear Rec. 709 to Rec. 2020, rows: ITU-R BT.2087-0, section 2.
 const TO_REC2020: [[f64; 3]; 3] = [

@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::agx::agx;
+use crate::agx::{Rgb, agx};
 use crate::color::{linear_to_srgb, srgb_to_linear};
 
 /// From linear light to what a display is sent. In a file the names are those of [`ViewTransform::name`].
@@ -68,9 +68,6 @@ impl ViewSettings {
         }
     }
 }
-
-/// A colour in 64-bit floats.
-pub(crate) type Rgb = [f64; 3];
 
 impl ViewSettings {
     /// What a display is sent for a linear colour: each from 0 to 1.

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use glam::DVec3;
 
-use super::error::{At, Problem};
+use super::problem::{At, Problem};
 use super::validate::{color, view};
 use super::{Description, EnvironmentDescription, EnvironmentName, Integrator};
 use wgray_image::color::srgb_to_linear;

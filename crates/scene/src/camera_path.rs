@@ -2,9 +2,8 @@
 
 use glam::DVec3;
 
-use super::error::{At, Problem, SceneError};
 use super::spline::{Key, value};
-use super::{Camera, CameraDescription, CameraKeyDescription, Interpolation, Scene};
+use super::{CameraDescription, CameraKeyDescription, Interpolation};
 
 /// How a scene's camera moves.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +20,7 @@ pub struct CameraPath {
     focus_distance: Vec<Key<f64>>,
     frames: (f64, f64),
     /// The file and the line that it is in, if it is in one.
-    place: Option<(String, usize)>,
+    pub(crate) place: Option<(String, usize)>,
 }
 
 impl CameraPath {
@@ -59,7 +58,7 @@ impl CameraPath {
     }
 
     /// The camera at a frame, not checked.
-    fn description(&self, frame: f64) -> CameraDescription {
+    pub(crate) fn description(&self, frame: f64) -> CameraDescription {
         let mut camera = self.still.clone();
         let at = |keys: &[Key<f64>]| value(keys, frame, self.interpolation);
         let (position, look_at, up) = match &mut camera {
@@ -82,42 +81,9 @@ impl CameraPath {
         }
         camera
     }
-
-    /// The camera at a frame. The key of a problem is below `camera`.
-    pub(super) fn at(&self, frame: f64) -> Result<Camera, Problem> {
-        let camera = self.description(frame).validate_frame();
-        camera.map_err(|problem| Problem::new(format!("at frame {frame}, {problem}")).at("path"))
-    }
 }
 
 fn keys<T>(keys: &[CameraKeyDescription], value: impl Fn(&CameraKeyDescription) -> Option<T>) -> Vec<Key<T>> {
     let of = |key: &CameraKeyDescription| Some((key.frame, value(key)?));
     keys.iter().filter_map(of).collect()
-}
-
-impl Scene {
-    /// The camera at a frame: [`Scene::camera`] if it does not move. Frames may be fractions, and lie outside of the path.
-    ///
-    /// # Errors
-    ///
-    /// A camera that has no view there, such as one whose way leads through what it looks at, and a frame that is not finite.
-    pub fn camera_at(&self, frame: f64) -> Result<Camera, SceneError> {
-        let Some(path) = &self.camera_path else {
-            return Ok(self.camera);
-        };
-        if !frame.is_finite() {
-            return Err(SceneError::Override(Problem::of(
-                "frame",
-                format!("{frame} must be finite"),
-            )));
-        }
-        path.at(frame).map_err(|problem| match &path.place {
-            Some((origin, line)) => SceneError::Invalid {
-                origin: origin.clone(),
-                line: *line,
-                problem: problem.at("camera"),
-            },
-            None => SceneError::Override(problem.at("camera").at("frame")),
-        })
-    }
 }

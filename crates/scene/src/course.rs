@@ -10,7 +10,9 @@ use serde_json::value::RawValue;
 use toml::Value;
 
 use super::define::Defines;
-use super::error::{At, Collector, KeyPath, Problem, Problems, SceneError, Segment, cut};
+use super::error::SceneError;
+use super::key_path::{KeyPath, Segment, cut};
+use super::problem::{At, Collector, Problem, Problems};
 use super::validate::{light, point};
 use super::{
     ColorDescription, ConductorDescription, Description, DiffuseDescription, Integrator, LightDescription,
@@ -84,12 +86,6 @@ struct Object {
 
 fn one() -> f64 {
     1.0
-}
-
-/// Whether a scene of this name is such a file.
-pub fn is_course(name: &Path) -> bool {
-    let ending = name.extension();
-    ending.is_some_and(|ending| ending.eq_ignore_ascii_case("json"))
 }
 
 /// The folder that the files it names must lie in, if nothing else is said: the one that has the scene's own folder, as

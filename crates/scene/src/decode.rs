@@ -1,5 +1,7 @@
 //! Image files to texels, within limits that are known from a file's header before anything is decoded.
 
+mod gray_exr;
+
 use std::cell::Cell;
 use std::io::Cursor;
 use std::path::Path;
@@ -7,7 +9,7 @@ use std::path::Path;
 use image::error::{DecodingError, LimitError, LimitErrorKind};
 use image::{DynamicImage, ImageBuffer, ImageDecoder as _, ImageError, ImageFormat, ImageReader, Limits};
 
-use super::gray_exr::gray_exr;
+use self::gray_exr::gray_exr;
 use super::ktx2::{self, Ktx2};
 use super::texture::{Image, Texels};
 

@@ -7,8 +7,11 @@ use toml::{Table, Value};
 use toml_parser::Source;
 use toml_parser::lexer::TokenKind;
 
-use super::error::{At as _, KeyPath, Problem, Problems, SceneError, Segment, cut};
-use super::parse::list;
+use super::error::SceneError;
+use super::key_path::list;
+use super::key_path::{KeyPath, Segment, cut};
+use super::problem::At as _;
+use super::problem::{Problem, Problems};
 use super::suggest;
 
 /// A value for a key of a scene file: `KEY=VALUE`.

@@ -13,7 +13,7 @@ use image::{DynamicImage, ImageError, ImageFormat};
 use super::Problem;
 use super::decode::{Channels, Format, Header, LONGEST_SIDE, Refused, decode};
 use super::halves::halved;
-use super::parse::list;
+use super::key_path::list;
 use super::texture::{Encoding, Image, Texels};
 use crate::mesh::{Mesh, in_other_case};
 use wgray_image::color::srgb_to_linear;

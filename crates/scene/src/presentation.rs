@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use glam::{DMat3, DVec3};
 
-use super::error::Problem;
+use super::problem::Problem;
 use super::{
     Description, DiffuseDescription, DiskDescription, Framing, Orbit, Rotation, RotationAbout, Scene, ShapeDescription,
     View,

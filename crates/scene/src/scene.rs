@@ -4,13 +4,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
+use crate::camera_path::CameraPath;
+use crate::description::{AlphaMode, Integrator, Pattern, PixelFilterKind, Shadows, VertexColors};
 use crate::gltf::Imported;
 use crate::mesh::Mesh;
+use crate::metals::MetalIndex;
 use crate::note::Note;
-use crate::*;
+use crate::texture::{Color, Image, NormalMap, Texture, Value};
+use wgray_image::ViewSettings;
 
 /// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
 ///
@@ -141,40 +143,6 @@ pub struct Render {
     pub filter: PixelFilter,
     /// Further samples of the pixels whose error is large; then `pixel_samples` are those of one round.
     pub adaptive: Option<Adaptive>,
-}
-
-/// What light is simulated. In a file the names are in snake case: `"path"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Integrator {
-    /// Direct light and Phong's reflection model, the formula in the scene format's page.
-    Phong,
-    /// Paths of light from surface to surface.
-    Path,
-}
-
-impl Integrator {
-    /// All of them.
-    pub const ALL: [Integrator; 2] = [Integrator::Phong, Integrator::Path];
-
-    /// The name in files and options.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Integrator::Phong => "phong",
-            Integrator::Path => "path",
-        }
-    }
-}
-
-/// Whether glass casts shadows. In a file the names are in snake case: `"opaque"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Shadows {
-    /// Like everything else.
-    #[default]
-    Opaque,
-    /// Not at all: light passes it straight on, with its full strength.
-    Transparent,
 }
 
 /// A set of sample positions on the unit square.

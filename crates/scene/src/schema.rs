@@ -2,17 +2,14 @@
 //! checked by (`limits.rs`).
 
 pub(crate) mod fields;
-pub(super) mod kinds;
 
 use schemars::generate::SchemaSettings;
-use schemars::{Schema, SchemaGenerator};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
+use super::description::kinds::SPLIT;
 use super::description::tagged::Tagged as _;
+use super::description::tagged_schema::definition;
 use super::{CameraDescription, Description};
-
-/// What is between the words of a kind of values and their range, as `kinds` has them.
-const SPLIT: &str = "|";
 
 /// A JSON Schema of the draft 2020-12 that scene files in TOML keep, for editors to complete and check them by.
 ///
@@ -49,48 +46,6 @@ fn without_kinds(schema: &mut Value) {
         }
         _ => {}
     }
-}
-
-/// A table that its key `type` tells apart: `shape` is what it is of. Each type has its tag, its description and its own schema, which
-/// becomes one of the definitions.
-pub(super) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
-    let tags: Vec<&str> = types.iter().map(|(tag, ..)| *tag).collect();
-    let told: Vec<&str> = types.iter().map(|(_, told, _)| told.trim()).collect();
-    let key = json!({ "description": "The type.", "type": "string", "enum": tags, "enumDescriptions": told });
-    // A condition for each type, so that a mistake is told at its key. Some editors complete by no conditions: for them alone all types
-    // stand beside what everything is.
-    let mut all = vec![json!({})];
-    let mut conditions = Vec::new();
-    for (tag, told, schema) in types {
-        let mut schema = schema.to_value();
-        let mut properties = Map::new();
-        properties.insert("type".to_owned(), json!({ "description": told.trim(), "const": tag }));
-        if let Some(Value::Object(own)) = schema.get_mut("properties") {
-            properties.append(own);
-        }
-        schema["properties"] = Value::Object(properties);
-        let name = definition(shape, tag);
-        let reference = json!({ "$ref": format!("#/$defs/{name}") });
-        conditions.push(json!({
-            "if": { "properties": { "type": { "const": tag } }, "required": ["type"] },
-            "then": reference.clone(),
-        }));
-        all.push(reference);
-        generator.definitions_mut().insert(name, schema);
-    }
-    let schema = json!({
-        "type": "object",
-        "properties": { "type": key },
-        "required": ["type"],
-        "allOf": conditions,
-        "anyOf": all,
-    });
-    schema.try_into().unwrap_or_default()
-}
-
-/// The name of a type's definition: `camera-perspective`.
-fn definition(shape: &str, tag: &str) -> String {
-    format!("{}-{tag}", shape.trim_end_matches("Description").to_lowercase())
 }
 
 /// A camera is perspective if it does not say what it is, and what it does not say may be in the keys of its path.

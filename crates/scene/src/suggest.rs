@@ -2,8 +2,8 @@
 
 use std::cell::Cell;
 
-use super::error::cut;
-use super::parse::list;
+use super::key_path::cut;
+use super::key_path::list;
 
 /// Maximum length of a name that is compared, in bytes. Comparing takes time proportional to the product of both lengths.
 const MAX_LEN: usize = 64;

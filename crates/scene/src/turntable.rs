@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
 
-use super::error::Problem;
+use super::problem::Problem;
 use super::{CameraDescription, CameraKeyDescription, CameraPathDescription, Interpolation};
 
 /// The most frames.

@@ -8,7 +8,7 @@ use toml::Table;
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use super::{CameraPathDescription, one};
-use crate::schema::kinds::{Aperture, Blades, Degrees, FNumber, Fov, Length, Point, Vector};
+use crate::description::kinds::{Aperture, Blades, Degrees, FNumber, Fov, Length, Point, Vector};
 
 tagged! {
     /// `[camera]`

@@ -4,7 +4,7 @@ use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::schema::kinds::{Aperture, Fov, FrameNumber, Length, Point, Vector};
+use crate::description::kinds::{Aperture, Fov, FrameNumber, Length, Point, Vector};
 /// The way of a camera through its keys. Before the first and after the last one it stands.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

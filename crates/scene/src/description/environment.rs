@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Rotation, one};
-use crate::schema::kinds::{Degrees, Elevation, EnvironmentScale, Rgb, Turbidity};
+use crate::description::kinds::{Degrees, Elevation, EnvironmentScale, Rgb, Turbidity};
 
 /// What surrounds the scene, for `integrator = "path"`: one of `color`, `file` and `name`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Rotation, Scale};
-use crate::schema::kinds::{Matrix, Place, Point, Seconds};
+use crate::description::kinds::{Matrix, Place, Point, Seconds};
 
 /// A glTF file: its meshes with their materials and textures, and its lights.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -7,7 +7,7 @@ use toml::Table;
 
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
-use crate::schema::kinds::{ConeAngle, InnerAngle, Point, Rgb, Size, Vector};
+use crate::description::kinds::{ConeAngle, InnerAngle, Point, Rgb, Size, Vector};
 
 tagged! {
     /// `[[lights]]`

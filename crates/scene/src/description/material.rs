@@ -8,7 +8,7 @@ use toml::Table;
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use super::{ColorDescription, NormalMapDescription, PrincipledDescription, ValueDescription};
-use crate::schema::kinds::{Absorption, Degrees, Etas, Ior, Ks, Metal, Share, ShareColor, Shininess};
+use crate::description::kinds::{Absorption, Degrees, Etas, Ior, Ks, Metal, Share, ShareColor, Shininess};
 
 tagged! {
     /// `[materials.NAME]`

@@ -8,8 +8,8 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
+use crate::description::kinds::{Angles, Degrees, Factor, Factor3, Matrix, Point, Vector};
 use crate::mesh::Normals;
-use crate::schema::kinds::{Angles, Degrees, Factor, Factor3, Matrix, Point, Vector};
 
 /// A mesh file, and how it is read.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -8,14 +8,16 @@ mod camera;
 mod camera_path;
 mod environment;
 mod gltf;
+pub(crate) mod kinds;
 mod light;
 mod material;
 mod mesh;
 mod principled;
 mod render;
 mod shape;
-pub(super) mod tables;
+pub(crate) mod tables;
 pub(super) mod tagged;
+pub(crate) mod tagged_schema;
 mod texture;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,7 +27,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Assets, ViewTransform};
-use crate::schema::kinds::{Pixels, Stops};
+use crate::description::kinds::{Pixels, Stops};
 
 pub use self::camera::*;
 pub use self::camera_path::*;

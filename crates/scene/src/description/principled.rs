@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ColorDescription, NormalMapDescription, TextureReference, ValueDescription};
-use crate::schema::kinds::{AttenuationDistance, Degrees, PrincipledIor, Share, ShareColor, ShareRgb, Thickness};
+use crate::description::kinds::{AttenuationDistance, Degrees, PrincipledIor, Share, ShareColor, ShareRgb, Thickness};
 
 /// glTF's metallic-roughness material with its extensions, for `integrator = "path"`; glTF's defaults.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -10,9 +10,50 @@ use serde::de::{Deserializer, Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::limits::MOST;
-use crate::schema::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
-use crate::{Integrator, Shadows};
+use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
+use crate::limits::{DEEPEST, MOST};
+
+/// What light is simulated. In a file the names are in snake case: `"path"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Integrator {
+    /// Direct light and Phong's reflection model, the formula in the scene format's page.
+    Phong,
+    /// Paths of light from surface to surface.
+    Path,
+}
+
+impl Integrator {
+    /// All of them.
+    pub const ALL: [Integrator; 2] = [Integrator::Phong, Integrator::Path];
+
+    /// The name in files and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Integrator::Phong => "phong",
+            Integrator::Path => "path",
+        }
+    }
+
+    /// The fewest and the most bounces of a path.
+    pub fn depths(self) -> (u32, u32) {
+        match self {
+            Integrator::Phong => (1, 64),
+            Integrator::Path => (0, DEEPEST),
+        }
+    }
+}
+
+/// Whether glass casts shadows. In a file the names are in snake case: `"opaque"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Shadows {
+    /// Like everything else.
+    #[default]
+    Opaque,
+    /// Not at all: light passes it straight on, with its full strength.
+    Transparent,
+}
 
 /// The settings of a render.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -9,7 +9,7 @@ use super::gltf::GltfDescription;
 use super::mesh::MeshDescription;
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
-use crate::schema::kinds::{Length, Point, Points3, Points4, Size, Vector};
+use crate::description::kinds::{Length, Point, Points3, Points4, Size, Vector};
 
 tagged! {
     /// `[[shapes]]`

@@ -53,7 +53,7 @@ macro_rules! tagged {
 
             fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
                 let types = vec![$(($tag, concat!($($variant_doc),*), generator.subschema_for::<$body>()),)+];
-                crate::schema::tagged(generator, stringify!($name), types)
+                crate::description::tagged_schema::tagged(generator, stringify!($name), types)
             }
         }
     };

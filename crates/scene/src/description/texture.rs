@@ -11,7 +11,7 @@ use toml::Table;
 
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
-use crate::schema::kinds::{
+use crate::description::kinds::{
     Anisotropy, Degrees, Factors, LineWidth, Rgb, Share, Strength, UvOffset, UvScale, UvSet, tell_plain,
 };
 use crate::{Channel, Encoding, TextureFilter, Wrap};

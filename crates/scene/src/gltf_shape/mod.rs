@@ -11,9 +11,10 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use self::fitting::longest_side;
-use super::error::{At, Problem, Segment};
 use super::image_file::Place;
-use super::parse::list;
+use super::key_path::Segment;
+use super::key_path::list;
+use super::problem::{At, Problem};
 use super::suggest;
 use super::validate::placement;
 use super::{

@@ -7,11 +7,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::model::{self, SIDE};
 use super::{Overrides, folder_of};
-use crate::error::{Problem, SceneError};
+use crate::error::SceneError;
 use crate::framing::check_extent;
 use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, ModelContents, UPRIGHT, load};
-use crate::model::{self, SIDE};
+use crate::problem::Problem;
 use crate::{CameraDescription, Description, Framing, GltfDescription, Scene, Selection, View, framed};
 
 /// Sine of the smallest angle to +z at which a view is not vertical.

@@ -1,6 +1,7 @@
 //! From a scene file to a checked [`Scene`], with other values in place of some of the file's.
 
 mod gltf_file;
+mod model;
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -9,16 +10,17 @@ use std::path::{Path, PathBuf};
 
 use self::gltf_file::describe;
 pub use self::gltf_file::{GltfChoice, is_gltf};
+pub use self::model::{is_mesh, is_model};
 use crate::around::{Background, of_option, surround};
 use crate::course;
 use crate::define::{Define, Defines};
-use crate::error::KeyPath;
-use crate::error::{At, Problem, Problems, SceneError};
+use crate::error::SceneError;
 use crate::gltf::GltfError;
-use crate::model;
+use crate::key_path::KeyPath;
 use crate::note::Note;
-use crate::parse::Places;
 use crate::parse::{NOT_UTF8, encoding, invalid, line_of_path, syntax_error};
+use crate::parse::{Places, is_course};
+use crate::problem::{At, Problem, Problems};
 use crate::turntable::turning;
 use crate::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
 use crate::{
@@ -409,7 +411,7 @@ impl<'a> Draft<'a> {
             defines,
             description,
         } = self;
-        let is_course = course::is_course(Path::new(origin));
+        let is_course = is_course(Path::new(origin));
         let root = if is_course {
             course::asset_root(folder)
         } else {

@@ -6,9 +6,11 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::parts::{Broken, Kind, Part, Parts, Rest};
-use super::{Problems, Read, course, invalid, read, read_camera, read_file, tagged};
+use super::{Problems, Read, invalid, is_course, read, read_camera, read_file, tagged};
 use crate::define::Defines;
-use crate::error::{At, KeyPath, SceneError, Segment};
+use crate::error::SceneError;
+use crate::key_path::{KeyPath, Segment};
+use crate::problem::At;
 use crate::{CameraDescription, Description};
 
 impl Description {
@@ -21,7 +23,7 @@ impl Description {
         before: &Description,
         at: &KeyPath,
     ) -> Result<Option<Change>, SceneError> {
-        if course::is_course(Path::new(origin)) {
+        if is_course(Path::new(origin)) {
             return Ok(None);
         }
         let broken = |broken: Broken| broken.into_error(text, origin);

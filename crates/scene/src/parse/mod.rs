@@ -5,7 +5,6 @@ mod parts;
 mod syntax;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
 use std::path::Path;
 
 use glam::DVec3;
@@ -16,7 +15,6 @@ use toml::{Table, Value};
 
 use self::parts::{Broken, Kind, LARGEST, Parts};
 use super::Integrator;
-use super::course;
 use super::define::Defines;
 use super::description::tables::{self, ReadError};
 use super::description::tagged::Tagged;
@@ -25,25 +23,16 @@ use super::description::{
     LightDescription, MaterialDescription, MeshFileDescription, PerspectiveDescription, RenderDescription,
     ShapeDescription, TextureDescription,
 };
-use super::error::{At, Collector, KeyPath, Problem, Problems, SceneError, Segment, both, cut};
+use super::error::SceneError;
+use super::key_path::{KeyPath, Segment, cut, list, listed};
 use super::limits::{BLADES, DEEPEST, MOST, UV_SETS};
+use super::problem::{At, Collector, Problem, Problems, both};
 use super::suggest;
-use super::validate::depths;
 
 pub use change::{Pieces, Places};
 pub use syntax::{NOT_UTF8, encoding, syntax_error};
 
 impl Description {
-    /// Parses a scene file without validating its values. `origin` is the name of the file in messages; if it ends in `.json`, the text is
-    /// JSON.
-    ///
-    /// # Errors
-    ///
-    /// Invalid TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
-    pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
-        Description::parse_with(text, origin, &mut Defines::new(&[]))
-    }
-
     /// Returns the description with the defined values.
     pub(crate) fn defined(&self, defines: &mut Defines) -> Result<Description, Problem> {
         let mut file = Table::try_from(self).map_err(|error| Problem::new(error.to_string()))?;
@@ -51,11 +40,8 @@ impl Description {
         read_file(file).map_err(|problems| problems.first.at("define"))
     }
 
-    /// Parses a scene file with the defined values.
-    pub(crate) fn parse_with(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
-        if course::is_course(Path::new(origin)) {
-            return course::read(text, origin, defines);
-        }
+    /// Parses a scene file in TOML with the defined values.
+    pub(crate) fn parse_toml(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
         let broken = |broken: Broken| broken.into_error(text, origin);
         let parts = Parts::of(text);
         if let Some(large) = parts.too_large() {
@@ -76,6 +62,12 @@ impl Description {
         };
         read.map_err(|problems| invalid(text, origin, problems, defines))
     }
+}
+
+/// Returns true if a scene of this name is in JSON.
+pub fn is_course(name: &Path) -> bool {
+    let extension = name.extension();
+    extension.is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
 }
 
 /// Returns the error of invalid values, of the text or of a define.
@@ -523,26 +515,6 @@ fn remove(table: &mut Table, path: &[Segment]) -> bool {
 /// Maximum number of keys in a message, which no table exceeds.
 const MAX_KEYS: usize = 64;
 
-/// Formats names as `"a", "b", "c"`, up to a limit.
-pub fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
-    listed(names, 24)
-}
-
-/// Formats up to `most` names.
-fn listed<S: AsRef<str>>(names: impl IntoIterator<Item = S>, most: usize) -> String {
-    let mut text = String::new();
-    let mut names = names.into_iter();
-    for name in names.by_ref().take(most) {
-        let comma = if text.is_empty() { "" } else { ", " };
-        // Writing to a String cannot fail.
-        let _ = write!(text, "{comma}{:?}", cut(name.as_ref()));
-    }
-    match names.count() {
-        0 => text,
-        more => format!("{text} and {more} more"),
-    }
-}
-
 /// Formats a value as TOML on one line, truncated if it is long.
 fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
@@ -666,7 +638,7 @@ fn whole(key: Option<&Segment>, integrator: Integrator) -> String {
     let (low, high) = match key {
         Some(Segment::Key(key)) if key == "seed" => (0, u32::MAX),
         Some(Segment::Key(key)) if key == "uv_set" => (0, UV_SETS - 1),
-        Some(Segment::Key(key)) if key == "max_depth" => depths(integrator),
+        Some(Segment::Key(key)) if key == "max_depth" => integrator.depths(),
         Some(Segment::Key(key)) if key == "rr_depth" => (0, DEEPEST),
         _ => (1, MOST),
     };

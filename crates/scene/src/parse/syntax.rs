@@ -1,6 +1,7 @@
 //! Errors of texts that are not valid TOML: the parser's message, a hint and the line.
 
-use crate::error::{SceneError, cut};
+use crate::error::SceneError;
+use crate::key_path::cut;
 use wgray_image::visible::visible;
 
 /// The message about bytes that are not text.

@@ -9,7 +9,7 @@ use toml::{Table, Value};
 
 use super::{SPLIT, definition, of_files};
 use crate::CameraDescription;
-use crate::error::{KeyPath, Segment, cut};
+use crate::key_path::{KeyPath, Segment, cut};
 
 /// A value that can be changed, or is shown.
 #[derive(Clone, Debug, PartialEq, Serialize)]

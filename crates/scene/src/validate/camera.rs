@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::{Checked, FLATTEST, between, check, length, number, point, show, unit};
 use crate::camera_path::CameraPath;
-use crate::error::{At, Collector, Problem, Problems, both};
 use crate::limits::{APERTURES, BLADES, F_NUMBERS, FOVS, FRAMES, LENGTHS, TURNS};
+use crate::problem::{At, Collector, Problem, Problems, both};
 use crate::{Camera, CameraDescription, CameraKeyDescription, Lens, PerspectiveDescription, Projection};
 
 /// How far apart keys must be at least, in frames: slopes between them stay finite.

@@ -1,6 +1,6 @@
 //! The integrator of a scene that names none: `path` if the scene uses a key that needs it, else `phong`.
 
-use super::super::error::{KeyPath, Segment};
+use super::super::key_path::{KeyPath, Segment};
 use super::super::{Description, Integrator, MaterialDescription, ShapeDescription};
 
 impl Description {
@@ -12,7 +12,7 @@ impl Description {
 }
 
 /// Returns the note that the path tracer was chosen, and why.
-pub(super) fn note(description: &Description) -> Option<String> {
+pub(crate) fn note(description: &Description) -> Option<String> {
     if description.render.integrator.is_some() {
         return None;
     }

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-use super::super::error::cut;
 use super::super::image_file::Place;
+use super::super::key_path::cut;
 use super::super::limits::{FARTHEST, LENGTHS, SCALES, TURNS};
 use super::super::mesh_file;
 use super::super::suggest::Suggestions;

@@ -15,19 +15,19 @@ mod principled;
 
 use crate::note::Note;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use glam::DVec3;
 
 use self::appearance::{Images, Textures};
 use self::mesh::{Known, NamedMesh};
 use self::mtl::Looks;
-use super::error::{At, Collector, Problem, Problems, both, cut};
-use super::gltf_shape::Expanded;
+use super::key_path::cut;
+use super::key_path::list;
 use super::limits::{
     CLAMPS, COLORS, DEEPEST, FARTHEST, FILTER_RADII, LEAST_ADAPTIVE, LENGTHS, MOST, SHADOW_EPSILONS, SHARES,
 };
-use super::parse::list;
+use super::problem::{At, Collector, Problem, Problems, both};
 use super::suggest::Suggestions;
 use super::{
     Adaptive, AdaptiveDescription, Assets, Camera, CameraPath, Color, Description, EllipsoidDescription, Environment,
@@ -37,6 +37,7 @@ use super::{
 };
 
 pub(super) use self::appearance::TEXEL_MEMORY;
+pub(crate) use self::integrator::note as integrator_note;
 pub(super) use self::mesh::{placement, turned_up};
 pub(super) use self::path::LIGHT_SAMPLES;
 
@@ -49,63 +50,8 @@ const FLATTEST: f64 = 1e-6;
 type Checked<T> = Result<T, Problem>;
 
 impl Description {
-    /// Checks every value and makes a scene of them. Image files that they name are in the current folder.
-    ///
-    /// # Errors
-    ///
-    /// A value that breaks a rule. [`Scene::parse`](super::Scene::parse) reports all of them.
-    pub fn validate(&self) -> Result<Scene, Problem> {
-        self.validate_with(&Assets::beside(Path::new(".")))
-    }
-
-    /// Checks every value, the files that they name among them, and makes a scene of them.
-    ///
-    /// # Errors
-    ///
-    /// A value that breaks a rule.
-    pub fn validate_with(&self, assets: &Assets) -> Result<Scene, Problem> {
-        let scene = self.validate_and_list(assets, &mut BTreeSet::new());
-        scene.map_err(|problems| problems.first)
-    }
-
-    /// [`Description::validate_with`] with all problems. Lists the files of the scene even if it has problems.
-    pub(super) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problems> {
-        files.extend(self.files_beside(assets));
-        let integrator = self.integrator();
-        let settings = self.settings(integrator);
-        let has_gltf = self
-            .shapes
-            .iter()
-            .any(|shape| matches!(shape, ShapeDescription::Gltf(_)));
-        let expanded = match &settings {
-            Ok(_) if has_gltf => Some(Expanded::of(self, assets, files)),
-            _ => None,
-        };
-        let mut scene = match expanded {
-            None => self.validate_plain(settings, integrator, assets, files)?,
-            Some(Err(problem)) => {
-                let others = self.validate_plain(Err(problem.into()), integrator, assets, files);
-                others.map_err(Problems::once_per_key)? // the file may have the same problem again
-            }
-            Some(Ok(expanded)) => {
-                // The files may have added lights.
-                let settings = expanded.description.settings(integrator);
-                let described = &expanded.description;
-                let scene = described.validate_plain(settings, integrator, &expanded.assets, files);
-                let place = |problem| expanded.place(self, problem);
-                let mut scene = scene.map_err(|problems| problems.map(place).once_per_key())?;
-                scene.notes.splice(0..0, expanded.notes);
-                scene.imported = expanded.imported;
-                scene
-            }
-        };
-        let chosen = integrator::note(self).map(Note::from);
-        scene.notes.splice(0..0, chosen);
-        Ok(scene)
-    }
-
     /// Validates the sections that name no files.
-    fn settings(&self, integrator: Integrator) -> Result<Settings, Problems> {
+    pub(crate) fn settings(&self, integrator: Integrator) -> Result<Settings, Problems> {
         let image = both(
             image(&self.image).at("image"),
             camera::with_path(&self.camera).at("camera"),
@@ -126,7 +72,7 @@ impl Description {
 
     /// Validates a description without glTF files. If the settings have problems, files are not read, because no scene can be made of
     /// them; all other values are checked nevertheless.
-    fn validate_plain(
+    pub(crate) fn validate_plain(
         &self,
         settings: Result<Settings, Problems>,
         integrator: Integrator,
@@ -233,7 +179,7 @@ impl Description {
 }
 
 /// The sections of a scene that name no files.
-struct Settings {
+pub(crate) struct Settings {
     width: u32,
     height: u32,
     view: ViewSettings,
@@ -383,16 +329,8 @@ pub(super) fn adaptive(
     })
 }
 
-/// The fewest and the most bounces of a path.
-pub(super) fn depths(integrator: Integrator) -> (u32, u32) {
-    match integrator {
-        Integrator::Phong => (1, 64),
-        Integrator::Path => (0, DEEPEST),
-    }
-}
-
 pub(super) fn max_depth(depth: u32, integrator: Integrator) -> Checked<u32> {
-    let (low, high) = depths(integrator);
+    let (low, high) = integrator.depths();
     check((low..=high).contains(&depth), || {
         format!("{depth} must be from {low} to {high}")
     })?;

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::error::{cut, cut_to};
 use super::super::image_file::{Part, Place};
+use super::super::key_path::{cut, cut_to};
 use super::super::limits::{BRIGHTEST, SHININESS};
 use super::super::{Color, ImageTextureDescription, Integrator, Material, Reflection, Texture};
 use super::appearance::{Images, image_texture};

@@ -435,9 +435,9 @@ fn the_page_has_the_limits() {
         format!("| `width` | required | 1 to {MOST} |"),
         format!(
             "| `max_depth` | 8 | {} to {}; under `\"path\"` {} to {DEEPEST} |",
-            depths(Integrator::Phong).0,
-            depths(Integrator::Phong).1,
-            depths(Integrator::Path).0
+            Integrator::Phong.depths().0,
+            Integrator::Phong.depths().1,
+            Integrator::Path.depths().0
         ),
         format!("| `rr_depth` | {RR_DEPTH} | 0 to {DEEPEST} |"),
         format!("above 0: {} to {} |", number(CLAMPS.0), number(CLAMPS.1)),

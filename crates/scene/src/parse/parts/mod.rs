@@ -11,7 +11,8 @@ use toml_parser::Source;
 use toml_parser::lexer::{Token, TokenKind};
 
 use super::syntax::{explained, syntax_error};
-use crate::error::{KeyPath, SceneError, Segment};
+use crate::error::SceneError;
+use crate::key_path::{KeyPath, Segment};
 
 /// The largest part in bytes, and the largest file that has to be read as a whole.
 pub const LARGEST: usize = 4 << 20;

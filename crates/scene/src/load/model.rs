@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::error::{Problem, SceneError};
-use super::framing::check_extent;
-use super::load::Overrides;
-use super::validate::turned_up;
-use super::{
+use super::Overrides;
+use crate::error::SceneError;
+use crate::framing::check_extent;
+use crate::mesh::{Mesh, MeshError};
+use crate::problem::Problem;
+use crate::validate::turned_up;
+use crate::{
     CameraDescription, Description, EnvironmentDescription, EnvironmentName, Framing, GltfChoice, ImageDescription,
     Integrator, MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed,
-    is_gltf, mesh_file,
+    is_gltf,
 };
-use crate::mesh::{Mesh, MeshError};
 
 /// The longer side of the image in pixels, and samples of a pixel, by default.
 pub(super) const SIDE: u32 = 720;
@@ -94,7 +95,7 @@ pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Descriptio
         path: path.to_owned(),
         error,
     })?;
-    let mesh = mesh_file::load(&whole, None).map_err(|error| SceneError::Mesh(error.at(path)))?;
+    let mesh = crate::mesh_file::load(&whole, None).map_err(|error| SceneError::Mesh(error.at(path)))?;
     if let (true, Some(damage)) = (overrides.strict, mesh.damage.first()) {
         return Err(SceneError::Mesh(damage.clone().of(path)));
     }

@@ -6,9 +6,11 @@ use std::borrow::Cow;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde_json::{Value, json};
 
-use super::SPLIT;
 use crate::limits::*;
 use crate::{MetalIndex, ViewSettings};
+
+/// What is between the words of a kind of values and their range, as `description::kinds` has them.
+pub(crate) const SPLIT: &str = "|";
 
 /// Each kind with its words, behind which its range comes, and its schema.
 macro_rules! kinds {

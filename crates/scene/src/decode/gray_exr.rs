@@ -8,7 +8,7 @@ use exr::prelude::{ReadChannels as _, ReadLayers as _};
 use image::error::DecodingError;
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat};
 
-use super::decode::{Channels, Header, Refused};
+use super::{Channels, Header, Refused};
 
 /// What a file of colours has.
 const COLORS: [&str; 3] = ["R", "G", "B"];

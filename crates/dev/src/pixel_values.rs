@@ -1,0 +1,93 @@
+//! The values of pixels: of films as images, as text and as bytes.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use wgray_image::Pixels;
+use wgray_render::film::{Film, mean};
+
+/// Returns the means of a film's sums. Rows without samples show `under`, a smaller film of the same image.
+pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
+    Pixels {
+        width: film.region.width(),
+        height: film.region.height(),
+        colors: of_film(film, under, has_samples, &|film, i| mean(film.sums[i])),
+    }
+}
+
+/// Returns a value of each pixel of a film, or, in rows without samples, of a smaller film of the same image.
+pub(super) fn of_film<T: Default + Send>(
+    film: &Film,
+    under: Option<&Film>,
+    has_samples: &(dyn Fn(u32) -> bool + Sync),
+    value: &(dyn Fn(&Film, usize) -> T + Sync),
+) -> Vec<T> {
+    let size = |film: &Film| [film.region.width(), film.region.height()];
+    let from = size(film);
+    let pixels = (0..film.sums.len()).into_par_iter().with_min_len(1024);
+    let of_pixel = |i: usize| match under {
+        Some(under) if !has_samples(i as u32 / from[0]) => {
+            let at = Scaled { from, to: size(under) };
+            at.index(i as u32 % from[0], i as u32 / from[0])
+                .map_or_else(T::default, |i| value(under, i))
+        }
+        _ => value(film, i),
+    };
+    pixels.map(of_pixel).collect()
+}
+
+/// A mapping from an image to the same image in another size.
+pub(super) struct Scaled {
+    pub from: [u32; 2],
+    pub to: [u32; 2],
+}
+
+impl Scaled {
+    /// Returns the index of the pixel that covers pixel (x, y); `None` outside the image.
+    pub fn index(&self, x: u32, y: u32) -> Option<usize> {
+        let scaled = |at: u32, i: usize| {
+            (at < self.from[i]).then(|| u64::from(at) * u64::from(self.to[i]) / u64::from(self.from[i]))
+        };
+        Some((scaled(y, 1)? * u64::from(self.to[0]) + scaled(x, 0)?) as usize)
+    }
+}
+
+/// Formats numbers.
+pub(super) fn numbers<const N: usize>(values: [f32; N]) -> String {
+    values.map(|v| format!("{v}")).join("  ")
+}
+
+/// Formats the bits of floats in hexadecimal.
+pub(super) fn bits<const N: usize>(values: [f32; N]) -> String {
+    values.map(|v| format!("{:08x}", v.to_bits())).join("  ")
+}
+
+/// Returns the bytes of values that are displayed without a transform.
+pub(super) fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
+    let byte = |v: f32| (v * 255.0 + 0.5) as u8; // saturates
+    pixels
+        .par_iter()
+        .with_min_len(1024)
+        .flat_map_iter(|pixel| color(pixel).to_array().map(byte))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec4;
+    use wgray_image::Region;
+
+    use super::*;
+
+    #[test]
+    fn a_coarse_picture_shows_where_the_film_is_empty() {
+        let mut under = Film::new(Region::whole(1, 1));
+        under.sums[0] = Vec4::new(1.0, 0.0, 0.0, 1.0);
+        let mut film = Film::new(Region::whole(1, 2));
+        film.sums[0] = Vec4::new(0.0, 2.0, 4.0, 2.0);
+        assert_eq!(
+            means(&film, Some(&under), &|y| y < 1).colors,
+            [[0.0, 1.0, 2.0], [1.0, 0.0, 0.0]]
+        );
+        assert_eq!(means(&film, None, &|y| y < 1).colors[1], [0.0; 3]);
+    }
+}

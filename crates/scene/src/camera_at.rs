@@ -1,0 +1,41 @@
+//! The validated camera at a frame of a camera path.
+
+use crate::camera_path::CameraPath;
+use crate::error::SceneError;
+use crate::problem::{At as _, Problem};
+use crate::scene::{Camera, Scene};
+
+impl CameraPath {
+    /// The camera at a frame. The key of a problem is below `camera`.
+    pub(crate) fn at(&self, frame: f64) -> Result<Camera, Problem> {
+        let camera = self.description(frame).validate_frame();
+        camera.map_err(|problem| Problem::new(format!("at frame {frame}, {problem}")).at("path"))
+    }
+}
+
+impl Scene {
+    /// The camera at a frame: [`Scene::camera`] if it does not move. Frames may be fractions, and lie outside of the path.
+    ///
+    /// # Errors
+    ///
+    /// A camera that has no view there, such as one whose way leads through what it looks at, and a frame that is not finite.
+    pub fn camera_at(&self, frame: f64) -> Result<Camera, SceneError> {
+        let Some(path) = &self.camera_path else {
+            return Ok(self.camera);
+        };
+        if !frame.is_finite() {
+            return Err(SceneError::Override(Problem::of(
+                "frame",
+                format!("{frame} must be finite"),
+            )));
+        }
+        path.at(frame).map_err(|problem| match &path.place {
+            Some((origin, line)) => SceneError::Invalid {
+                origin: origin.clone(),
+                line: *line,
+                problem: problem.at("camera"),
+            },
+            None => SceneError::Override(problem.at("camera").at("frame")),
+        })
+    }
+}

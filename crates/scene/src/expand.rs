@@ -1,0 +1,66 @@
+//! From a description to a scene: glTF files are expanded, then everything is validated.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::gltf_shape::Expanded;
+use crate::problem::{Problem, Problems};
+use crate::validate::integrator_note;
+use crate::{Assets, Description, Note, Scene, ShapeDescription};
+
+impl Description {
+    /// Checks every value and makes a scene of them. Image files that they name are in the current folder.
+    ///
+    /// # Errors
+    ///
+    /// A value that breaks a rule. [`Scene::parse`](super::Scene::parse) reports all of them.
+    pub fn validate(&self) -> Result<Scene, Problem> {
+        self.validate_with(&Assets::beside(Path::new(".")))
+    }
+
+    /// Checks every value, the files that they name among them, and makes a scene of them.
+    ///
+    /// # Errors
+    ///
+    /// A value that breaks a rule.
+    pub fn validate_with(&self, assets: &Assets) -> Result<Scene, Problem> {
+        let scene = self.validate_and_list(assets, &mut BTreeSet::new());
+        scene.map_err(|problems| problems.first)
+    }
+
+    /// [`Description::validate_with`] with all problems. Lists the files of the scene even if it has problems.
+    pub(crate) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problems> {
+        files.extend(self.files_beside(assets));
+        let integrator = self.integrator();
+        let settings = self.settings(integrator);
+        let has_gltf = self
+            .shapes
+            .iter()
+            .any(|shape| matches!(shape, ShapeDescription::Gltf(_)));
+        let expanded = match &settings {
+            Ok(_) if has_gltf => Some(Expanded::of(self, assets, files)),
+            _ => None,
+        };
+        let mut scene = match expanded {
+            None => self.validate_plain(settings, integrator, assets, files)?,
+            Some(Err(problem)) => {
+                let others = self.validate_plain(Err(problem.into()), integrator, assets, files);
+                others.map_err(Problems::once_per_key)? // the file may have the same problem again
+            }
+            Some(Ok(expanded)) => {
+                // The files may have added lights.
+                let settings = expanded.description.settings(integrator);
+                let described = &expanded.description;
+                let scene = described.validate_plain(settings, integrator, &expanded.assets, files);
+                let place = |problem| expanded.place(self, problem);
+                let mut scene = scene.map_err(|problems| problems.map(place).once_per_key())?;
+                scene.notes.splice(0..0, expanded.notes);
+                scene.imported = expanded.imported;
+                scene
+            }
+        };
+        let chosen = integrator_note(self).map(Note::from);
+        scene.notes.splice(0..0, chosen);
+        Ok(scene)
+    }
+}

@@ -1,0 +1,134 @@
+//! Key paths of values, and names as messages quote them.
+
+use std::borrow::Cow;
+use std::fmt::{self, Write as _};
+
+/// Maximum length of a value or key in a message, in characters.
+const MAX_VALUE_LEN: usize = 60;
+/// Returns a value or key for a message: only its start and end if it is long.
+pub fn cut(text: &str) -> Cow<'_, str> {
+    cut_to(MAX_VALUE_LEN, text)
+}
+
+/// Removes the middle of a text that is longer than this number of characters.
+pub fn cut_to(longest: usize, text: &str) -> Cow<'_, str> {
+    let count = text.chars().count();
+    if count <= longest {
+        return text.into();
+    }
+    let kept = longest - 3;
+    let start: String = text.chars().take(kept - kept / 3).collect();
+    let end: String = text.chars().skip(count - kept / 3).collect();
+    format!("{start}...{end}").into()
+}
+
+/// Formats names as `"a", "b", "c"`, up to a limit.
+pub fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
+    listed(names, 24)
+}
+
+/// Formats up to `most` names.
+pub fn listed<S: AsRef<str>>(names: impl IntoIterator<Item = S>, most: usize) -> String {
+    let mut text = String::new();
+    let mut names = names.into_iter();
+    for name in names.by_ref().take(most) {
+        let comma = if text.is_empty() { "" } else { ", " };
+        // Writing to a String cannot fail.
+        let _ = write!(text, "{comma}{:?}", cut(name.as_ref()));
+    }
+    match names.count() {
+        0 => text,
+        more => format!("{text} and {more} more"),
+    }
+}
+
+/// Maximum number of segments of a key path that are printed.
+const MAX_SEGMENTS: usize = 20;
+
+/// The key path of a value: `shapes[2].size`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct KeyPath(pub Vec<Segment>);
+
+/// A segment of a [`KeyPath`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Segment {
+    /// A key of a table.
+    Key(String),
+    /// An index into a list.
+    Index(usize),
+}
+
+impl From<&str> for Segment {
+    fn from(key: &str) -> Self {
+        Segment::Key(key.to_owned())
+    }
+}
+
+impl From<usize> for Segment {
+    fn from(index: usize) -> Self {
+        Segment::Index(index)
+    }
+}
+
+impl fmt::Display for KeyPath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        let end = self.0.len().saturating_sub(MAX_SEGMENTS / 2);
+        for (i, segment) in self.0.iter().enumerate() {
+            if self.0.len() > MAX_SEGMENTS && (MAX_SEGMENTS / 2..end).contains(&i) {
+                if i == MAX_SEGMENTS / 2 {
+                    f.write_str("...")?;
+                }
+                continue;
+            }
+            match segment {
+                Segment::Index(index) => write!(f, "[{index}]")?,
+                Segment::Key(key) => {
+                    if i > 0 {
+                        f.write_str(".")?;
+                    }
+                    let shown = cut(key);
+                    if !key.is_empty() && key.chars().all(bare) {
+                        f.write_str(&shown)?;
+                    } else {
+                        write!(f, "{shown:?}")?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl KeyPath {
+    /// Returns the path as it is written in a scene file, at any length. Parsing it returns the same path.
+    pub fn exact(&self) -> String {
+        let mut text = String::new();
+        for segment in &self.0 {
+            match segment {
+                Segment::Index(index) => text.push_str(&format!("[{index}]")),
+                Segment::Key(key) => {
+                    if !text.is_empty() {
+                        text.push('.');
+                    }
+                    text.push_str(&written_key(key));
+                }
+            }
+        }
+        text
+    }
+}
+
+/// Returns a key as it is written in TOML: bare or quoted.
+fn written_key(key: &str) -> std::borrow::Cow<'_, str> {
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !key.is_empty() && key.chars().all(is_bare) {
+        return key.into();
+    }
+    let escaped = key.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if c.is_control() => format!("\\u{:04X}", c as u32),
+        c => c.to_string(),
+    });
+    format!("\"{}\"", escaped.collect::<String>()).into()
+}

@@ -1,0 +1,28 @@
+//! Scene files as descriptions, in TOML or JSON.
+
+use std::path::Path;
+
+use crate::define::Defines;
+use crate::error::SceneError;
+use crate::parse::is_course;
+use crate::{Description, course};
+
+impl Description {
+    /// Parses a scene file without validating its values. `origin` is the name of the file in messages; if it ends in `.json`, the text is
+    /// JSON.
+    ///
+    /// # Errors
+    ///
+    /// Invalid TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
+        Description::parse_with(text, origin, &mut Defines::new(&[]))
+    }
+
+    /// Parses a scene file with the defined values.
+    pub(crate) fn parse_with(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
+        match is_course(Path::new(origin)) {
+            true => course::read(text, origin, defines),
+            false => Description::parse_toml(text, origin, defines),
+        }
+    }
+}
