@@ -55,7 +55,7 @@ fn is_veiled(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32, p
     var rest = way * reach;
     for (var i = 0u; i <= MOST_PASSED; i++) {
         let hit = closest_hit(ray, left, wall);
-        if (hit.primitive == NOTHING) | !(hit.t < rest) {
+        if (hit.primitive == NO_INDEX) | !(hit.t < rest) {
             return false;
         }
         let spot = spot_of(hit);
@@ -79,7 +79,7 @@ fn first_seen(ray: Ray, met: Hit) -> Hit {
     var onward = ray;
     var way = 0.0;
     for (var i = 0u; i < MOST_PASSED; i++) {
-        if hit.primitive == NOTHING {
+        if hit.primitive == NO_INDEX {
             break;
         }
         let spot = spot_of(hit);

@@ -7,7 +7,7 @@ struct LightSample {
     pdf: f32,              // per solid angle, with the light's choice; the choice's alone of a light without extent
     is_delta: bool,        // has no extent, so that no other ray finds it
     reach: f32,            // where shadow rays end, as a multiple of `to`
-    primitive: u32,        // what shines and does not hide itself, NOTHING for none
+    primitive: u32,        // what shines and does not hide itself, NO_INDEX for none
 }
 
 // One of all that shines, by its power: Walker, "An Efficient Method for Generating Discrete Random Variables with General
@@ -125,7 +125,7 @@ fn sample_face(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
         density = chosen.density;
     }
     let pdf = solid_angle_pdf(density, to, face.primitive.z);
-    return LightSample(to, radiance, pdf, false, environment.reach, NOTHING);
+    return LightSample(to, radiance, pdf, false, environment.reach, NO_INDEX);
 }
 
 // What a surface radiates at texture coordinates, the colours of its vertices aside.

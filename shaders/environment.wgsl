@@ -104,5 +104,5 @@ fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
     let d = direction_in_cell(chosen & 65535u, chosen >> 16u, inside, width, height);
     let to = normalize(environment.x * d.x + environment.y * d.y + environment.z * d.z);
     let arriving = arriving_from(to, normal);
-    return LightSample(to, arriving.radiance, arriving.pdf, false, light.reach, NOTHING);
+    return LightSample(to, arriving.radiance, arriving.pdf, false, light.reach, NO_INDEX);
 }

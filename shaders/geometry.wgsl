@@ -98,7 +98,7 @@ fn seen_path(start: Path) -> Path {
     var path = start;
     for (var i = 0u; i < MOST_HIDDEN; i++) {
         let hit = closest_hit(path.ray, path.left, path.wall);
-        if hit.primitive == NOTHING {
+        if hit.primitive == NO_INDEX {
             break;
         }
         let spot = spot_of(hit);
@@ -123,7 +123,7 @@ fn pixel_first_hit(pixel: vec2u) -> FirstHit {
         path = seen_path(path);
     }
     var found = path_first_hit(path);
-    if (HIDDEN != 0u) & (found.shape != NOTHING) {
+    if (HIDDEN != 0u) & (found.shape != NO_INDEX) {
         found.depth += dot(path.ray.origin - start.origin, start.direction);
     }
     return found;
@@ -136,9 +136,9 @@ fn path_first_hit(path: Path) -> FirstHit {
     if SEES_THROUGH != 0u {
         hit = first_seen(ray, hit);
     }
-    if hit.primitive == NOTHING {
+    if hit.primitive == NO_INDEX {
         let zero = vec3f(0.0);
-        return FirstHit(zero, 0.0, zero.xy, NOTHING, NOTHING, zero, NOTHING, zero.xy, vec2u(0u));
+        return FirstHit(zero, 0.0, zero.xy, NO_INDEX, NO_INDEX, zero, NO_INDEX, zero.xy, vec2u(0u));
     }
     let spot = spot_of(hit);
     if is_on_mesh(hit) {

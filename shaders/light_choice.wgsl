@@ -11,7 +11,7 @@ struct Chosen {
 // a time.
 fn chosen_light(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -> Chosen {
     var chosen = Chosen(emitter, 0.0);
-    if emitter.index != NOTHING {
+    if emitter.index != NO_INDEX {
         return chosen;
     }
     var probability = 1.0;
@@ -20,7 +20,7 @@ fn chosen_light(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -
     var child = 0u;
     var level = 0u;
     var bits = vec2u(0u);
-    while at != NOTHING {
+    while at != NO_INDEX {
         last = at;
         let node = load_light_node(at);
         let shares = light_shares(light_importances(node, p, n));
@@ -41,15 +41,15 @@ fn chosen_light(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -
 
 // The density of samples, per area, on what the ray from p has met: 0 for what the tree does not know, or unless it is wanted.
 fn met_density(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
-    var at = NOTHING;
+    var at = NO_INDEX;
     if wanted {
         at = light_leaf(hit);
     }
-    if at == NOTHING {
+    if at == NO_INDEX {
         return 0.0;
     }
     var density = load_light_node(at / 4u).density[at % 4u];
-    while at != NOTHING {
+    while at != NO_INDEX {
         let node = load_light_node(at / 4u);
         density *= light_shares(light_importances(node, p, n))[at % 4u];
         at = node.parent.x;
@@ -57,14 +57,14 @@ fn met_density(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     return density;
 }
 
-// Which child of which node is what was hit, as `LightNode.parent` has it; NOTHING if there is none.
+// Which child of which node is what was hit, as `LightNode.parent` has it; NO_INDEX if there is none.
 fn light_leaf(hit: Hit) -> u32 {
     var place = hit.primitive;
     if (IN_TREE & (1u << INSTANCE)) != 0u {
         if hit.instance != 0u {
             let leaves = load_instance(hit.instance - 1u).leaves;
-            if leaves == NOTHING {
-                return NOTHING;
+            if leaves == NO_INDEX {
+                return NO_INDEX;
             }
             place = leaves + hit.slot;
         }

@@ -18,7 +18,7 @@ fn word_of(row: vec4u, i: u32) -> u32 {
 // The word that a triangle's group has: its material, and whether it casts no shadow.
 fn group_word(i: Instance, slot: u32) -> u32 {
     var group = i.materials;
-    if i.groups != NOTHING {
+    if i.groups != NO_INDEX {
         group += word_of(meshes[i.groups + slot / 4u], slot % 4u);
     }
     return word_of(nodes[counts.tree.z + group / 4u], group % 4u);
@@ -42,7 +42,7 @@ fn face_of(i: Instance, hit: Hit) -> Spot {
     let none = Tangents(zero, zero);
     var face = Spot(q, edge_1, edge_2, vec2f(0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0), zero, zero, zero, none, none, none,
                     i.anchor, i.condition);
-    if i.attributes != NOTHING {
+    if i.attributes != NO_INDEX {
         let row_0 = bitcast<vec4f>(meshes[i.attributes + corners.x]);
         let row_1 = bitcast<vec4f>(meshes[i.attributes + corners.y]);
         let row_2 = bitcast<vec4f>(meshes[i.attributes + corners.z]);
@@ -56,7 +56,7 @@ fn face_of(i: Instance, hit: Hit) -> Spot {
         }
     }
     if (NORMAL_MAPS == 1u) | (ANISOTROPIC == 1u) {
-        if i.tangents != NOTHING {
+        if i.tangents != NO_INDEX {
             face.tangents_0 = load_tangents(i, corners.x);
             face.tangents_1 = load_tangents(i, corners.y);
             face.tangents_2 = load_tangents(i, corners.z);

@@ -6,7 +6,7 @@ struct Ray {
     direction: vec3f,      // unit length
 }
 
-// The nearest intersection so far: FAR and NOTHING where there is none.
+// The nearest intersection so far: FAR and NO_INDEX where there is none.
 struct Hit {
     t: f32,
     instance: u32,         // 0 for a primitive by itself, else one more than the number of a mesh's instance
@@ -17,12 +17,12 @@ struct Hit {
 
 // No hit.
 fn no_hit() -> Hit {
-    return Hit(FAR, 0u, NOTHING, 0u, vec2f(0.0));
+    return Hit(FAR, 0u, NO_INDEX, 0u, vec2f(0.0));
 }
 
-// The number of a primitive by itself at a place, which is an instance and a primitive; NOTHING for a triangle of a mesh.
+// The number of a primitive by itself at a place, which is an instance and a primitive; NO_INDEX for a triangle of a mesh.
 fn by_itself(place: vec2u) -> u32 {
-    return select(NOTHING, place.y, place.x == 0u);
+    return select(NO_INDEX, place.y, place.x == 0u);
 }
 
 fn point_to_local(q: Primitive, p: vec3f) -> vec3f {

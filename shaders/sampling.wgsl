@@ -55,7 +55,7 @@ fn random_sample(index: u32, group: u32, key: vec2u) -> vec2f {
     return vec2f(unit_float(bits.x), unit_float(bits.y));
 }
 
-// The key of one purpose of random numbers: 0 is the pixel's area, 1 + n the light n, NOTHING the
+// The key of one purpose of random numbers: 0 is the pixel's area, 1 + n the light n, NO_INDEX the
 // choice of branches.
 fn sample_key(pixel: vec2u, seed: u32, purpose: u32) -> vec2u {
     let bits = hash4(vec4u(pixel.x, pixel.y, seed, purpose));

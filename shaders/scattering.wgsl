@@ -137,7 +137,7 @@ fn facets_of(surface: Surface, found: Material) -> Material {
             material.ior = 1.0 / eta_of(surface, found);
         }
     }
-    if material.energy != NOTHING {
+    if material.energy != NO_INDEX {
         material.loss = facet_loss(facet_alpha(material), wo);
         if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {
             if material.kind == ROUGH_GLASS {

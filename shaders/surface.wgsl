@@ -38,8 +38,8 @@ fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let normal = outward * side;
     let size = max(largest(position), largest(way));
     let start = position + normal * (epsilon * size);
-    let above = vec2u(0u, select(i, NOTHING, round & inside));
-    let below = vec2u(0u, select(i, NOTHING, round & !inside));
+    let above = vec2u(0u, select(i, NO_INDEX, round & inside));
+    let below = vec2u(0u, select(i, NO_INDEX, round & !inside));
     return Surface(position, normal, normal, normal, -ray.direction, start, vec3f(0.0), side, above, below, vec2f(0.0),
                    vec3f(0.0), vec3f(0.0));
 }

@@ -5,7 +5,7 @@
 fn vertex_color(hit: Hit) -> vec4f {
     if is_on_mesh(hit) {
         let i = load_instance(hit.instance - 1u);
-        if i.colors != NOTHING {
+        if i.colors != NO_INDEX {
             let corners = meshes[i.triangles + hit.slot];
             let c0 = bitcast<vec4f>(meshes[i.colors + corners.x]);
             let c1 = bitcast<vec4f>(meshes[i.colors + corners.y]);

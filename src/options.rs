@@ -8,26 +8,26 @@ use wgray_scene::{Problem, Scene};
 
 use crate::device::Device;
 
-/// How a scene is rendered. Size, samples and seed are the scene's, which [`Overrides`](crate::Overrides) can change.
+/// The options of a render. Size, samples and seed belong to the scene; [`Overrides`](crate::Overrides) change them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// What renders.
+    /// The device.
     pub device: Device,
-    /// The pixels that are rendered, the same as in the whole picture; all if absent.
+    /// The region to render, with the pixels of the full image; without, the full image.
     pub crop: Option<Region>,
-    /// The layers beside the radiance; each is there once, however often it is named.
+    /// The layers besides the radiance. Repetitions are ignored.
     pub aovs: Vec<Aov>,
-    /// Whether quotients and square roots are rounded correctly in software, for the CPU's bits on GPUs whose own may be off
-    /// in the last digit. Vulkan only; without effect on the CPU.
+    /// True to round quotients and square roots correctly in software, for the bits of the CPU on GPUs that may be off by one unit in the last
+    /// place. Vulkan only; the CPU ignores it.
     pub exact_rounding: bool,
 }
 
 impl Options {
-    /// The pixels that these options ask for.
+    /// Returns the region that these options request.
     ///
     /// # Errors
     ///
-    /// The first option that does not fit the scene.
+    /// The first option that does not apply to the scene.
     pub fn region(&self, scene: &Scene) -> Result<Region, Problem> {
         let (width, height) = (scene.width, scene.height);
         let whole = Region::whole(width, height);
@@ -50,7 +50,7 @@ impl Options {
         Err(Problem::of("crop", format!("{x0},{y0},{x1},{y1} {rule}")))
     }
 
-    /// The scene as backends read it, with what these options ask for.
+    /// Packs a scene with the layers that these options request.
     pub(crate) fn pack(&self, scene: &Scene) -> Packed {
         let plain = pack(scene);
         let of_samples = |aov: &Aov| aov.source(plain.integrator) == AovSource::Samples;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use web_time::Instant;
-use wgray_image::contain::contained;
+use wgray_image::contain::catch_panic;
 use wgray_render::backend::Backend;
 use wgray_render::records::Packed;
 
@@ -174,7 +174,7 @@ impl<'a> Renderer<'a> {
     fn mend(&mut self, error: RenderError) -> Result<(), RenderError> {
         match error {
             RenderError::Lost { device, message } => self.reopen(device, message),
-            RenderError::CutShort { .. } => {
+            RenderError::LoopTruncated { .. } => {
                 self.go_on_cpu(&error);
                 Ok(())
             }
@@ -242,7 +242,7 @@ impl<'a> Renderer<'a> {
     fn release(&mut self, lost: &str, message: &str) {
         let (cpu, _) = cpu(self.scene);
         let backend = std::mem::replace(&mut self.backend, cpu);
-        let _ = contained(|| drop(backend)); // wgpu may panic, which has no consequence here
+        let _ = catch_panic(|| drop(backend)); // wgpu may panic, which has no consequence here
         self.gone = Some((lost.to_string(), message.to_string()));
     }
 

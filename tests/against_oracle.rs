@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use wgray::scene::{Description, Pattern, SamplesDescription};
-use wgray_render::records::{FirstHit, NOTHING};
+use wgray_render::records::{FirstHit, NO_INDEX};
 
 use crate::oracle::{Flaw, Meeting, Oracle};
 use crate::pictures::{both, first_hits, means, render};
@@ -164,7 +164,7 @@ fn a_flawed_oracle_is_found() {
 /// Whether a first hit is what the oracle met.
 fn same_first_hit(hit: &FirstHit, meeting: &Option<Meeting>) -> bool {
     let Some(meeting) = meeting else {
-        return hit.shape == NOTHING && hit.depth == 0.0;
+        return hit.shape == NO_INDEX && hit.depth == 0.0;
     };
     let close = |a: f64, b: f64| (a - b).abs() <= 2e-5 * (1.0 + b.abs());
     let (normal, uv): (DVec3, DVec2) = (hit.normal.as_dvec3(), hit.uv.as_dvec2());

@@ -206,7 +206,7 @@ const SENTENCES: &[Sentence] = &[
         ] {
             let told = b.resume(wrong);
             hold(
-                matches!(told, Err(RenderError::WrongFilm(_))),
+                matches!(told, Err(RenderError::FilmMismatch(_))),
                 "a film of another form is taken",
             )?;
         }
@@ -306,7 +306,7 @@ const SENTENCES: &[Sentence] = &[
             b.render(region(0, 0, 20, 11), 0..all).map_err(|e| e.to_string())?;
             let early = b.render(region(0, 0, 20, 1), all..all + 1);
             hold(
-                matches!(early, Err(RenderError::TooEarly { .. })),
+                matches!(early, Err(RenderError::PilotIncomplete { .. })),
                 "further samples are taken too early",
             )?;
             b.render(region(0, 11, 20, 12), 0..all).map_err(|e| e.to_string())?;
@@ -422,7 +422,7 @@ impl Backend for Wrong<'_> {
         }
         match self.inner.submit(tile, samples) {
             Err(RenderError::NoFilm) if self.how == How::IgnoresAMissingFilm => Ok(()),
-            Err(RenderError::TooEarly { .. }) if self.how == How::TakesFurtherSamplesEarly => Ok(()),
+            Err(RenderError::PilotIncomplete { .. }) if self.how == How::TakesFurtherSamplesEarly => Ok(()),
             told => told,
         }
     }

@@ -6,7 +6,7 @@ use wgray::scene::Description;
 use wgray_render::cpu::camera::camera_ray;
 use wgray_render::cpu::geometry::closest_hit;
 use wgray_render::cpu::surface::surface_at;
-use wgray_render::records::{NOTHING, NOWHERE};
+use wgray_render::records::{NO_INDEX, NOWHERE};
 
 use crate::oracle::{Flaw, Oracle};
 use crate::pictures::{differing, exact_ways, means, reference, render};
@@ -231,7 +231,7 @@ fn rays_start_a_little_above_their_surface() {
                 let at = glam::Vec2::new((random.unit() * 48.0) as f32, (random.unit() * 36.0) as f32);
                 let ray = camera_ray(&scene.camera, at);
                 let hit = closest_hit(&scene, ray, NOWHERE, NOWHERE);
-                if hit.primitive == NOTHING {
+                if hit.primitive == NO_INDEX {
                     continue;
                 }
                 let epsilon = scene.environment.shadow_epsilon;

@@ -20,7 +20,7 @@ use wgray_render::cpu::slab::{fan, slabs};
 use wgray_render::cpu::surface::Surface;
 use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type};
 use wgray_render::records::{
-    Camera, ELLIPSOID, FAR, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material, NOTHING, NOWHERE, Node, PAD,
+    Camera, ELLIPSOID, FAR, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material, NO_INDEX, NOWHERE, Node, PAD,
     Primitive, SMALLEST_ALPHA, Sphere, Texture,
 };
 
@@ -168,7 +168,7 @@ impl Face {
             v: columns.y_axis.as_vec3(),
             w: columns.z_axis.as_vec3(),
             shape: random.below(4),
-            attributes: random.pick(&[NOTHING, 9]),
+            attributes: random.pick(&[NO_INDEX, 9]),
             has_uvs: uvs,
             size: corners
                 .iter()
@@ -344,7 +344,7 @@ impl Situation {
             u: (vector(random) * size).as_vec3(),
             finite: if directional { 0.0 } else { 1.0 },
             v: (vector(random) * size).as_vec3(),
-            primitive: NOTHING,
+            primitive: NO_INDEX,
             color: color(random),
             number: random.below(4),
             normal: vector(random).normalize().as_vec3(),
@@ -384,7 +384,7 @@ impl Situation {
                 Hit {
                     t: random.pick(&[FAR, self.t() as f32]),
                     instance: random.pick(&[0, 0, 1, 2]),
-                    primitive: random.pick(&[NOTHING, 0, 7]),
+                    primitive: random.pick(&[NO_INDEX, 0, 7]),
                     slot: random.below(9),
                     barycentric: self.face.barycentric.as_vec2(),
                 }
@@ -551,8 +551,8 @@ impl Situation {
             intensity: each(&|_| random.pick(&[random.magnitude(-9.0, 0.0), 0.0]) as f32),
             edge: each(&|_| random.pick(&[0.0, random.unit()]) as f32),
             sides: below(2) + 1,
-            parent: UVec4::new(random.pick(&[NOTHING, 0]), 0, 0, 0),
-            children: UVec4::splat(random.pick(&[NOTHING, 1])),
+            parent: UVec4::new(random.pick(&[NO_INDEX, 0]), 0, 0, 0),
+            children: UVec4::splat(random.pick(&[NO_INDEX, 1])),
             density: each(&|_| random.magnitude(-9.0, 9.0) as f32),
             instance: below(2),
             index: below(4),

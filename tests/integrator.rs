@@ -11,7 +11,7 @@ use wgray_render::cpu::ray::Ray;
 use wgray_render::cpu::rng::unit_float;
 use wgray_render::cpu::sampling::{decision_bits, sample_key, sample_square};
 use wgray_render::cpu::shadow::Block;
-use wgray_render::records::{NOTHING, NOWHERE, Packed, RANDOM};
+use wgray_render::records::{NO_INDEX, NOWHERE, Packed, RANDOM};
 
 use crate::pictures::{Way, differing, exact_ways, reference, render_with};
 use crate::{scenes, sources};
@@ -21,7 +21,7 @@ const FILE: &str = "integrators/phong.wgsl";
 const WGSL: &str = "
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
     let hit = closest_hit(ray, NOWHERE, NOWHERE);
-    if hit.primitive == NOTHING {
+    if hit.primitive == NO_INDEX {
         return environment.background;
     }
     let spot = spot_of(hit);
@@ -30,7 +30,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
     let random = vec3f(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
     let up = normalize(surface.shading_normal + random);
     let next = closest_hit(Ray(surface.start, up), surface.above, surface.below);
-    var sum = vec3f(select(0.0, 0.5, next.primitive == NOTHING));
+    var sum = vec3f(select(0.0, 0.5, next.primitive == NO_INDEX));
     for (var i = 0u; i < light_counts().y; i++) {
         let light = load_light(i);
         let block = Block(RANDOM, 1u, 0u, 1u, sample, sample_key(pixel, camera.seed, 1u + light.number));
@@ -45,7 +45,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
 /// The same in Rust.
 fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     let hit = closest_hit(scene, ray, NOWHERE, NOWHERE);
-    if hit.primitive == NOTHING {
+    if hit.primitive == NO_INDEX {
         return scene.environment.background;
     }
     let spot = spot_of(scene, hit);
@@ -57,7 +57,7 @@ fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
         direction: normalize(surface.shading_normal + random),
     };
     let next = closest_hit(scene, up, surface.above, surface.below);
-    let mut sum = Vec3::splat(if next.primitive == NOTHING { 0.5 } else { 0.0 });
+    let mut sum = Vec3::splat(if next.primitive == NO_INDEX { 0.5 } else { 0.0 });
     for light in &scene.lights {
         let key = sample_key(pixel, scene.camera.seed, 1 + light.number);
         let block = Block {

@@ -105,7 +105,7 @@ fn constants_have_their_values() {
     };
     assert_eq!(value("FAR"), f32::MAX.to_bits());
     assert_eq!(value("EVIDENCE"), wgray_render::records::EVIDENCE.to_bits());
-    assert_eq!(value("NOTHING"), u32::MAX);
+    assert_eq!(value("NO_INDEX"), u32::MAX);
     assert_eq!(value("PLANE"), wgray_render::records::PLANE);
     assert_eq!(value("FOR_NORMAL"), wgray_render::records::FOR_NORMAL);
 }

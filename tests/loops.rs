@@ -164,7 +164,7 @@ fn a_sample_that_is_too_long_is_an_error_or_right() {
                 assert!(!cuts, "{name}, {way:?}: it is too long for this driver");
                 assert_eq!(differing(&film, &reference(&packed)), 0, "{name}, {way:?}");
             }
-            Err(RenderError::CutShort { .. }) => assert!(cuts, "{name}, {way:?}: nothing cuts it short"),
+            Err(RenderError::LoopTruncated { .. }) => assert!(cuts, "{name}, {way:?}: nothing cuts it short"),
             Err(error) => panic!("{name}, {way:?}: {error}"),
         }
     }
@@ -179,7 +179,7 @@ fn a_sample_that_is_too_long_is_an_error_or_right() {
                 bytemuck::cast_slice::<_, u8>(&cpu)
             );
         }
-        Err(error) => assert!(cuts && matches!(error, RenderError::CutShort { .. }), "{error}"),
+        Err(error) => assert!(cuts && matches!(error, RenderError::LoopTruncated { .. }), "{error}"),
     }
 }
 
@@ -197,7 +197,7 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
                 assert!(!(cuts && too_long), "{rounds} rounds were not noticed");
                 assert!(has_rounds(&film, &plain, rounds), "{rounds} rounds: a wrong picture");
             }
-            Err(RenderError::CutShort { .. }) => assert!(cuts && too_long, "{rounds} rounds are not too many"),
+            Err(RenderError::LoopTruncated { .. }) => assert!(cuts && too_long, "{rounds} rounds are not too many"),
             Err(error) => panic!("{rounds} rounds: {error}"),
         }
     }
@@ -209,7 +209,10 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
         baked: false,
     };
     let refused = wgray_render::gpu::Gpu::new(device, &packed, &unsigned, options).err();
-    assert!(matches!(refused, Some(RenderError::CutShort { .. })), "{refused:?}");
+    assert!(
+        matches!(refused, Some(RenderError::LoopTruncated { .. })),
+        "{refused:?}"
+    );
 }
 
 /// Negative control: where the driver cuts loops and nothing watches, a picture is wrong.

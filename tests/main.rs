@@ -49,6 +49,7 @@ mod scenes;
 mod schema;
 mod sources;
 mod statistics;
+mod structure;
 mod textures;
 mod twins;
 mod unchanged;

@@ -5,7 +5,7 @@ use wgray::Scene;
 use wgray_image::Region;
 use wgray_render::cpu::panorama::{panorama_differential, panorama_ray};
 use wgray_render::job::Cut;
-use wgray_render::records::{NOTHING, Packed};
+use wgray_render::records::{NO_INDEX, Packed};
 
 use crate::pictures::{backend, both, crop, differing, film, first_hits, means, render};
 use crate::scenes::parse;
@@ -88,9 +88,9 @@ fn a_sphere_is_seen_where_it_is_and_fills_its_solid_angle() {
                 let sine = center.cross(to).length();
                 if (sine - 0.3).abs() > 1e-5 {
                     let seen = sine < 0.3 && center.dot(to) > 0.0;
-                    assert_eq!(hit.shape != NOTHING, seen, "{way:?} {east} {north}: pixel {x}, {y}");
+                    assert_eq!(hit.shape != NO_INDEX, seen, "{way:?} {east} {north}: pixel {x}, {y}");
                 }
-                if hit.shape != NOTHING {
+                if hit.shape != NO_INDEX {
                     // The depth goes along the ray, to the nearer side.
                     let along = 10.0 * (center.dot(to) - (center.dot(to).powi(2) - 1.0 + 0.09).sqrt());
                     assert!((f64::from(hit.depth) - along).abs() < 1e-3, "{} {along}", hit.depth);

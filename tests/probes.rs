@@ -103,7 +103,7 @@ use wgray_render::cpu::warp::{
 use wgray_render::gpu::Device;
 use wgray_render::gpu::naga::ScalarKind;
 use wgray_render::records::{
-    Camera, FirstHit, Instance, Light, LightNode, Material, NOTHING, Node, Primitive, Sphere, Texture,
+    Camera, FirstHit, Instance, Light, LightNode, Material, NO_INDEX, Node, Primitive, Sphere, Texture,
 };
 
 use crate::adapter::{self, allowed, judge};
@@ -722,7 +722,7 @@ fn nan_does_not_spread_where_it_must_not() {
         primitive: 3,
         ..no_hit()
     };
-    assert_eq!(closer(hit, f32::NAN, 4, NOTHING), hit);
+    assert_eq!(closer(hit, f32::NAN, 4, NO_INDEX), hit);
     let source = shared_source();
     let module = parse(&source);
     let random = Random::new(7);

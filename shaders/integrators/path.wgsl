@@ -39,7 +39,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     var state = before;
     let path = before.path;
     let hit = closest_hit(path.ray, path.left, path.wall);
-    let met = hit.primitive != NOTHING;
+    let met = hit.primitive != NO_INDEX;
     let shown = ((ALPHA == 0u) & ((SURROUNDINGS & UNSEEN_AROUND) == 0u)) | (path.depth > 0u);
     var arriving = environment.radiance;
     if (SURROUNDINGS & IMAGE_AROUND) != 0u {

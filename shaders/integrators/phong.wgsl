@@ -10,7 +10,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
     }
     if BOUNCES == 0u {
         let hit = closest_hit(path.ray, path.left, path.wall);
-        if hit.primitive == NOTHING {
+        if hit.primitive == NO_INDEX {
             return environment.background;
         }
         return radiance_from(spot_of(hit), hit, path, pixel, sample);
@@ -23,7 +23,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
         var spot: Spot;
         while path.depth <= BOUNCES {
             hit = closest_hit(path.ray, path.left, path.wall);
-            if hit.primitive == NOTHING {
+            if hit.primitive == NO_INDEX {
                 break;
             }
             spot = spot_of(hit);
@@ -31,7 +31,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
                 break;
             }
             if path.depth == BOUNCES {
-                hit.primitive = NOTHING;
+                hit.primitive = NO_INDEX;
                 break;
             }
             let scattered = scatter(spot, hit, path, pixel, sample);
@@ -42,7 +42,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
             }
         }
         var seen = environment.background;
-        if hit.primitive != NOTHING {
+        if hit.primitive != NO_INDEX {
             seen = radiance_from(spot, hit, path, pixel, sample);
         }
         sum += path.throughput * seen;
@@ -64,7 +64,7 @@ fn scatter(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scatt
     if material.kind == MIRROR {
         return mirrored_path(path, surface, at, material);
     }
-    let bits = decision_bits(pixel, camera.seed, sample, path.depth * LEAVES + path.branch, NOTHING);
+    let bits = decision_bits(pixel, camera.seed, sample, path.depth * LEAVES + path.branch, NO_INDEX);
     return glass_path(path, surface, at, material, unit_float(bits.x));
 }
 

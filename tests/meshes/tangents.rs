@@ -12,7 +12,7 @@ use wgray_render::cpu::normal_map::mapped_normal;
 use wgray_render::cpu::primitive::Tangents;
 use wgray_render::cpu::ray::{Hit, Ray};
 use wgray_render::cpu::texture::appearance;
-use wgray_render::records::{NOTHING, Packed};
+use wgray_render::records::{NO_INDEX, Packed};
 
 use super::forms::{HEAD, Sheet, scene};
 use crate::pictures::reference;
@@ -233,7 +233,7 @@ fn a_picture_shows_no_triangles() {
     let mut packed = leaning(&Sheet::sphere(16, 8).obj(), "", &shape);
     let found = largest_step(&packed);
     // The control: the triangles' own tangents.
-    packed.instances[0].tangents = NOTHING;
+    packed.instances[0].tangents = NO_INDEX;
     let by_triangle = largest_step(&packed);
     println!("steps of {found}, {by_triangle} without tangents");
     assert!(found < 0.005 && by_triangle > 0.015, "{found} {by_triangle}");
@@ -317,14 +317,14 @@ fn only_smooth_meshes_with_normal_maps_have_tangents() {
     let sphere = Sheet::sphere(16, 8);
     let (with, count) = (leaning(&sphere.obj(), "", ""), 17 * 9);
     assert_eq!(with.meshes[0].tangents.len(), count - 2); // a pole's vertices are of a triangle each, but for one
-    assert!(with.instances[0].tangents != NOTHING);
+    assert!(with.instances[0].tangents != NO_INDEX);
     let flat = leaning(&sphere.obj(), "", "normals = 'flat'");
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("mesh.obj"), sphere.obj()).unwrap();
     let text = format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'mesh.obj'\nmaterial = 'm'");
     for packed in [flat, scene(&text, folder.path())] {
         assert!(packed.meshes[0].tangents.is_empty());
-        assert_eq!(packed.instances[0].tangents, NOTHING);
+        assert_eq!(packed.instances[0].tangents, NO_INDEX);
         let spot: Spot = spot_of(&packed, hit(&packed, 0, Vec2::ZERO));
         assert_eq!(spot.tangents_0, Tangents::default());
         assert_eq!(face_frame(&spot, Vec2::ZERO), face_tangents(&spot));

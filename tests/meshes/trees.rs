@@ -17,7 +17,7 @@ use wgray_render::cpu::slab::{box_passage, is_passed, slabs};
 use wgray_render::cpu::surface::{Surface, largest};
 use wgray_render::cpu::traverse::{closest_primitive, hidden_by_primitives};
 use wgray_render::records::{
-    BLOCK, CASTS_SHADOW, FAR, INSTANCE, Instance, Item, Light, NO_SHADOW, NOTHING, NOWHERE, Packed, RANDOM,
+    BLOCK, CASTS_SHADOW, FAR, INSTANCE, Instance, Item, Light, NO_INDEX, NO_SHADOW, NOWHERE, Packed, RANDOM,
 };
 
 use super::forms::{Form, HEAD, scene};
@@ -222,7 +222,7 @@ impl<'a> Aims<'a> {
         let size = (self.high - self.low).max_element() * self.random.pick(&[0.0, 0.1, 1.0]);
         let edge = || (Vec3::new(self.number(), self.number(), self.number()) - 0.5) * size;
         let mut light: Light = bytemuck::Zeroable::zeroed();
-        light.primitive = NOTHING;
+        light.primitive = NO_INDEX;
         (light.u, light.v) = (edge(), edge());
         if self.random.once_in(4) {
             (light.center, light.finite, light.reach) = ((end - start).normalize_or(Vec3::Z), 0.0, 1e10);
@@ -283,7 +283,7 @@ fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
         let rule = nearest(scene, ray, left, NOWHERE);
         let found = closest_hit(scene, ray, left, NOWHERE);
         hits += u32::from(bits(rule) != bits(found) || rule.slot != found.slot);
-        met += u32::from(rule.primitive != NOTHING);
+        met += u32::from(rule.primitive != NO_INDEX);
         let (surface, light, block) = aims.shadow();
         let rule = hidden(scene, &surface, &light, block);
         // Of samples that light nothing trees are not asked.

@@ -7,7 +7,7 @@ use wgray_render::cpu::geometry::{closest_hit, hidden_samples};
 use wgray_render::cpu::ray::Ray;
 use wgray_render::cpu::shadow::Block;
 use wgray_render::cpu::surface::Surface;
-use wgray_render::records::{CASTS_SHADOW, FAR, GRID, Instance, Light, NOTHING, NOWHERE, Packed};
+use wgray_render::records::{CASTS_SHADOW, FAR, GRID, Instance, Light, NO_INDEX, NOWHERE, Packed};
 
 use super::forms::{Form, HEAD, scene};
 use crate::random::Random;
@@ -155,7 +155,7 @@ fn is_hidden(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool 
         center: (origin.as_dvec3() + direction.as_dvec3() * times).as_vec3(),
         finite: 1.0,
         reach: 1.0 - 1e-5,
-        primitive: NOTHING,
+        primitive: NO_INDEX,
         ..bytemuck::Zeroable::zeroed()
     };
     let block = Block {

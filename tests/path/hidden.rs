@@ -2,7 +2,7 @@
 
 use glam::UVec2;
 use wgray_render::cpu::geometry::pixel_first_hit;
-use wgray_render::records::{NOTHING, Packed};
+use wgray_render::records::{NO_INDEX, Packed};
 
 use crate::pictures::{both, differing, exact_ways, means, reference, render};
 use crate::scenes;
@@ -70,7 +70,7 @@ fn the_camera_sees_what_is_behind_and_mirrors_see_the_lamp() {
         for i in 0..24 * 24 {
             let pixel = UVec2::new(i % 24, i / 24);
             let (a, b) = (pixel_first_hit(&hidden, pixel), pixel_first_hit(&without, pixel));
-            assert_eq!(a.shape == NOTHING, b.shape == NOTHING, "{pixel}");
+            assert_eq!(a.shape == NO_INDEX, b.shape == NO_INDEX, "{pixel}");
             assert!(
                 (a.depth - b.depth).abs() < 1e-5 && (a.normal - b.normal).length() < 1e-6,
                 "{pixel}"

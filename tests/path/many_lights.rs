@@ -7,7 +7,7 @@ use wgray::scene::{Description, PointLightDescription};
 use wgray_render::cpu::light_choice::{chosen_light, met_density};
 use wgray_render::cpu::ray::Hit;
 use wgray_render::cpu::rng::hash4;
-use wgray_render::records::{NOTHING, Packed};
+use wgray_render::records::{NO_INDEX, Packed};
 
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_ways, reference, render};
@@ -57,7 +57,7 @@ struct Leaf {
 fn leaves(packed: &Packed) -> Vec<Leaf> {
     let mut found = Vec::new();
     for node in &packed.light_nodes {
-        for i in (0..4).filter(|i| node.intensity[*i] > 0.0 && node.children[*i] == NOTHING) {
+        for i in (0..4).filter(|i| node.intensity[*i] > 0.0 && node.children[*i] == NO_INDEX) {
             found.push(Leaf {
                 density: node.density[i],
                 instance: node.instance[i],
@@ -78,7 +78,7 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
         let of_tree = packed.emitters[0];
         assert_eq!(
             (packed.emitters.len(), of_tree.index),
-            (1 + usize::from(!far.is_empty()), NOTHING)
+            (1 + usize::from(!far.is_empty()), NO_INDEX)
         );
         for (p, n) in [
             (Vec3::new(0.3, 0.2, 0.0), Vec3::Z),
@@ -104,7 +104,7 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
                 }
                 // With a sun beside it, the tree is chosen by its share, which all leaves' densities have.
                 let primitive = packed.lights[leaf.index as usize].primitive;
-                if primitive != NOTHING {
+                if primitive != NO_INDEX {
                     let hit = Hit {
                         t: 1.0,
                         instance: 0,
@@ -276,8 +276,8 @@ fn meshes_that_shine_are_in_the_tree() {
     let packed = load(&text(&[mesh("s", -0.7), mesh("m", 9.0), mesh("s", 0.7)].concat(), 16));
     assert_eq!(leaves(&packed).len(), 160);
     let first: Vec<u32> = packed.instances.iter().map(|instance| instance.leaves).collect();
-    assert_eq!(first[1], NOTHING);
-    assert!(first[0] != NOTHING && first[2] != NOTHING);
+    assert_eq!(first[1], NO_INDEX);
+    assert!(first[0] != NO_INDEX && first[2] != NO_INDEX);
     let expected = reference(&packed);
     for way in exact_ways() {
         assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");

@@ -11,7 +11,7 @@ use wgray_render::cpu::integrators::phong::scatter;
 use wgray_render::cpu::path::Path;
 use wgray_render::cpu::path::is_specular;
 use wgray_render::cpu::surface::{Surface, with_coordinates};
-use wgray_render::records::{NOTHING, NOWHERE, Packed, Primitive};
+use wgray_render::records::{NO_INDEX, NOWHERE, Packed, Primitive};
 
 use super::scene;
 use crate::meshes::forms::Sheet;
@@ -140,7 +140,7 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, Arrival, u32)
     };
     loop {
         let hit = closest_hit(scene, path.ray, path.left, path.wall);
-        if hit.primitive == NOTHING {
+        if hit.primitive == NO_INDEX {
             return None;
         }
         let spot = spot_of(scene, hit);
@@ -388,7 +388,7 @@ fn points_of_a_mesh_change_as_on_neighbouring_rays() {
             let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
             let ray = camera_ray(&packed.camera, at);
             let hit = closest_hit(&packed, ray, NOWHERE, NOWHERE);
-            if hit.primitive == NOTHING {
+            if hit.primitive == NO_INDEX {
                 continue;
             }
             let spot = spot_of(&packed, hit);

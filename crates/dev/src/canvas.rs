@@ -353,7 +353,7 @@ impl Canvas {
 
     fn hits_so_far(&self, aov: Aov) -> Content {
         let nothing = FirstHit {
-            shape: wgray_render::records::NOTHING,
+            shape: wgray_render::records::NO_INDEX,
             ..bytemuck::Zeroable::zeroed()
         };
         let mut hits = self.hits.clone();

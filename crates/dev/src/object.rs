@@ -9,7 +9,7 @@ use toml::{Table, Value};
 use super::edit::{Layout, line_end, line_start};
 use super::source::{Loaded, Sources};
 use wgray_render::cpu::geometry::pixel_first_hit;
-use wgray_render::records::{Camera, NOTHING, Packed};
+use wgray_render::records::{Camera, NO_INDEX, Packed};
 use wgray_scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDescription, fields};
 
 /// Maximum number of lines that are shown of a table.
@@ -114,7 +114,7 @@ impl SceneView {
             ..loaded.packed.clone()
         };
         let hit = pixel_first_hit(&packed, pixel);
-        if hit.shape == NOTHING {
+        if hit.shape == NO_INDEX {
             let around = if loaded.description.environment.is_some() {
                 "environment"
             } else {

@@ -12,7 +12,7 @@ use super::pixel_values::{Scaled, bits, bytes, numbers};
 use wgray_image::{Pixels, difference};
 use wgray_render::gpu::marks::MAX_NAME_LEN;
 use wgray_render::output::{self as image, Aov, AovSource};
-use wgray_render::records::{FirstHit, NOTHING};
+use wgray_render::records::{FirstHit, NO_INDEX};
 use wgray_scene::Integrator;
 
 /// The view of the scene.
@@ -195,7 +195,7 @@ impl Content {
             Content::Samples(counts, total) => bytes(counts, |n| Vec3::splat(*n as f32 / (*total).max(1) as f32)),
             Content::Hits(aov, hits) => {
                 let middle = hits.get((height / 2 * width + width / 2) as usize);
-                let middle_depth = middle.filter(|hit| hit.shape != NOTHING).map_or(1.0, |hit| hit.depth);
+                let middle_depth = middle.filter(|hit| hit.shape != NO_INDEX).map_or(1.0, |hit| hit.depth);
                 bytes(hits, |hit| aov.color_of_hit(hit, middle_depth))
             }
             Content::Layer(values, _) => bytes(&values.colors, |color| Vec3::from(*color)),
@@ -394,7 +394,7 @@ impl Frame {
     }
 
     fn hit(&self, aov: Aov, hit: &FirstHit) -> Vec<(&'static str, String)> {
-        if hit.shape == NOTHING {
+        if hit.shape == NO_INDEX {
             return vec![("hit", "nothing".to_string())];
         }
         let Names { shapes, instances, .. } = self.names;

@@ -1,4 +1,4 @@
-//! What all requests to the server share.
+//! Resources that all requests to the server share.
 
 use std::sync::Arc;
 

@@ -32,12 +32,10 @@ pub fn install_quiet_hook() {
 /// # Errors
 ///
 /// The message of their panic. What the calls have touched is fit for being dropped, and for nothing else.
-pub fn contained<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
+pub fn catch_panic<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
     let _inside = Inside::enter();
     catch_unwind(AssertUnwindSafe(calls)).map_err(|panic| message(panic.as_ref()))
 }
-
-pub use contained as catch_panic;
 
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
@@ -86,7 +84,7 @@ impl<T> Drop for DropContained<T> {
     fn drop(&mut self) {
         // SAFETY: the value is not used any more.
         let value = unsafe { ManuallyDrop::take(&mut self.0) };
-        let _ = contained(|| drop(value)); // nobody is left to be told
+        let _ = catch_panic(|| drop(value)); // nobody is left to be told
     }
 }
 
@@ -104,14 +102,14 @@ mod tests {
 
     #[test]
     fn a_panic_is_an_error_with_its_message() {
-        assert_eq!(contained(|| 7), Ok(7));
-        assert_eq!(contained(|| panic!("text")), Err::<(), _>("text".to_string()));
+        assert_eq!(catch_panic(|| 7), Ok(7));
+        assert_eq!(catch_panic(|| panic!("text")), Err::<(), _>("text".to_string()));
         let causes = "Error in Device::poll: Validation Error\n\nCaused by:\n  Parent device is lost\n";
-        let told = contained(|| panic!("{causes}"));
+        let told = catch_panic(|| panic!("{causes}"));
         let line = "Error in Device::poll: Validation Error: Caused by:: Parent device is lost";
         assert_eq!(told, Err::<(), _>(line.to_string()));
         assert_eq!(
-            contained(|| std::panic::panic_any(7)),
+            catch_panic(|| std::panic::panic_any(7)),
             Err::<(), _>("it panicked".to_string())
         );
     }
@@ -119,14 +117,14 @@ mod tests {
     #[test]
     fn panics_are_contained_inside_alone() {
         assert!(!is_contained());
-        let inner = contained(|| {
-            let deeper = contained(|| panic!("deeper"));
+        let inner = catch_panic(|| {
+            let deeper = catch_panic(|| panic!("deeper"));
             assert_eq!(deeper, Err::<(), _>("deeper".to_string()));
             is_contained()
         });
         assert_eq!(inner, Ok(true));
         assert_eq!(
-            contained(|| std::thread::spawn(is_contained).join().ok()),
+            catch_panic(|| std::thread::spawn(is_contained).join().ok()),
             Ok(Some(false))
         );
         assert!(!is_contained());

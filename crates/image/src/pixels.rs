@@ -1,6 +1,6 @@
 //! Images in memory.
 
-/// A picture in memory.
+/// An image in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pixels {
     /// Columns.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A rectangle of pixels of a picture, half-open.
+/// A half-open rectangle of pixels of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
     /// First column.
@@ -16,7 +16,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// The whole of a picture.
+    /// Returns the region of a whole image.
     pub fn whole(width: u32, height: u32) -> Region {
         Region {
             x0: 0,
@@ -26,27 +26,27 @@ impl Region {
         }
     }
 
-    /// Columns; 0 if the last is before the first.
+    /// Returns the number of columns; 0 if the last is before the first.
     pub fn width(&self) -> u32 {
         self.x1.saturating_sub(self.x0)
     }
 
-    /// Rows; 0 if the last is before the first.
+    /// Returns the number of rows; 0 if the last is before the first.
     pub fn height(&self) -> u32 {
         self.y1.saturating_sub(self.y0)
     }
 
-    /// Whether it has no pixels.
+    /// Returns true if it has no pixels.
     pub fn is_empty(&self) -> bool {
         self.pixels() == 0
     }
 
-    /// Pixels.
+    /// Returns the number of pixels.
     pub fn pixels(&self) -> u64 {
         u64::from(self.width()) * u64::from(self.height())
     }
 
-    /// The region and the pixels beside it, which may be outside of a picture.
+    /// Returns the region with its neighboring pixels, which may lie outside of the image.
     pub fn with_neighbors(&self) -> Region {
         Region {
             x0: self.x0.saturating_sub(1),
@@ -56,7 +56,7 @@ impl Region {
         }
     }
 
-    /// The part that is in another region too.
+    /// Returns the intersection with another region.
     pub fn within(&self, other: Region) -> Region {
         let x = |x: u32| x.max(other.x0).min(other.x1);
         let y = |y: u32| y.max(other.y0).min(other.y1);

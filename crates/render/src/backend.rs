@@ -47,8 +47,8 @@ use wgray_image::Region;
 /// - [`RenderError::NoFilm`]: `submit` or `film` without a film;
 /// - [`RenderError::Pending`]: anything but `poll` and `wait` while a call is pending;
 /// - [`RenderError::Outside`]: a tile that is not inside the film, or a film or first hits that are not inside the picture;
-/// - [`RenderError::WrongFilm`]: `resume` with a film that is not of the scene's form;
-/// - [`RenderError::TooEarly`]: further samples before all pixels of the film have their first ones.
+/// - [`RenderError::FilmMismatch`]: `resume` with a film that is not of the scene's form;
+/// - [`RenderError::PilotIncomplete`]: further samples before all pixels of the film have their first ones.
 ///
 /// Any other error is the device's. After it nothing is pending and there is no film; `begin` and `resume` may work.
 pub trait Backend {
@@ -184,7 +184,7 @@ impl Rules {
         for (list, (what, wanted, scene)) in film.lists().zip(known.into_iter().chain(of_layers)) {
             let found = list.len() as u64;
             if found != wanted {
-                return Err(RenderError::WrongFilm(format!(
+                return Err(RenderError::FilmMismatch(format!(
                     "{found} {what} for {pixels} pixels; {scene} has {wanted}"
                 )));
             }
@@ -206,7 +206,7 @@ impl Rules {
             let first = samples.end.min(self.first_look).saturating_sub(samples.start);
             let there = film.first_samples + tile.pixels() * u64::from(first);
             if samples.end > self.first_look && there < film.region.pixels() * u64::from(self.first_look) {
-                return Err(RenderError::TooEarly {
+                return Err(RenderError::PilotIncomplete {
                     samples: samples.clone(),
                     first: self.first_look,
                 });

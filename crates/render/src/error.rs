@@ -70,7 +70,7 @@ pub enum RenderError {
         "{device}: this driver ends long loops early, even for a single sample of a pixel; use fewer shapes, lights or \
          light samples, or the CPU"
     )]
-    CutShort {
+    LoopTruncated {
         /// The adapter's name.
         device: String,
     },
@@ -102,13 +102,13 @@ pub enum RenderError {
     },
     /// A film that cannot be resumed for this scene.
     #[error("the film does not fit the scene: {0}")]
-    WrongFilm(String),
+    FilmMismatch(String),
     /// Adaptive samples before the first samples of all pixels, which decide how many are needed.
     #[error(
         "samples {} to {} come too early: some pixels of the film do not have their first {first} yet",
         samples.start, samples.end
     )]
-    TooEarly {
+    PilotIncomplete {
         /// The samples.
         samples: Range<u32>,
         /// Number of first samples of every pixel.

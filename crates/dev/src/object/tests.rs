@@ -308,7 +308,7 @@ fn what_is_hit_is_what_the_first_hits_say() {
         for x in (0..40).step_by(3) {
             let hit = pixel_first_hit(&pack(&moved), UVec2::new(x, y));
             let wanted = match hit.shape {
-                NOTHING => "render".to_owned(),
+                NO_INDEX => "render".to_owned(),
                 2 => "lights[0]".to_owned(),
                 shape => format!("shapes[{shape}]"),
             };

@@ -32,7 +32,7 @@ impl Painter {
                 self.since = None;
                 self.settle((Instant::now(), true)); // the scene may have changed meanwhile, which the running kernel can show
             }
-            Some(Err(error @ (RenderError::CutShort { .. } | RenderError::Shader(_)))) => {
+            Some(Err(error @ (RenderError::LoopTruncated { .. } | RenderError::Shader(_)))) => {
                 let tried = match built.refused {
                     Some(_) => self.good.clone().unwrap_or(pending.shaders),
                     None => pending.shaders,
@@ -155,7 +155,8 @@ impl Painter {
     /// Handles an error of the device: opens it again, a few times. If the driver truncates the kernel, the last good
     /// shaders are used instead, or rendering halts if there are no others.
     pub(super) fn fail(&mut self, error: &RenderError) {
-        if let (RenderError::CutShort { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running) {
+        if let (RenderError::LoopTruncated { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running)
+        {
             if self.good.as_ref().is_some_and(|good| *good != running.shaders) {
                 let shaders = (running.shaders.clone(), running.constants);
                 self.stop_running();

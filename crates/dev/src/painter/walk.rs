@@ -9,7 +9,7 @@ use crate::camera::{Move, Viewpoint, dollied, framed, moved, placed};
 use wgray_image::Region;
 use wgray_render::backend::Backend as _;
 use wgray_render::cpu::Cpu;
-use wgray_render::records::NOTHING;
+use wgray_render::records::NO_INDEX;
 use wgray_scene::{Bounds, CameraDescription, Geometry, Light, Scene};
 
 /// Maximum number of viewpoints that are kept.
@@ -108,7 +108,7 @@ impl Painter {
             y1: y.checked_add(1)?,
         };
         let hit = *Cpu::new(&packed).first_hits(pixel).ok()?.first()?;
-        if hit.shape == NOTHING {
+        if hit.shape == NO_INDEX {
             return None;
         }
         let number = hit.shape as usize;

@@ -11,7 +11,7 @@ use super::rng::{hash4, unit_float};
 use super::surface::Surface;
 use super::texture::{channel_of, texture_color};
 use super::vertices::{uv_in_set, with_vertex_colors};
-use crate::records::{FOR_OPACITY, MASK, MOST_PASSED, Material, NOTHING, OPACITY_CHANNEL, OPAQUE, Packed};
+use crate::records::{FOR_OPACITY, MASK, MOST_PASSED, Material, NO_INDEX, OPACITY_CHANNEL, OPAQUE, Packed};
 
 pub const ONWARD: u32 = 0;
 pub const TO_LIGHT: u32 = 1;
@@ -96,7 +96,7 @@ pub fn is_veiled(
     let mut rest = way * reach;
     for _ in 0..=MOST_PASSED {
         let hit = closest_hit(scene, ray, left, wall);
-        if (hit.primitive == NOTHING) | !matches!(hit.t.partial_cmp(&rest), Some(std::cmp::Ordering::Less)) {
+        if (hit.primitive == NO_INDEX) | !matches!(hit.t.partial_cmp(&rest), Some(std::cmp::Ordering::Less)) {
             return false;
         }
         let spot = spot_of(scene, hit);
@@ -119,7 +119,7 @@ pub fn first_seen(scene: &Packed, ray: Ray, met: Hit) -> Hit {
     let mut onward = ray;
     let mut way = 0.0;
     for _ in 0..MOST_PASSED {
-        if hit.primitive == NOTHING {
+        if hit.primitive == NO_INDEX {
             break;
         }
         let spot = spot_of(scene, hit);

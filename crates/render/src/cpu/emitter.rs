@@ -18,7 +18,7 @@ use super::texture::texture_color;
 use super::vertices::{uv_in_set, vertex_color};
 use super::warp::{disk_sample, triangle_sample};
 use crate::records::{
-    COLORS_OF_EMISSION, DISK, ELLIPSOID, ENVIRONMENT, Emitter, FOR_EMISSION, Light, Material, NOTHING, POINT, Packed,
+    COLORS_OF_EMISSION, DISK, ELLIPSOID, ENVIRONMENT, Emitter, FOR_EMISSION, Light, Material, NO_INDEX, POINT, Packed,
     RECTANGLE, SPOT, TRIANGLE,
 };
 
@@ -154,7 +154,7 @@ pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSam
         pdf: solid_angle_pdf(density, to, face.primitive.z),
         is_delta: false,
         reach: scene.environment.reach,
-        primitive: NOTHING,
+        primitive: NO_INDEX,
     }
 }
 

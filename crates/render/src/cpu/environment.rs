@@ -7,7 +7,7 @@ use super::light_sample::power_heuristic;
 use super::math::{dot, min, normalize};
 use super::rng::{hash4, unit_float};
 use super::surroundings::{cell_towards, column_after, direction_in_cell, normal_bin};
-use crate::records::{ENVIRONMENT_BLOCKS, Light, NOTHING, Packed};
+use crate::records::{ENVIRONMENT_BLOCKS, Light, NO_INDEX, Packed};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arriving {
@@ -135,6 +135,6 @@ pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) 
         pdf: arriving.pdf,
         is_delta: false,
         reach: light.reach,
-        primitive: NOTHING,
+        primitive: NO_INDEX,
     }
 }

@@ -21,7 +21,7 @@ use super::surface::{Surface, first_hit, surface_at, with_coordinates};
 use super::traverse::{closest_primitive, hidden_by_primitives, is_hidden_by_primitives};
 use super::tree::{closest_in_tree, hidden_by_tree, is_hidden_by_tree};
 use crate::records::{
-    FirstHit, HIDDEN_BACK, Instance, Light, MOST_HIDDEN, Material, NO_SHADOW, NOTHING, NOWHERE, Packed, SOME_SHADOWS,
+    FirstHit, HIDDEN_BACK, Instance, Light, MOST_HIDDEN, Material, NO_INDEX, NO_SHADOW, NOWHERE, Packed, SOME_SHADOWS,
 };
 
 pub fn closest_hit(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
@@ -91,7 +91,7 @@ fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
         anchor: i.anchor,
         condition: i.condition,
     };
-    if i.attributes != NOTHING {
+    if i.attributes != NO_INDEX {
         let [n0, n1, n2] = corners.map(|vertex| mesh.attributes[vertex]);
         face.normal_0 = normal_from_mesh(i, n0.xyz());
         face.normal_1 = normal_from_mesh(i, n1.xyz());
@@ -102,7 +102,7 @@ fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
             face.uv_2 = Vec2::new(p2.w, n2.w);
         }
     }
-    if i.tangents != NOTHING {
+    if i.tangents != NO_INDEX {
         let [t0, t1, t2] = corners.map(|vertex| {
             let [u, v] = mesh.tangents[vertex].map(|row| vector_from_mesh(i, row.xyz()));
             Tangents { u, v }
@@ -175,7 +175,7 @@ pub fn seen_path(scene: &Packed, start: Path) -> Path {
     let mut path = start;
     for _ in 0..MOST_HIDDEN {
         let hit = closest_hit(scene, path.ray, path.left, path.wall);
-        if hit.primitive == NOTHING {
+        if hit.primitive == NO_INDEX {
             break;
         }
         let spot = spot_of(scene, hit);
@@ -209,7 +209,7 @@ pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
         path = seen_path(scene, path);
     }
     let mut found = path_first_hit(scene, path);
-    if is_hidden && found.shape != NOTHING {
+    if is_hidden && found.shape != NO_INDEX {
         found.depth += dot(path.ray.origin - start.origin, start.direction);
     }
     found
@@ -221,11 +221,11 @@ pub fn path_first_hit(scene: &Packed, path: Path) -> FirstHit {
     if scene.specialization.sees_through != 0 {
         hit = first_seen(scene, ray, hit);
     }
-    if hit.primitive == NOTHING {
+    if hit.primitive == NO_INDEX {
         return FirstHit {
-            shape: NOTHING,
-            material: NOTHING,
-            primitive: NOTHING,
+            shape: NO_INDEX,
+            material: NO_INDEX,
+            primitive: NO_INDEX,
             ..FirstHit::zeroed()
         };
     }

@@ -6,7 +6,7 @@ use super::integrators::path::decision_set;
 use super::light_tree::{light_child, light_importances, light_shares};
 use super::ray::Hit;
 use super::rng::{hash4, unit_float};
-use crate::records::{Emitter, NOTHING, Packed};
+use crate::records::{Emitter, NO_INDEX, Packed};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chosen {
@@ -16,7 +16,7 @@ pub struct Chosen {
 
 pub fn chosen_light(scene: &Packed, emitter: Emitter, p: Vec3, n: Vec3, key: UVec2, sample: u32) -> Chosen {
     let mut chosen = Chosen { emitter, density: 0.0 };
-    if emitter.index != NOTHING {
+    if emitter.index != NO_INDEX {
         return chosen;
     }
     let mut probability = 1.0;
@@ -25,7 +25,7 @@ pub fn chosen_light(scene: &Packed, emitter: Emitter, p: Vec3, n: Vec3, key: UVe
     let mut child = 0;
     let mut level = 0;
     let mut bits = UVec2::ZERO;
-    while at != NOTHING {
+    while at != NO_INDEX {
         node = &scene.light_nodes[at as usize];
         let shares = light_shares(light_importances(node, p, n));
         if level & 1 == 0 {
@@ -44,16 +44,16 @@ pub fn chosen_light(scene: &Packed, emitter: Emitter, p: Vec3, n: Vec3, key: UVe
 }
 
 pub fn met_density(scene: &Packed, hit: Hit, wanted: bool, p: Vec3, n: Vec3) -> f32 {
-    let mut at = NOTHING;
+    let mut at = NO_INDEX;
     if wanted {
         at = light_leaf(scene, hit);
     }
-    if at == NOTHING {
+    if at == NO_INDEX {
         return 0.0;
     }
     let nodes = &scene.light_nodes;
     let mut density = nodes[at as usize / 4].density[at as usize % 4];
-    while at != NOTHING {
+    while at != NO_INDEX {
         let node = &nodes[at as usize / 4];
         density *= light_shares(light_importances(node, p, n))[at as usize % 4];
         at = node.parent.x;
@@ -65,8 +65,8 @@ pub fn light_leaf(scene: &Packed, hit: Hit) -> u32 {
     let mut place = hit.primitive;
     if hit.instance != 0 {
         let leaves = scene.instances[hit.instance as usize - 1].leaves;
-        if leaves == NOTHING {
-            return NOTHING;
+        if leaves == NO_INDEX {
+            return NO_INDEX;
         }
         place = leaves + hit.slot;
     }

@@ -3,7 +3,7 @@
 use glam::{UVec2, Vec2, Vec3};
 
 use super::math::{cross, dot};
-use crate::records::{FAR, NOTHING, Primitive};
+use crate::records::{FAR, NO_INDEX, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
@@ -24,14 +24,14 @@ pub fn no_hit() -> Hit {
     Hit {
         t: FAR,
         instance: 0,
-        primitive: NOTHING,
+        primitive: NO_INDEX,
         slot: 0,
         barycentric: Vec2::ZERO,
     }
 }
 
 pub fn by_itself(place: UVec2) -> u32 {
-    if place.x == 0 { place.y } else { NOTHING }
+    if place.x == 0 { place.y } else { NO_INDEX }
 }
 
 pub fn point_to_local(q: &Primitive, p: Vec3) -> Vec3 {

@@ -19,7 +19,7 @@ use super::surface::Surface;
 use super::thin::{thin_eval, thin_pdf, thin_sample};
 use super::warp::frame_around;
 use crate::records::{
-    DIFFUSE, FACET_KINDS, GLASS, INSTANCE, LOBE_COAT, METAL, Material, NOTHING, PASSING_KINDS, PHONG, PRINCIPLED,
+    DIFFUSE, FACET_KINDS, GLASS, INSTANCE, LOBE_COAT, METAL, Material, NO_INDEX, PASSING_KINDS, PHONG, PRINCIPLED,
     Packed, ROUGH_GLASS, THIN,
 };
 
@@ -187,7 +187,7 @@ pub fn facets_of(scene: &Packed, surface: &Surface, found: Material) -> Material
     if material.kind == ROUGH_GLASS {
         material.ior = 1.0 / eta_of(surface, &found);
     }
-    if material.energy != NOTHING {
+    if material.energy != NO_INDEX {
         material.loss = if material.kind == ROUGH_GLASS {
             1.0 / glass_kept(scene, &material, facet_alpha(&material), wo, surface.side) - 1.0
         } else if material.streaks != 0 {

@@ -6,7 +6,7 @@ use super::ellipsoid::ellipsoid_level;
 use super::math::{dot, max, positive_zero};
 use super::primitive::{is_round, local_tangents, primitive_gradient, primitive_normal, primitive_uv};
 use super::ray::{Ray, point_to_local, vector_to_local, vector_to_world};
-use crate::records::{FirstHit, NOTHING, Primitive};
+use crate::records::{FirstHit, NO_INDEX, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
@@ -56,8 +56,8 @@ pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surf
         start: position + normal * (epsilon * size),
         side,
         bulge: Vec3::ZERO,
-        above: UVec2::new(0, if round & inside { NOTHING } else { i }),
-        below: UVec2::new(0, if round & !inside { NOTHING } else { i }),
+        above: UVec2::new(0, if round & inside { NO_INDEX } else { i }),
+        below: UVec2::new(0, if round & !inside { NO_INDEX } else { i }),
         uv: Vec2::ZERO,
         du: Vec3::ZERO,
         dv: Vec3::ZERO,

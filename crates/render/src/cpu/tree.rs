@@ -17,7 +17,7 @@ use super::traverse::is_cut;
 use super::walk::{self, Line, Nearest};
 use crate::bvh::{Aabb, Node};
 use crate::records::{
-    CASTS_SHADOW, DISK, ELLIPSOID, FAR, INSTANCE, Instance, Item, Light, NOTHING, Packed, PackedMesh, RECTANGLE,
+    CASTS_SHADOW, DISK, ELLIPSOID, FAR, INSTANCE, Instance, Item, Light, NO_INDEX, Packed, PackedMesh, RECTANGLE,
     SOME_SHADOWS, TRIANGLE,
 };
 
@@ -81,13 +81,13 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
     // At the same distance as what was found before, this instance's triangle counts only if the instance comes first.
     let best = Nearest {
         t: before.t,
-        number: if number + 1 < before.instance { NOTHING } else { 0 },
-        slot: NOTHING,
+        number: if number + 1 < before.instance { NO_INDEX } else { 0 },
+        slot: NO_INDEX,
     };
-    let skip = if left.x == number + 1 { left.y } else { NOTHING };
+    let skip = if left.x == number + 1 { left.y } else { NO_INDEX };
     let line = Line::new(origin, direction, pad);
     let found = walk::closest(*LEVEL, &walked(packed), &line, start, skip, best);
-    if found.slot == NOTHING {
+    if found.slot == NO_INDEX {
         return before;
     }
     let [v0, v1, v2] = corners(packed, found.slot as usize);
@@ -154,7 +154,7 @@ pub fn hidden_by_tree(scene: &Packed, before: u32, surface: &Surface, light: &Li
         pad: item_pad(scene, surface.start),
         directions: &rays.samples.segments(*LEVEL, rays.to),
         reach: light.reach,
-        skip: NOTHING,
+        skip: NO_INDEX,
     };
     let bounds = |i: usize| {
         let Item { low, high, kind, .. } = scene.items[i];
@@ -202,7 +202,7 @@ fn hidden_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u32 
         pad: mesh_pad(i, origin),
         directions: &rays.samples.segments(*LEVEL, to),
         reach: rays.light.reach,
-        skip: if own.x == number + 1 { own.y } else { NOTHING },
+        skip: if own.x == number + 1 { own.y } else { NO_INDEX },
     };
     if i.shadows == SOME_SHADOWS {
         return hidden_by_groups(scene, i, mesh, &segments, wanted);
@@ -277,6 +277,6 @@ fn is_cut_by_mesh(scene: &Packed, number: u32, surface: &Surface, to: Vec3, reac
     let origin = point_to_mesh(i, surface.start);
     let line = Line::new(origin, vector_to_mesh(i, to), mesh_pad(i, origin));
     let own = surface.above;
-    let skip = if own.x == number + 1 { own.y } else { NOTHING };
+    let skip = if own.x == number + 1 { own.y } else { NO_INDEX };
     walk::any(*LEVEL, &walked(&scene.meshes[i.mesh as usize]), &line, skip, reach)
 }

@@ -7,12 +7,12 @@ use super::footprint::Footprint;
 use super::geometry::{instance_of, is_on_mesh};
 use super::mesh::{Spot, color_between, face_uv, face_uv_derivative};
 use super::ray::Hit;
-use crate::records::{COLORS_OF_BASE, COLORS_OF_EMISSION, Instance, Material, NO_COLORS, NOTHING, Packed};
+use crate::records::{COLORS_OF_BASE, COLORS_OF_EMISSION, Instance, Material, NO_COLORS, NO_INDEX, Packed};
 
 pub fn vertex_color(scene: &Packed, hit: Hit) -> Vec4 {
     if is_on_mesh(hit) {
         let i = instance_of(scene, hit);
-        if i.colors != NOTHING {
+        if i.colors != NO_INDEX {
             let mesh = &scene.meshes[i.mesh as usize];
             let UVec4 { x, y, z, .. } = mesh.triangles[hit.slot as usize];
             let [c0, c1, c2] = [x, y, z].map(|vertex| mesh.colors[vertex as usize]);

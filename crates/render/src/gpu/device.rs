@@ -8,7 +8,7 @@ use wgpu::{Backends, BufferUsages, DeviceType};
 use super::controls::FloatControls;
 use super::failure::{Failure, error_of_opening};
 use crate::error::RenderError;
-use wgray_image::contain::{DropContained, contained};
+use wgray_image::contain::{DropContained, catch_panic};
 
 /// What to do where there is no adapter.
 pub const HOW_TO_GET_VULKAN: &str =
@@ -164,7 +164,7 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
 
 fn enumerate() -> Vec<wgpu::Adapter> {
     // A driver that is being reset may fail where wgpu does not expect it: then there is none.
-    let adapters = contained(|| {
+    let adapters = catch_panic(|| {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
     });
@@ -247,7 +247,7 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
         memory_hints: wgpu::MemoryHints::MemoryUsage,
         trace: wgpu::Trace::Off,
     };
-    let opened = contained(|| pollster::block_on(adapter.request_device(&descriptor)));
+    let opened = catch_panic(|| pollster::block_on(adapter.request_device(&descriptor)));
     let (device, queue) = match opened {
         Ok(Ok(opened)) => opened,
         Ok(Err(error)) => return Err(error_of_opening(&info.name, &error)),
@@ -279,7 +279,7 @@ impl Device {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let value = contained(calls);
+        let value = catch_panic(calls);
         let errors = [validation.pop(), internal.pop(), memory.pop()].map(pollster::block_on);
         let [validation, internal, memory] = errors;
         // A buffer that was refused for want of memory is refused again by whatever uses it: the cause is told.
@@ -304,7 +304,7 @@ impl Device {
 
     /// wgpu panics here where the device is lost.
     fn poll_for(&self, what: wgpu::PollType) -> Result<(), RenderError> {
-        match contained(|| self.device.poll(what)) {
+        match catch_panic(|| self.device.poll(what)) {
             Ok(Ok(_)) => Ok(()),
             Ok(Err(error)) => Err(self.error(error)),
             Err(message) => Err(self.error(message)),

@@ -513,7 +513,7 @@ impl Gpu {
 
     /// A single sample is too long for the driver.
     fn cut_short(&self) -> RenderError {
-        RenderError::CutShort {
+        RenderError::LoopTruncated {
             device: self.device.info.name.clone(),
         }
     }

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::{Band, Layout};
 use crate::film::Layer;
-use crate::records::{FirstHit, NOTHING};
+use crate::records::{FirstHit, NO_INDEX};
 use wgray_scene::Integrator;
 
 /// A value of a pixel.
@@ -233,7 +233,7 @@ impl Aov {
     /// The colour of a first hit in a PNG, before rounding to 8 bits, as [`Aov::color`] gives it. A layer of another source has that
     /// of [`Aov::Primitive`].
     pub fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
-        if hit.shape == NOTHING {
+        if hit.shape == NO_INDEX {
             return Vec3::ZERO;
         }
         match self {

@@ -49,7 +49,7 @@ fn faceted(facets: &Facets, found: &mut impl FnMut(&Color, u32, Option<(Channel,
         roughness: of_value(&facets.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, found),
         anisotropy: facets.anisotropy as f32,
         rotation: (facets.rotation / 180.0) as f32,
-        energy: if facets.compensated { 0 } else { NOTHING },
+        energy: if facets.compensated { 0 } else { NO_INDEX },
         ..bytemuck::Zeroable::zeroed()
     }
 }
@@ -221,8 +221,8 @@ impl Appearances {
         record.hidden = hidden(material);
         let passes = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
         let parts = match record.kind {
-            METAL | THIN if record.energy != NOTHING => Some(Parts::Mirror),
-            ROUGH_GLASS if record.energy != NOTHING => Some(Parts::Glass(record.ior.to_bits())),
+            METAL | THIN if record.energy != NO_INDEX => Some(Parts::Mirror),
+            ROUGH_GLASS if record.energy != NO_INDEX => Some(Parts::Glass(record.ior.to_bits())),
             PRINCIPLED => Some(Parts::Mixture(passes.then_some(record.ior.to_bits()))),
             _ => None,
         };

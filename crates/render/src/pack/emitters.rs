@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::geometry::Trees;
 use super::light_tree::{self, Cone, Lamp};
 use super::{
-    DIRECTIONAL, DISK, DISTANT, ELLIPSOID, EMITTER, ENVIRONMENT, Emitter, Light, LightNode, Material, NO_SHADOW,
-    NOTHING, PLANE, POINT, Primitive, RECTANGLE, SPOT, TRIANGLE, reach,
+    DIRECTIONAL, DISK, DISTANT, ELLIPSOID, EMITTER, ENVIRONMENT, Emitter, Light, LightNode, Material, NO_INDEX,
+    NO_SHADOW, PLANE, POINT, Primitive, RECTANGLE, SPOT, TRIANGLE, reach,
 };
 use wgray_scene::{Color, Scene, Texels, TextureKind};
 
@@ -205,8 +205,8 @@ fn balance(powers: &mut [f64], places: &[(u32, u32)], lights: &[Light]) {
 fn environment_light() -> Light {
     Light {
         reach: DISTANT,
-        primitive: NOTHING,
-        number: NOTHING,
+        primitive: NO_INDEX,
+        number: NO_INDEX,
         kind: ENVIRONMENT,
         ..bytemuck::Zeroable::zeroed()
     }
@@ -264,26 +264,26 @@ fn with_tree(
         })
         .collect();
     shining.nodes = light_tree::build(&lamps);
-    shining.leaves = vec![NOTHING; primitives.len()];
-    shining.of_instances = vec![NOTHING; trees.instances.len()];
+    shining.leaves = vec![NO_INDEX; primitives.len()];
+    shining.of_instances = vec![NO_INDEX; trees.instances.len()];
     for lamp in lamps.iter().filter(|lamp| lamp.instance != 0) {
         let number = lamp.instance as usize - 1;
-        if shining.of_instances[number] == NOTHING {
+        if shining.of_instances[number] == NO_INDEX {
             shining.of_instances[number] = shining.leaves.len() as u32;
             let triangles = trees.meshes[trees.instances[number].mesh as usize].triangles.len();
-            shining.leaves.resize(shining.leaves.len() + triangles, NOTHING);
+            shining.leaves.resize(shining.leaves.len() + triangles, NO_INDEX);
         }
     }
     for (number, node) in (0..).zip(&shining.nodes) {
         for (i, child) in (4 * number..).zip(0..4) {
-            if node.children[child] != NOTHING || node.intensity[child] == 0.0 {
+            if node.children[child] != NO_INDEX || node.intensity[child] == 0.0 {
                 continue;
             }
             let place = match node.instance[child] {
                 0 => shining.lights[node.index[child] as usize].primitive,
                 number => shining.of_instances[number as usize - 1] + node.index[child],
             };
-            if place != NOTHING {
+            if place != NO_INDEX {
                 shining.leaves[place as usize] = i;
             }
         }
@@ -302,7 +302,7 @@ fn with_tree(
         .into_iter()
         .chain(far.iter().map(|(_, power)| *power))
         .collect();
-    let places = [(0, NOTHING)].into_iter().chain(far.iter().map(|(place, _)| *place));
+    let places = [(0, NO_INDEX)].into_iter().chain(far.iter().map(|(place, _)| *place));
     shining.emitters = (table(&weights).into_iter().zip(places))
         .map(|((threshold, other), (instance, index))| Emitter {
             threshold,

@@ -7,7 +7,7 @@ use bytemuck::cast_vec;
 use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
 
 use super::{
-    CASTS_SHADOW, DISK, ELLIPSOID, INSTANCE, Instance, Item, NO_SHADOW, NOTHING, Node, PAD, Primitive, RECTANGLE,
+    CASTS_SHADOW, DISK, ELLIPSOID, INSTANCE, Instance, Item, NO_INDEX, NO_SHADOW, Node, PAD, Primitive, RECTANGLE,
     SOME_SHADOWS, TRIANGLE,
 };
 use crate::bvh::{Aabb, build};
@@ -125,7 +125,7 @@ impl Trees {
                 row = more_uvs + mesh.more_uvs.len() as u32;
                 let nodes = node_row;
                 node_row += NODE_ROWS * mesh.nodes.len() as u32;
-                let or_nothing = |row: u32, is_there: bool| if is_there { row } else { NOTHING };
+                let or_nothing = |row: u32, is_there: bool| if is_there { row } else { NO_INDEX };
                 [
                     nodes,
                     triangles,

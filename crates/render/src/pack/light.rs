@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use bytemuck::Zeroable as _;
 
-use super::{DIRECTIONAL, Light, NOTHING, POINT, Primitive, SPOT};
+use super::{DIRECTIONAL, Light, NO_INDEX, POINT, Primitive, SPOT};
 use wgray_scene as scene;
 
 /// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
@@ -26,7 +26,7 @@ pub(super) fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64)
     let unit = Light {
         finite: 1.0,
         reach,
-        primitive: NOTHING,
+        primitive: NO_INDEX,
         number,
         ..Light::zeroed()
     };

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DQuat, DVec3, UVec4};
 use rayon::prelude::*;
 
-use super::{LightNode, NOTHING};
+use super::{LightNode, NO_INDEX};
 
 /// Buckets along each axis where a node may be split, section 4.4.
 const BUCKETS: usize = 12;
@@ -182,7 +182,7 @@ fn build_with(lamps: &[Lamp], parallel: usize) -> Vec<LightNode> {
     };
     let mut nodes = Vec::with_capacity(lamps.len() / 2 + 1);
     if let Some(part) = builder.part(&mut order, 0) {
-        builder.add_subtree(NOTHING, part, &mut nodes);
+        builder.add_subtree(NO_INDEX, part, &mut nodes);
     }
     nodes
 }
@@ -226,7 +226,7 @@ impl Builder<'_> {
         let inner: Vec<(usize, Part)> = inner.collect();
         let subtrees = inner.into_par_iter().map(|(i, part)| {
             let mut subtree = Vec::new();
-            self.add_subtree(NOTHING, part, &mut subtree);
+            self.add_subtree(NO_INDEX, part, &mut subtree);
             (i, subtree)
         });
         for (i, mut subtree) in subtrees.collect::<Vec<_>>() {
@@ -234,7 +234,7 @@ impl Builder<'_> {
             for node in &mut subtree {
                 node.parent.x = node.parent.x.wrapping_add(4 * first); // the root's is set below
                 for child in 0..WIDTH {
-                    if node.children[child] != NOTHING {
+                    if node.children[child] != NO_INDEX {
                         node.children[child] += first;
                     }
                 }
@@ -268,7 +268,7 @@ impl Builder<'_> {
             );
         }
         let mut node = LightNode {
-            children: UVec4::splat(NOTHING),
+            children: UVec4::splat(NO_INDEX),
             parent: UVec4::new(parent, 0, 0, 0),
             ..bytemuck::Zeroable::zeroed()
         };

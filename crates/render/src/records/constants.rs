@@ -236,9 +236,9 @@ constants! {
     /// No distance of a hit is larger.
     pub const FAR: f32 = f32::MAX;
     /// The number of a primitive that is none.
-    pub const NOTHING: u32 = u32::MAX;
+    pub const NO_INDEX: u32 = u32::MAX;
     /// The instance and primitive of a ray's start that is on none.
-    pub const NOWHERE: UVec2 = UVec2::new(0, NOTHING);
+    pub const NOWHERE: UVec2 = UVec2::new(0, NO_INDEX);
     /// Shadow rays are traced in blocks of so many, a bit of a word for each.
     pub const BLOCK: u32 = 32;
 

@@ -134,7 +134,7 @@ records! {
         pub roughness: f32,
         /// Its lookups in textures: the first, x, and how many there are, y.
         pub lookups: UVec2,
-        /// [`ROUGH_GLASS`], and [`PRINCIPLED`] with a volume: the texel where the table of what it lets pass and reflects at once starts. Of [`METAL`] and [`THIN`], too, [`NOTHING`]
+        /// [`ROUGH_GLASS`], and [`PRINCIPLED`] with a volume: the texel where the table of what it lets pass and reflects at once starts. Of [`METAL`] and [`THIN`], too, [`NO_INDEX`]
         /// where light that bounces between facets is lost.
         pub energy: u32,
         /// 0 here; of a surface that was met what facets lose at once, as a multiple of what they do not.
@@ -230,7 +230,7 @@ records! {
         pub finite: f32,
         /// Half the second edge.
         pub v: Vec3,
-        /// The primitive that shines, [`NOTHING`] if there is none.
+        /// The primitive that shines, [`NO_INDEX`] if there is none.
         pub primitive: u32,
         /// Its colour.
         pub color: Vec3,
@@ -259,7 +259,7 @@ records! {
         pub other: u32,
         /// 0 for a light, else one more than the number of a mesh's instance.
         pub instance: u32,
-        /// The number of the light, or where the triangle is in its mesh; [`NOTHING`] for the tree over what shines.
+        /// The number of the light, or where the triangle is in its mesh; [`NO_INDEX`] for the tree over what shines.
         pub index: u32,
     }
 
@@ -287,7 +287,7 @@ records! {
         pub edge: Vec4,
         /// 1, or 2 where the opposite directions get light too.
         pub sides: UVec4,
-        /// The children that are nodes; [`NOTHING`] for one thing that shines, and where there is no child. What follows is of such things.
+        /// The children that are nodes; [`NO_INDEX`] for one thing that shines, and where there is no child. What follows is of such things.
         pub children: UVec4,
         /// How densely samples of light lie on it once it is chosen, per area; 1 for what has no extent. Of these samples those of the tree
         /// alone, whose share it is multiplied by.
@@ -296,7 +296,7 @@ records! {
         pub instance: UVec4,
         /// The number of the light, or where the triangle is in its mesh.
         pub index: UVec4,
-        /// x: which child it is of which node, four times the node's number and 0 to 3; [`NOTHING`] for the first one of all. The rest is 0.
+        /// x: which child it is of which node, four times the node's number and 0 to 3; [`NO_INDEX`] for the first one of all. The rest is 0.
         pub parent: UVec4,
     }
 
@@ -374,7 +374,7 @@ records! {
         pub vertices: u32,
         /// Where the mesh's origin is.
         pub anchor: Vec3,
-        /// The row of its triangles' groups, [`NOTHING`] if there is one group alone.
+        /// The row of its triangles' groups, [`NO_INDEX`] if there is one group alone.
         pub groups: u32,
         /// First column of the map from the mesh's space.
         pub u: Vec3,
@@ -386,7 +386,7 @@ records! {
         pub shape: u32,
         /// Third column.
         pub w: Vec3,
-        /// The row of its mesh's first vertex's normal and v, [`NOTHING`] if there are none.
+        /// The row of its mesh's first vertex's normal and v, [`NO_INDEX`] if there are none.
         pub attributes: u32,
         /// The largest coordinate of its mesh.
         pub size: f32,
@@ -400,14 +400,14 @@ records! {
         pub shadows: u32,
         /// The number of its mesh.
         pub mesh: u32,
-        /// The first of the two rows of its mesh's first vertex's tangents, [`NOTHING`] if there are none.
+        /// The first of the two rows of its mesh's first vertex's tangents, [`NO_INDEX`] if there are none.
         pub tangents: u32,
-        /// Where the numbers of its triangles' leaves start in the list of what shines, [`NOTHING`] if none of them shines; 0 where there
+        /// Where the numbers of its triangles' leaves start in the list of what shines, [`NO_INDEX`] if none of them shines; 0 where there
         /// is no tree over what shines.
         pub leaves: u32,
-        /// The row of its mesh's first vertex's colour, [`NOTHING`] if there are none.
+        /// The row of its mesh's first vertex's colour, [`NO_INDEX`] if there are none.
         pub colors: u32,
-        /// The first of the rows of its mesh's first vertex's further texture coordinates, two sets in each; [`NOTHING`] if there are none.
+        /// The first of the rows of its mesh's first vertex's further texture coordinates, two sets in each; [`NO_INDEX`] if there are none.
         pub more_uvs: u32,
         /// How many further sets there are.
         pub uv_sets: u32,
@@ -415,7 +415,7 @@ records! {
         pub unused: u32,
     }
 
-    /// What the ray through a pixel's centre meets first; depth 0 and shape [`NOTHING`] where that is nothing.
+    /// What the ray through a pixel's centre meets first; depth 0 and shape [`NO_INDEX`] where that is nothing.
     pub struct FirstHit {
         /// The outward normal, unit length.
         pub normal: Vec3,

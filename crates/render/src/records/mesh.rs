@@ -1,36 +1,36 @@
-//! Meshes as both backends read them: triangles in the order of a BVH's leaves, vertices in rows.
+//! Packed meshes: triangles in the order of the leaves of a BVH, vertices in rows.
 
 use glam::{UVec4, Vec3, Vec4};
 
 use super::Node;
 
-/// A mesh as both backends read it, in its own space.
+/// A packed mesh, in object space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackedMesh {
-    /// The tree over its triangles.
+    /// The BVH over its triangles.
     pub nodes: Vec<Node>,
-    /// The triangles in the order of the tree's leaves: the numbers of three vertices, and the triangle's own.
+    /// The triangles in the order of the leaves: the indices of three vertices, and the index of the triangle.
     pub triangles: Vec<UVec4>,
-    /// Each vertex's position, and its u.
+    /// Position and u of each vertex.
     pub vertices: Vec<Vec4>,
-    /// Each vertex's normal, 0 if there is none, and its v; empty if there are neither normals nor texture coordinates.
+    /// Normal, or 0, and v of each vertex; empty without normals and texture coordinates.
     pub attributes: Vec<Vec4>,
-    /// Each vertex's tangents along u and along v, for normal maps; or empty.
+    /// Tangents along u and v of each vertex, for normal maps; or empty.
     pub tangents: Vec<[Vec4; 2]>,
-    /// Each vertex's colour, linear RGB and opacity; or empty.
+    /// Color of each vertex, linear RGB and opacity; or empty.
     pub colors: Vec<Vec4>,
-    /// Each vertex's further texture coordinates, two sets in a row, all of a vertex's rows together; or empty.
+    /// Further texture coordinates of each vertex, two sets per row, the rows of a vertex together; or empty.
     pub more_uvs: Vec<Vec4>,
-    /// Each triangle's group, in the order of the triangles; none if there is one group alone.
+    /// Group of each triangle, in the order of the triangles; empty if there is a single group.
     pub groups: Vec<u32>,
-    /// The lower corner of its box.
+    /// The lower corner of its bounding box.
     pub low: Vec3,
-    /// The upper corner of its box.
+    /// The upper corner of its bounding box.
     pub high: Vec3,
 }
 
 impl PackedMesh {
-    /// The memory that it takes.
+    /// Returns its size in bytes.
     pub fn bytes(&self) -> u64 {
         let lists = [
             size_of_val(self.nodes.as_slice()),
@@ -45,7 +45,7 @@ impl PackedMesh {
         lists.iter().map(|bytes| *bytes as u64).sum()
     }
 
-    /// Its largest coordinate.
+    /// Returns its largest absolute coordinate.
     pub fn size(&self) -> f32 {
         self.low.abs().max(self.high.abs()).max_element()
     }

@@ -9,63 +9,63 @@ use wgray_scene::Integrator;
 use super::*;
 use crate::film::Form;
 
-/// A scene as both backends read it.
+/// A packed scene: the records that both backends read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packed {
-    /// Where coordinates are counted from: a point of the scene file's space.
+    /// The origin of all coordinates: a point in the space of the scene file.
     pub origin: DVec3,
     /// The camera.
     pub camera: Camera,
-    /// What light is simulated.
+    /// The integrator.
     pub integrator: Integrator,
-    /// What belongs to the scene as a whole.
+    /// Values of the scene as a whole.
     pub environment: Environment,
-    /// The primitives, lights' rectangles among them: those outside of the tree, sorted by kind and in each kind by whether they
+    /// The primitives, including the rectangles of lights: those outside of the BVH, sorted by kind and in each kind by whether they
     /// can cast a shadow, then those in it.
     pub primitives: Vec<Primitive>,
-    /// A sphere around each primitive.
+    /// The bounding sphere of each primitive.
     pub bounds: Vec<Sphere>,
-    /// The tree over all instances of meshes, and over the bounded primitives where these are many.
+    /// The BVH over all instances of meshes, and over the bounded primitives where these are many.
     pub nodes: Vec<Node>,
-    /// What it is over, in the order of its leaves.
+    /// The contents of its leaves, in their order.
     pub items: Vec<Item>,
-    /// The meshes in the world.
+    /// The instances of meshes.
     pub instances: Vec<Instance>,
     /// The meshes.
     pub meshes: Vec<Arc<PackedMesh>>,
-    /// For each group of each instance its material, and [`NO_SHADOW`].
+    /// The material of each group of each instance, and [`NO_SHADOW`].
     pub group_words: Vec<u32>,
     /// The materials of the scene, then one for each area light.
     pub materials: Vec<Material>,
-    /// The lights, rectangles first; each knows the primitive that shines. Under the integrator `path` every primitive that
-    /// shines is one.
+    /// The lights, rectangles first; each refers to its primitive. Under the integrator `path` every emissive primitive is one.
     pub lights: Vec<Light>,
-    /// Under the integrator `path`, what light is sampled of: the table by which one is chosen.
+    /// Under the integrator `path`, the table from which emitters are sampled.
     pub emitters: Vec<Emitter>,
-    /// The tree over what shines where that is much, which is then one of the emitters.
+    /// The light tree, which is a single emitter of the table; empty if there are few emitters.
     pub light_nodes: Vec<LightNode>,
-    /// Of each primitive, and of each triangle of the instances of meshes that shine, which child of which node of that tree it is, as [`LightNode::parent`] has it, else [`NOTHING`].
+    /// The leaf of each primitive and of each triangle of emissive instances in the light tree, encoded as [`LightNode::parent`]; else [`NO_INDEX`].
     pub light_leaves: Vec<u32>,
-    /// How many there are of all these, and where.
+    /// The numbers and positions of all records.
     pub counts: Counts,
-    /// What materials look up in textures.
+    /// The texture lookups of materials.
     pub lookups: Vec<Lookup>,
-    /// The textures that materials look up.
+    /// The textures of these lookups.
     pub textures: Vec<Texture>,
-    /// Their images: tables of places, and texels.
+    /// Their images: tables of offsets, and texels.
     pub texels: Vec<u32>,
-    /// The filter's bins ([`filter::table`]); none if it is the box of the pixel.
+    /// The bins of the pixel filter; empty if it is the box of the pixel.
     pub filter_table: Vec<Vec4>,
-    /// Samples of every pixel; under adaptive sampling the most that one gets.
+    /// The number of samples per pixel; under adaptive sampling the maximum.
     pub pixel_samples: u32,
-    /// Whether sampling is adaptive.
+    /// True if sampling is adaptive.
     pub adaptive: bool,
-    /// The constants.
+    /// The constants of the kernel.
     pub specialization: Specialization,
 }
 
 impl Packed {
-    /// Samples of light at every hit, over all lights; a point or directional light counts 1. Under the integrator `path` one of all.
+    /// Returns the number of light samples per hit over all lights; a point or directional light counts as one. Under the integrator `path` it is one
+    /// for all lights.
     pub fn light_samples(&self) -> u64 {
         if self.integrator == Integrator::Path {
             return u64::from(!self.emitters.is_empty());
@@ -77,37 +77,37 @@ impl Packed {
     /// Returns the number of emitters that the path tracer samples: lights, emissive surfaces, the environment.
     pub fn emitter_count(&self) -> u64 {
         // A light tree is a single entry of the table.
-        let in_tree = self.light_leaves.iter().filter(|leaf| **leaf != NOTHING).count();
+        let in_tree = self.light_leaves.iter().filter(|leaf| **leaf != NO_INDEX).count();
         self.emitters.len().saturating_sub(usize::from(in_tree > 0)) as u64 + in_tree as u64
     }
 
-    /// The same scene, and a film that has layers. Without effect under another integrator than `path`, which alone has them.
+    /// Returns the scene with layers in its film. Only the integrator `path` has layers; others ignore it.
     #[must_use]
     pub fn with_layers(mut self) -> Packed {
         self.specialization.layers = (self.integrator == Integrator::Path).into();
         self
     }
 
-    /// The same scene, and a film without layers. The colours are the same.
+    /// Returns the scene without layers in its film. The colors are the same.
     #[must_use]
     pub fn without_layers(mut self) -> Packed {
         self.specialization.layers = 0;
         self
     }
 
-    /// The memory that trees of boxes take, in bytes.
+    /// Returns the size of all BVHs in bytes.
     pub fn tree_bytes(&self) -> u64 {
         let of_meshes = self.meshes.iter().map(|mesh| size_of_val(mesh.nodes.as_slice()));
         let own = size_of_val(self.nodes.as_slice()) + size_of_val(self.items.as_slice());
         (own + of_meshes.sum::<usize>()) as u64
     }
 
-    /// The memory that texels take, with tables of those around the scene, in bytes.
+    /// Returns the size of texels and of the sampling tables of environment maps in bytes.
     pub fn texel_bytes(&self) -> u64 {
         size_of_val(self.texels.as_slice()) as u64
     }
 
-    /// The memory that all of it takes, in bytes.
+    /// Returns the size of all records in bytes.
     pub fn bytes(&self) -> u64 {
         let lists = [
             size_of_val(self.primitives.as_slice()),
@@ -130,12 +130,12 @@ impl Packed {
         of_meshes.sum::<u64>() + lists.iter().map(|bytes| *bytes as u64).sum::<u64>()
     }
 
-    /// Whether the picture has alpha: its background is transparent.
+    /// Returns true if the image has alpha, that is, a transparent background.
     pub fn has_alpha(&self) -> bool {
         self.specialization.alpha != 0
     }
 
-    /// What its film has beside the sums.
+    /// Returns the form of its film.
     pub fn form(&self) -> Form {
         Form {
             adaptive: self.adaptive,
@@ -143,7 +143,7 @@ impl Packed {
         }
     }
 
-    /// Whether another scene is the same, seen by whatever camera.
+    /// Returns true if another scene differs in the camera only.
     pub fn same_but_camera(&self, other: &Packed) -> bool {
         let Packed {
             origin,
@@ -194,14 +194,14 @@ impl Packed {
             && same_meshes()
     }
 
-    /// The kinds of primitives that there are, each with where its primitives are.
+    /// Returns the kinds of primitives in the scene, each with the range of its primitives.
     pub fn kinds(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
         let kinds = (0..).zip(self.counts.primitives);
         let ranges = kinds.map(|(kind, range)| (kind, range.x as usize..range.z as usize));
         ranges.filter(|(_, range)| !range.is_empty())
     }
 
-    /// The kinds of primitives that can cast a shadow, each with where these are.
+    /// Returns the kinds of primitives that can cast shadows, each with their range.
     pub fn shadow_casters(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
         let kinds = (0..).zip(self.counts.primitives);
         let ranges = kinds.map(|(kind, range)| (kind, range.x as usize..range.y as usize));

@@ -3,20 +3,22 @@
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
-/// A table that its key `type` tells apart: `shape` is what it is of. Each type has its tag, its description and its own schema, which
-/// becomes one of the definitions.
+/// Returns the schema of a table whose key `type` selects one of several types. Each has a tag, a description and a schema, which becomes a
+/// definition named after `shape`.
 pub(crate) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
     let tags: Vec<&str> = types.iter().map(|(tag, ..)| *tag).collect();
-    let told: Vec<&str> = types.iter().map(|(_, told, _)| told.trim()).collect();
-    let key = json!({ "description": "The type.", "type": "string", "enum": tags, "enumDescriptions": told });
-    // A condition for each type, so that a mistake is told at its key. Some editors complete by no conditions: for them alone all types
-    // stand beside what everything is.
+    let descriptions: Vec<&str> = types.iter().map(|(_, description, _)| description.trim()).collect();
+    let key = json!({ "description": "The type.", "type": "string", "enum": tags, "enumDescriptions": descriptions });
+    // A condition for each type, so that an error is reported at its key. Some editors ignore conditions for completion: `anyOf` is for them.
     let mut all = vec![json!({})];
     let mut conditions = Vec::new();
-    for (tag, told, schema) in types {
+    for (tag, description, schema) in types {
         let mut schema = schema.to_value();
         let mut properties = Map::new();
-        properties.insert("type".to_owned(), json!({ "description": told.trim(), "const": tag }));
+        properties.insert(
+            "type".to_owned(),
+            json!({ "description": description.trim(), "const": tag }),
+        );
         if let Some(Value::Object(own)) = schema.get_mut("properties") {
             properties.append(own);
         }
@@ -40,7 +42,7 @@ pub(crate) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&
     schema.try_into().unwrap_or_default()
 }
 
-/// The name of a type's definition: `camera-perspective`.
+/// Returns the name of the definition of a type: `camera-perspective`.
 pub(crate) fn definition(shape: &str, tag: &str) -> String {
     format!("{}-{tag}", shape.trim_end_matches("Description").to_lowercase())
 }

@@ -34,7 +34,7 @@ use crate::cpu::texture::appearance;
 use crate::cpu::thin::thin_reflectance;
 use crate::cpu::vertices::with_vertex_colors;
 use crate::records::{
-    BACKGROUND, DIFFUSE, EMITTER, FAR, GLASS, IMAGE_AROUND, INSTANCE, METAL, MOST_PASSED, Material, NOTHING, NOWHERE,
+    BACKGROUND, DIFFUSE, EMITTER, FAR, GLASS, IMAGE_AROUND, INSTANCE, METAL, MOST_PASSED, Material, NO_INDEX, NOWHERE,
     OPAQUE, PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN, UNSEEN_AROUND,
 };
 
@@ -96,7 +96,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     let s = &scene.specialization;
     let path = state.path;
     let hit = closest_hit(scene, path.ray, path.left, path.wall);
-    if hit.primitive == NOTHING {
+    if hit.primitive == NO_INDEX {
         state.ended = true;
         let shown = ((s.alpha == 0) & (s.surroundings & UNSEEN_AROUND == 0)) | (path.depth > 0);
         let arriving = if s.surroundings & IMAGE_AROUND != 0 {

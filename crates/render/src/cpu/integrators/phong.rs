@@ -14,7 +14,7 @@ use crate::cpu::sampling::{decision_bits, sample_key};
 use crate::cpu::shadow::Block;
 use crate::cpu::surface::Surface;
 use crate::cpu::texture::appearance;
-use crate::records::{BLOCK, EMITTER, GRID, LEAVES, Light, MIRROR, Material, NOTHING, NOWHERE, Packed, SPLITS, SPOT};
+use crate::records::{BLOCK, EMITTER, GRID, LEAVES, Light, MIRROR, Material, NO_INDEX, NOWHERE, Packed, SPLITS, SPOT};
 
 pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
     let bounces = scene.specialization.bounces;
@@ -32,7 +32,7 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
     }
     if bounces == 0 {
         let hit = closest_hit(scene, path.ray, path.left, path.wall);
-        if hit.primitive == NOTHING {
+        if hit.primitive == NO_INDEX {
             return scene.environment.background;
         }
         return radiance_from(scene, &spot_of(scene, hit), hit, path, pixel, sample);
@@ -44,7 +44,7 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
         let mut seen = scene.environment.background;
         while path.depth <= bounces {
             let hit = closest_hit(scene, path.ray, path.left, path.wall);
-            if hit.primitive == NOTHING {
+            if hit.primitive == NO_INDEX {
                 break;
             }
             let spot = spot_of(scene, hit);
@@ -83,7 +83,7 @@ pub fn scatter(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: UVec2, 
         return mirrored_path(path, surface, at, material);
     }
     let bounce = path.depth * LEAVES + path.branch;
-    let bits = decision_bits(pixel, scene.camera.seed, sample, bounce, NOTHING);
+    let bits = decision_bits(pixel, scene.camera.seed, sample, bounce, NO_INDEX);
     glass_path(path, surface, at, material, unit_float(bits.x))
 }
 

@@ -156,7 +156,7 @@ fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64
         for (i, below) in children(node) {
             let probability = probability * f64::from(shares[i]);
             match below {
-                NOTHING => found[node.index[i] as usize] = probability,
+                NO_INDEX => found[node.index[i] as usize] = probability,
                 below => waiting.push((below as usize, probability)),
             }
         }
@@ -192,7 +192,7 @@ fn probabilities_sum_to_one_and_whatever_can_shine_has_one() {
             nodes
                 .iter()
                 .flat_map(children)
-                .filter(|(_, below)| *below == NOTHING)
+                .filter(|(_, below)| *below == NO_INDEX)
                 .count(),
             lamps.len()
         );
@@ -235,7 +235,7 @@ fn nodes_know_their_parents_and_hold_their_children() {
     let mut random = Random(3);
     let lamps: Vec<Lamp> = (0..1000).map(|i| random.lamp(i, false)).collect();
     let nodes = build(&lamps);
-    assert_eq!(nodes[0].parent.x, NOTHING);
+    assert_eq!(nodes[0].parent.x, NO_INDEX);
     assert!(nodes.len() < 500, "most nodes are full: {}", nodes.len());
     let center = |node: &LightNode, i: usize| Vec3::new(node.x[i], node.y[i], node.z[i]);
     let (mut seen, mut leaves) = (0, 0);
@@ -244,7 +244,7 @@ fn nodes_know_their_parents_and_hold_their_children() {
         seen += 1;
         let node = &nodes[number as usize];
         for (i, below) in children(node) {
-            if below == NOTHING {
+            if below == NO_INDEX {
                 leaves += 1;
                 continue;
             }
@@ -376,7 +376,7 @@ fn lamps_in_one_place_and_in_a_row_make_trees_of_few_levels() {
         let nodes = build(lamps);
         let levels = |mut i: usize| {
             let mut levels = 0;
-            while nodes[i].parent.x != NOTHING {
+            while nodes[i].parent.x != NO_INDEX {
                 i = nodes[i].parent.x as usize / 4;
                 levels += 1;
             }

@@ -1,0 +1,306 @@
+//! The modules of a package are in layers: none imports another one that imports it, directly or through others. The order of the packages is
+//! Cargo's to enforce.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use syn::visit::{self, Visit};
+use syn::{Attribute, File, Item, ItemMacro, ItemMod, ItemUse, Macro, UseTree, Visibility};
+
+use crate::sources;
+
+/// The folders whose files and folders are the modules in question, and the path of the module that they are in.
+const FOLDERS: [(&str, &[&str]); 6] = [
+    ("crates/image/src", &[]),
+    ("crates/scene/src", &[]),
+    ("crates/render/src", &[]),
+    ("crates/dev/src", &[]),
+    ("src", &[]),
+    ("src/cli", &["cli"]),
+];
+
+#[test]
+fn no_module_imports_one_that_imports_it() {
+    for (folder, parent) in FOLDERS {
+        let mut files = Vec::new();
+        read(&sources::path(folder), &strings(parent), &mut files);
+        let found = cycles(&imports(&files, &strings(parent)));
+        assert!(found.is_empty(), "{folder}: {found:?}");
+    }
+}
+
+#[test]
+fn cycles_are_found() {
+    let found = |texts: &[(&str, &str)]| {
+        let file = |(name, text): &(&str, &str)| {
+            let module = if *name == "lib" { Vec::new() } else { strings(&[name]) };
+            (module, syn::parse_file(text).unwrap())
+        };
+        cycles(&imports(&texts.iter().map(file).collect::<Vec<_>>(), &[]))
+    };
+    let none: Vec<Vec<String>> = Vec::new();
+    assert_eq!(found(&[("a", "use crate::b::B;"), ("b", "pub struct B;")]), none);
+    let both = [strings(&["a", "b"])];
+    assert_eq!(
+        found(&[("a", "use crate::b::B;"), ("b", "fn f() { super::a::g() }")]),
+        both
+    );
+    // through the names that the root exports
+    let root = ("lib", "mod a; mod b; pub use b::B; pub use a::*;");
+    assert_eq!(
+        found(&[
+            root,
+            ("a", "use super::{B}; pub struct A;"),
+            ("b", "type T = crate::A;")
+        ]),
+        both
+    );
+    // in a macro, and through a third module
+    let third = [
+        ("a", "macro_rules! m { () => { crate::b::B } }"),
+        ("b", "use crate::c;"),
+        ("c", "use crate::a;"),
+    ];
+    assert_eq!(found(&third), [strings(&["a", "b", "c"])]);
+    // not in tests
+    assert_eq!(
+        found(&[
+            ("a", "use crate::b::B;"),
+            ("b", "#[cfg(test)] mod tests { use crate::a; }")
+        ]),
+        none
+    );
+}
+
+type Module = Vec<String>;
+
+fn strings(names: &[&str]) -> Module {
+    names.iter().map(|&name| name.to_owned()).collect()
+}
+
+/// Reads the files of a folder, each with its module. Tests are left out.
+fn read(folder: &Path, module: &[String], files: &mut Vec<(Module, File)>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let stem = path.file_stem().unwrap().to_str().unwrap();
+        let below = [module, &strings(&[stem])].concat();
+        if path.is_dir() {
+            read(&path, &below, files);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let file = syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap();
+            let is_root = matches!(stem, "lib" | "main" | "mod");
+            files.push((if is_root { module.to_vec() } else { below }, file));
+        }
+    }
+    let of_tests: BTreeSet<Module> = (files.iter())
+        .flat_map(|(module, file)| {
+            tests_of(file)
+                .map(|name| [module.as_slice(), &[name]].concat())
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    files.retain(|(module, _)| !of_tests.iter().any(|tests| module.starts_with(tests)));
+}
+
+/// Returns the modules of a file that are in tests only.
+fn tests_of(file: &File) -> impl Iterator<Item = String> {
+    let modules = file.items.iter().filter_map(|item| match item {
+        Item::Mod(module) if is_test(&module.attrs) => Some(module.ident.to_string()),
+        _ => None,
+    });
+    modules
+}
+
+fn is_test(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        let list = attribute.meta.require_list();
+        list.is_ok_and(|list| list.path.is_ident("cfg") && list.tokens.to_string().contains("test"))
+    })
+}
+
+/// Returns the modules that each module imports.
+fn imports(files: &[(Module, File)], parent: &[String]) -> BTreeMap<String, BTreeSet<String>> {
+    let child = |module: &[String]| module.strip_prefix(parent)?.first().cloned();
+    let modules: BTreeSet<String> = files.iter().filter_map(|(module, _)| child(module)).collect();
+    let exports = exports(files, parent, &modules);
+    let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (module, file) in files {
+        let Some(importer) = child(module) else { continue };
+        let mut paths = Paths {
+            module: module.clone(),
+            found: Vec::new(),
+        };
+        paths.visit_file(file);
+        let imported =
+            paths
+                .found
+                .iter()
+                .filter_map(|path| child(path))
+                .filter_map(|name| match modules.contains(&name) {
+                    true => Some(name),
+                    false => exports.get(&name).cloned(),
+                });
+        let others = imported.filter(|imported| *imported != importer);
+        all.entry(importer.clone()).or_default().extend(others);
+    }
+    all
+}
+
+/// Returns the names that the parent module exports from its children, with the child that has them.
+fn exports(files: &[(Module, File)], parent: &[String], modules: &BTreeSet<String>) -> BTreeMap<String, String> {
+    let mut exports = BTreeMap::new();
+    let roots = files.iter().filter(|(module, _)| module == parent);
+    for item in roots.flat_map(|(_, file)| &file.items) {
+        let Item::Use(item) = item else { continue };
+        for path in used(&item.tree) {
+            let path: Vec<_> = path
+                .into_iter()
+                .filter(|name| name != "self" && name != "crate")
+                .collect();
+            let (Some(first), Some(last)) = (path.first(), path.last()) else {
+                continue;
+            };
+            if !modules.contains(first) {
+                continue;
+            }
+            match last.as_str() {
+                "*" => {
+                    let of_child =
+                        |module: &Module| module.strip_prefix(parent).is_some_and(|m| m.first() == Some(first));
+                    let names = files
+                        .iter()
+                        .filter(|(module, _)| of_child(module))
+                        .flat_map(|(_, file)| public_names(file));
+                    exports.extend(names.map(|name| (name, first.clone())));
+                }
+                name => {
+                    exports.insert(name.to_owned(), first.clone());
+                }
+            }
+        }
+    }
+    exports
+}
+
+fn public_names(file: &File) -> impl Iterator<Item = String> {
+    file.items.iter().filter_map(|item| {
+        let (visibility, name) = match item {
+            Item::Const(item) => (&item.vis, &item.ident),
+            Item::Enum(item) => (&item.vis, &item.ident),
+            Item::Fn(item) => (&item.vis, &item.sig.ident),
+            Item::Static(item) => (&item.vis, &item.ident),
+            Item::Struct(item) => (&item.vis, &item.ident),
+            Item::Trait(item) => (&item.vis, &item.ident),
+            Item::Type(item) => (&item.vis, &item.ident),
+            _ => return None,
+        };
+        matches!(visibility, Visibility::Public(_)).then(|| name.to_string())
+    })
+}
+
+/// Collects the paths of a file that start with `crate`, `self` or `super`, from the root of the package.
+struct Paths {
+    module: Module,
+    found: Vec<Module>,
+}
+
+impl Paths {
+    fn add(&mut self, path: &[String]) {
+        let mut base = match path[0].as_str() {
+            "crate" => Vec::new(),
+            "self" | "super" => self.module.clone(),
+            _ => return,
+        };
+        let ups = path.iter().take_while(|name| *name == "super").count();
+        base.truncate(base.len().saturating_sub(ups));
+        let rest = path
+            .iter()
+            .skip_while(|name| matches!(name.as_str(), "crate" | "self" | "super"));
+        self.found.push(base.into_iter().chain(rest.cloned()).collect());
+    }
+
+    /// Finds paths in tokens, whose text has spaces between them.
+    fn add_tokens(&mut self, tokens: &str) {
+        let tokens = tokens.replace(" :: ", "::");
+        let paths = tokens.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
+        for path in paths.filter(|path| path.starts_with("crate::") || path.starts_with("super::")) {
+            self.add(&path.split("::").map(str::to_owned).collect::<Vec<_>>());
+        }
+    }
+}
+
+impl Visit<'_> for Paths {
+    fn visit_item_mod(&mut self, module: &ItemMod) {
+        if is_test(&module.attrs) {
+            return;
+        }
+        self.module.push(module.ident.to_string());
+        visit::visit_item_mod(self, module);
+        self.module.pop();
+    }
+
+    fn visit_item_use(&mut self, item: &ItemUse) {
+        if !is_test(&item.attrs) {
+            used(&item.tree).iter().for_each(|path| self.add(path));
+        }
+    }
+
+    fn visit_path(&mut self, path: &syn::Path) {
+        let names: Vec<String> = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
+        self.add(&names);
+        visit::visit_path(self, path);
+    }
+
+    fn visit_macro(&mut self, item: &Macro) {
+        self.add_tokens(&item.tokens.to_string());
+    }
+
+    fn visit_item_macro(&mut self, item: &ItemMacro) {
+        self.add_tokens(&item.mac.tokens.to_string());
+    }
+}
+
+/// Returns the paths of an import.
+fn used(tree: &UseTree) -> Vec<Module> {
+    match tree {
+        UseTree::Path(path) => {
+            let first = path.ident.to_string();
+            let rest = used(&path.tree).into_iter();
+            rest.map(|rest| [vec![first.clone()], rest].concat()).collect()
+        }
+        UseTree::Name(name) => vec![vec![name.ident.to_string()]],
+        UseTree::Rename(rename) => vec![vec![rename.ident.to_string()]],
+        UseTree::Glob(_) => vec![strings(&["*"])],
+        UseTree::Group(group) => group.items.iter().flat_map(used).collect(),
+    }
+}
+
+/// Returns the groups of modules that import each other.
+fn cycles(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<Vec<String>> {
+    let reached = |start: &String| {
+        let mut reached = BTreeSet::new();
+        let mut open = vec![start];
+        while let Some(module) = open.pop() {
+            for next in imports.get(module).into_iter().flatten() {
+                if reached.insert(next.clone()) {
+                    open.push(next);
+                }
+            }
+        }
+        reached
+    };
+    let all: BTreeMap<&String, BTreeSet<String>> = imports.keys().map(|module| (module, reached(module))).collect();
+    let together = |a: &String, b: &String| all[a].contains(b) && all.get(b).is_some_and(|of_b| of_b.contains(a));
+    let groups: BTreeSet<Vec<String>> = (imports.keys())
+        .map(|module| {
+            imports
+                .keys()
+                .filter(|other| together(module, other))
+                .cloned()
+                .collect()
+        })
+        .filter(|group: &Vec<String>| !group.is_empty())
+        .collect();
+    groups.into_iter().collect()
+}
