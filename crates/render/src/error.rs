@@ -58,12 +58,12 @@ pub enum RenderError {
         message: String,
     },
     /// The device has too little memory.
-    #[error("{device}: out of memory: {message}")]
+    #[error("{device}: out of memory: {}", message.as_deref().unwrap_or("the driver has no more"))]
     OutOfMemory {
         /// The adapter's name.
         device: String,
-        /// The allocation that failed, and the memory in use.
-        message: String,
+        /// The allocation that failed, and the memory in use, once they are known.
+        message: Option<String>,
     },
     /// The driver ends long loops early, even in a kernel that renders a single sample of a pixel.
     #[error(

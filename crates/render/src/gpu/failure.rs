@@ -5,7 +5,6 @@ use std::error::Error;
 use std::fmt::Display;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::memory::NO_MORE;
 use crate::error::RenderError;
 
 /// What a device is known to suffer from; a clone is another handle to it.
@@ -59,10 +58,7 @@ impl Fault {
         let device = device.to_string();
         match self {
             Fault::Lost(message) => RenderError::Lost { device, message },
-            Fault::Memory => RenderError::OutOfMemory {
-                device,
-                message: NO_MORE.to_string(),
-            },
+            Fault::Memory => RenderError::OutOfMemory { device, message: None },
             Fault::Other(message) => RenderError::Device { device, message },
         }
     }
@@ -126,7 +122,7 @@ pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
     if says(NO_MEMORY_AT_OPENING) {
         RenderError::OutOfMemory {
             device: device.to_string(),
-            message: "the driver has no memory to open it; use the CPU".to_string(),
+            message: Some("the driver has no memory to open it; use the CPU".to_owned()),
         }
     } else if says(LOST_AT_OPENING) {
         Fault::Lost("the driver does not open it".to_string()).into_error(device)

@@ -1,11 +1,8 @@
-//! What takes memory on a device: told where there is not enough.
+//! The memory in use on a device, for the message when an allocation fails.
 
 use crate::error::RenderError;
 
-/// What a driver that has no more memory is taken to say, until it is known what for.
-pub const NO_MORE: &str = "the driver has no more";
-
-/// What there is on a device, in bytes.
+/// The memory in use on a device, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Held {
     /// The scene's buffers.
@@ -16,17 +13,17 @@ pub struct Held {
     pub copies: u64,
 }
 
-/// What was asked for, and how many bytes it has.
+/// The name of an allocation and its size in bytes.
 pub type Asked = (String, u64);
 
 impl Held {
-    /// Says in an error for want of memory what was asked for, where that is known, and what is there. Any other error, and
-    /// one that says so already, stays as it is.
+    /// Adds the failed allocation, if it is known, and the memory in use to an out-of-memory error that has no message yet. Other errors are
+    /// returned unchanged.
     pub fn explain(&self, error: RenderError, asked: Option<&Asked>) -> RenderError {
         match error {
-            RenderError::OutOfMemory { device, message } if message == NO_MORE => RenderError::OutOfMemory {
+            RenderError::OutOfMemory { device, message: None } => RenderError::OutOfMemory {
                 device,
-                message: self.message(asked),
+                message: Some(self.message(asked)),
             },
             other => other,
         }
@@ -35,7 +32,7 @@ impl Held {
     fn message(&self, asked: Option<&Asked>) -> String {
         let asked = match asked {
             Some((what, bytes)) => format!("the driver has no {} MiB for {what}", mebibytes(*bytes)),
-            None => NO_MORE.to_string(),
+            None => "the driver has no more".to_owned(),
         };
         let there = [
             (self.scene, "for the scene"),
@@ -64,10 +61,10 @@ fn mebibytes(bytes: u64) -> String {
 mod tests {
     use super::*;
 
-    fn error(message: &str) -> RenderError {
+    fn error() -> RenderError {
         RenderError::OutOfMemory {
-            device: "gpu".to_string(),
-            message: message.to_string(),
+            device: "gpu".to_owned(),
+            message: None,
         }
     }
 
@@ -79,7 +76,7 @@ mod tests {
             copies: 0,
         };
         let asked = ("a copy of it".to_string(), 64 << 20);
-        let told = held.explain(error(NO_MORE), Some(&asked));
+        let told = held.explain(error(), Some(&asked));
         let rest = "render a crop or a smaller image, or use the CPU";
         let line = format!(
             "gpu: out of memory: the driver has no 64.0 MiB for a copy of it in addition to 1.5 for the scene, 64.0 for the \
@@ -87,7 +84,7 @@ mod tests {
         );
         assert_eq!(told.to_string(), line);
         assert_eq!(held.explain(told, None).to_string(), line);
-        let unknown = Held::default().explain(error(NO_MORE), None).to_string();
+        let unknown = Held::default().explain(error(), None).to_string();
         assert_eq!(unknown, format!("gpu: out of memory: the driver has no more; {rest}"));
         let other = RenderError::Cancelled;
         assert!(matches!(held.explain(other, Some(&asked)), RenderError::Cancelled));
