@@ -8,7 +8,7 @@ use super::Mesh;
 
 /// Values computed from the mesh that contains the cache, one of each type. It takes no part in comparisons, and a clone of the mesh starts
 /// without it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Cache(RwLock<Values>);
 
 #[derive(Debug, Default)]
@@ -55,12 +55,6 @@ impl Cache {
 impl Clone for Cache {
     fn clone(&self) -> Self {
         Cache::default()
-    }
-}
-
-impl Default for Cache {
-    fn default() -> Self {
-        Cache(RwLock::default())
     }
 }
 
