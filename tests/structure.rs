@@ -105,11 +105,10 @@ fn read(folder: &Path, module: &[String], files: &mut Vec<(Module, File)>) {
 
 /// Returns the modules of a file that are in tests only.
 fn tests_of(file: &File) -> impl Iterator<Item = String> {
-    let modules = file.items.iter().filter_map(|item| match item {
+    file.items.iter().filter_map(|item| match item {
         Item::Mod(module) if is_test(&module.attrs) => Some(module.ident.to_string()),
         _ => None,
-    });
-    modules
+    })
 }
 
 fn is_test(attributes: &[Attribute]) -> bool {
