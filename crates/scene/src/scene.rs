@@ -17,7 +17,7 @@ use wgray_image::ViewSettings;
 /// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
 ///
 /// Its fields are there to be read. A scene that is edited is not checked again, and may end a render in a panic: edit the
-/// [`Description`], and validate that.
+/// [`Description`](crate::Description), and validate that.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Scene {
