@@ -30,6 +30,7 @@ mod lens;
 mod loops;
 mod meshes;
 mod model;
+mod mutations;
 mod nearly;
 mod oracle;
 mod panorama;

@@ -3,15 +3,15 @@
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use crate::error::RenderError;
 use crate::image::Output;
 use crate::scene::{Define, Description, Overrides, Scene, SceneError};
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
-use wgray_dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sources, StartError, measure};
+use wgray_dev::{Diagnostic, Listener, Report, Session, Settings, Sources, StartError};
 use wgray_render::gpu::AdapterChoice;
 
 use super::Usage;
@@ -19,7 +19,6 @@ use super::log::{self, Facts, Level};
 use super::outputs::keep_inputs;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
-use super::signal;
 
 /// Arguments of `wgray dev`.
 #[derive(Debug, clap::Args)]
@@ -72,10 +71,6 @@ pub struct Args {
     #[arg(long, conflicts_with = "listen")]
     no_page: bool,
 
-    /// Measure the latency from a save to the image, using copies of the files, and exit
-    #[arg(long, conflicts_with_all = ["listen", "out", "no_page"])]
-    measure: bool,
-
     #[command(flatten)]
     options: SceneOptions,
 }
@@ -102,9 +97,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         _ => AdapterChoice::Named(args.device),
     };
-    if args.measure {
-        return measured(&sources, device);
-    }
     if args.no_page && args.out.is_none() {
         return Err(Usage("--no-page requires --out FILE.png".to_string()).into());
     }
@@ -381,38 +373,6 @@ fn time(seconds: f64) -> String {
     } else {
         format!("{seconds:.2} s")
     }
-}
-
-fn measured(sources: &Sources, device: AdapterChoice) -> anyhow::Result<ExitCode> {
-    let stopped = signal::stop().context("signal handler")?;
-    let all = measure(sources, device, stopped.flag()).map_err(|error| match error {
-        Some(error) => anyhow!(error),
-        None => super::Interrupted(stopped.signal().unwrap_or_default()).into(),
-    })?;
-    Ok(super::ended(print(&sources.scene, all), ExitCode::SUCCESS))
-}
-
-fn print(scene: &Path, all: Vec<Measured>) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    writeln!(out, "{}: milliseconds, median and maximum", scene.display())?;
-    writeln!(
-        out,
-        "{:<14}{:>16}{:>18}{:>22}",
-        "change", "old one stopped", "first image", "every pixel sampled"
-    )?;
-    for row in all {
-        let cells = [row.stopped, row.first, row.whole].map(|mut times| {
-            times.sort();
-            let millis = |time: Option<&Duration>| time.map_or(0, |time| time.as_millis());
-            format!("{} {:>6}", millis(times.get(times.len() / 2)), millis(times.last()))
-        });
-        writeln!(
-            out,
-            "{:<14}{:>16}{:>18}{:>22}",
-            row.change, cells[0], cells[1], cells[2]
-        )?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

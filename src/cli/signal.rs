@@ -23,12 +23,6 @@ impl Stop {
             signal => i32::try_from(signal).ok(),
         }
     }
-
-    /// Returns a flag that becomes true when a signal is received.
-    #[cfg(feature = "dev")]
-    pub fn flag(&self) -> &AtomicBool {
-        &self.asked
-    }
 }
 
 /// Returns the name of a signal.

@@ -7,7 +7,6 @@ mod gltf;
 mod hostile;
 mod kernels;
 mod large;
-mod measure;
 mod pauses;
 mod picking;
 mod reload;

@@ -1,0 +1,145 @@
+//! The latency of the development mode: the time from a change of a scene or shader to its image, on copies in a temporary folder.
+//!
+//! ```sh
+//! cargo bench --bench latency                          # scenes/cornell.toml
+//! cargo bench --bench latency -- scenes/textures.toml  # a scene without other files
+//! ```
+
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use tempfile::NamedTempFile;
+use wgray_dev::{Command, Move, Session, Set, Settings, Sources};
+use wgray_render::gpu::AdapterChoice;
+use wgray_render::gpu::compose::{Shaders, built_in};
+use wgray_scene::Overrides;
+
+/// Number of changes of each kind.
+const ROUNDS: usize = 7;
+/// Maximum time to wait for an image.
+const TIMEOUT: Duration = Duration::from_secs(120);
+/// The expression of `kernels/render.wgsl` that is multiplied by a factor.
+const EXPRESSION: &str = "path_value(path)";
+
+/// The times from a change until the old image is given up, to the first image, and until each pixel has a sample.
+type Times = [Duration; 3];
+
+fn main() {
+    let arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
+    let scene = arguments.last().unwrap_or_else(|| "scenes/cornell.toml".to_owned());
+    let text = fs::read_to_string(&scene).unwrap_or_else(|error| panic!("{scene}: {error}"));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("scene.toml");
+    fs::write(&file, &text).expect("a copy of the scene");
+    let shaders = folder.path().join("shaders");
+    for (name, text) in built_in() {
+        let path = shaders.join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        fs::write(path, text).expect("a copy of a shader");
+    }
+    let session = Session::start(Settings {
+        sources: Sources {
+            scene: file.clone(),
+            overrides: Overrides::default(),
+            shaders: Some(shaders.clone()),
+        },
+        device: AdapterChoice::Auto,
+        out: None,
+        only_for_viewers: false,
+        editor: None,
+        report: Box::new(|_| ()),
+    })
+    .unwrap_or_else(|error| panic!("{scene}: {error}"));
+    measure(&session, || ());
+
+    println!("{scene}: milliseconds, median and maximum");
+    println!(
+        "{:<14}{:>16}{:>18}{:>22}",
+        "change", "old one stopped", "first image", "every pixel sampled"
+    );
+    // Each run has its own seeds and kernels, which no cache contains.
+    let now = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |time| time.as_millis() as usize % 65_536);
+    let number = |i: usize| 7_361_000 + now * ROUNDS + i;
+    let seeded = |i: usize| {
+        let mut table: toml::Table = text.parse().expect("a scene in TOML");
+        let render = table.entry("render").or_insert(toml::Table::new().into());
+        render["seed"] = toml::Value::from((number(i) + ROUNDS) as i64);
+        table.to_string()
+    };
+    let kernel = Shaders::built_in().text("kernels/render.wgsl").to_owned();
+    assert!(kernel.contains(EXPRESSION));
+    let scaled = |i: usize| {
+        let factor = 1.0 + number(i) as f64 / f64::from(1 << 23);
+        kernel.replace(EXPRESSION, &format!("({EXPRESSION} * vec4f(vec3f({factor:?}), 1.0))"))
+    };
+    rounds(&session, "value set", |i| {
+        session.send(Command::Set(Set {
+            path: "render.seed".to_owned(),
+            value: (number(i) as i64).into(),
+            gesture: None,
+        }));
+    });
+    rounds(&session, "scene save", |i| replace(&file, &seeded(i)));
+    rounds(&session, "camera move", |_| {
+        session.send(Command::Move(Move::Orbit(0.05, 0.0)));
+    });
+    rounds(&session, "shader save", |i| {
+        replace(&shaders.join("kernels/render.wgsl"), &scaled(i))
+    });
+}
+
+/// Replaces a file in one step, as editors do.
+fn replace(path: &Path, text: &str) {
+    let mut file = NamedTempFile::new_in(path.parent().expect("a folder")).expect("a file");
+    file.write_all(text.as_bytes()).expect("a written file");
+    file.persist(path).expect("a replaced file");
+}
+
+/// Makes a change several times, and prints the times to the images.
+fn rounds(session: &Session, name: &str, change: impl Fn(usize)) {
+    let times: Vec<Times> = (0..ROUNDS)
+        .map(|i| {
+            let times = measure(session, || change(i));
+            std::thread::sleep(Duration::from_millis(200)); // the next change interrupts a render
+            times
+        })
+        .collect();
+    let cells = [0, 1, 2].map(|column| {
+        let mut column: Vec<u128> = times.iter().map(|times| times[column].as_millis()).collect();
+        column.sort_unstable();
+        format!("{} {:>6}", column[ROUNDS / 2], column[ROUNDS - 1])
+    });
+    println!("{name:<14}{:>16}{:>18}{:>22}", cells[0], cells[1], cells[2]);
+}
+
+fn measure(session: &Session, change: impl FnOnce()) -> Times {
+    let frame = || session.frames.borrow().clone();
+    let revision = frame().map(|frame| frame.header.revision);
+    let start = Instant::now();
+    change();
+    let (mut stopped, mut first) = (None, None);
+    while start.elapsed() < TIMEOUT {
+        let state = session.state.borrow().clone();
+        assert!(state.problems.is_empty(), "{}", state.problems[0].message);
+        assert!(
+            state.notice.as_ref().is_none_or(|notice| !notice.bad),
+            "{:?}",
+            state.notice.as_ref().map(|n| &n.text)
+        );
+        if state.compiling {
+            stopped.get_or_insert(start.elapsed());
+        }
+        if let Some(frame) = frame().filter(|frame| Some(frame.header.revision) > revision) {
+            let first = *first.get_or_insert(start.elapsed());
+            if frame.header.sent == frame.header.finest && frame.header.samples > 0 {
+                return [stopped.unwrap_or(first), first, start.elapsed()];
+            }
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    panic!("no image within {} s", TIMEOUT.as_secs());
+}
