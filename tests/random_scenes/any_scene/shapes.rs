@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use wgray::mesh::Normals;
 use wgray::scene::*;
-use wgray_render::pack::MOST_OUTSIDE;
+use wgray_render::pack::MAX_LINEAR_PRIMITIVES;
 
 use super::files::MESHES;
 use super::values::*;
@@ -172,6 +172,6 @@ pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>,
 /// to compile.
 pub fn shapes() -> impl Strategy<Value = Vec<ShapeDescription>> {
     let shape = || prop_oneof![9 => shape(), 1 => mesh()];
-    let many = MOST_OUTSIDE + 1..MOST_OUTSIDE + 20;
+    let many = MAX_LINEAR_PRIMITIVES + 1..MAX_LINEAR_PRIMITIVES + 20;
     prop_oneof![11 => prop::collection::vec(shape(), 0..7), 1 => prop::collection::vec(shape(), many)]
 }

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use bytemuck::cast_slice;
 use glam::UVec4;
 
-use crate::pack::MOST_OUTSIDE;
+use crate::pack::MAX_LINEAR_PRIMITIVES;
 use crate::records::{
     BLOCK, Emitter, Field as _, Instance, Item, Light, LightNode, Lookup, Material, Node, Packed, Record, Texture,
 };
@@ -25,7 +25,7 @@ pub fn bake_if_small(packed: &Packed) -> Option<String> {
     };
     let of_looks = packed.materials.len() + packed.lookups.len() + packed.textures.len();
     let records = of_looks + lights + packed.emitters.len();
-    (packed.primitives.len() <= MOST_OUTSIDE && records <= MOST_RECORDS).then(|| bake(packed))
+    (packed.primitives.len() <= MAX_LINEAR_PRIMITIVES && records <= MOST_RECORDS).then(|| bake(packed))
 }
 
 /// The WGSL text of the functions of `buffers.wgsl`, and of those that load records, for one scene.

@@ -15,7 +15,7 @@ use wgray_scene::{Color, Scene, Texels, TextureKind};
 
 /// What shines.
 #[derive(Default)]
-pub struct Shining {
+pub struct PackedEmitters {
     /// The primitives that shine, and the lights without extent.
     pub lights: Vec<Light>,
     /// These, and the triangles of meshes that shine; or, where they are many, a tree and what is far away.
@@ -44,7 +44,7 @@ pub fn emitters(
     primitives: &[(Primitive, bool)],
     trees: &Trees,
     around: Option<f64>,
-) -> Shining {
+) -> PackedEmitters {
     // Of each material the mean radiance, and the power of a unit of area.
     let radiances: Vec<f64> = (materials.iter().enumerate())
         .map(
@@ -60,7 +60,7 @@ pub fn emitters(
             std::f64::consts::PI * radiance * sides
         })
         .collect();
-    let mut shining = Shining::default();
+    let mut shining = PackedEmitters::default();
     let mut powers = Vec::new();
     // Of each of these its material; of lights without one a number of their own.
     let mut kinds = Vec::new();
@@ -231,12 +231,12 @@ struct Found {
 
 /// What shines where a tree chooses of it, but for what is far away.
 fn with_tree(
-    mut shining: Shining,
+    mut shining: PackedEmitters,
     materials: &mut [Material],
     primitives: &[(Primitive, bool)],
     trees: &Trees,
     found: &Found,
-) -> Shining {
+) -> PackedEmitters {
     let is_far = |place: &(u32, u32)| is_far(&shining.lights, place);
     let (mut in_tree, mut far) = (Vec::new(), Vec::new());
     for (place, power) in found.places.iter().zip(&found.powers) {

@@ -16,7 +16,7 @@ use wgray_scene::mesh::Mesh;
 use wgray_scene::{Geometry, Scene, Shape};
 
 /// Scenes of more bounded primitives have them in the tree. Fewer are faster one by one, and as constants.
-pub const MOST_OUTSIDE: usize = 64;
+pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
 /// All that the scene's tree is over.
 #[derive(Clone, Debug, Default)]

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use bytemuck::Zeroable as _;
 
-use super::{DIRECTIONAL, Light, NO_INDEX, POINT, Primitive, SPOT};
-use wgray_scene as scene;
+use super::shape::parallelogram;
+use super::{DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, RECTANGLE, SPOT};
+use wgray_scene::{self as scene, Scene};
 
 /// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
 pub(super) const DISTANT: f32 = 1e10;
@@ -21,7 +22,38 @@ pub(super) fn reach(shadow_epsilon: f64) -> f32 {
     (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
 }
 
-pub(super) fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
+/// Packs the lights, rectangles first, and returns the number of rectangles. Each of these adds a primitive and a material.
+pub(super) fn pack_lights(
+    scene: &Scene,
+    primitives: &mut Vec<Primitive>,
+    materials: &mut Vec<Material>,
+) -> (Vec<Light>, usize) {
+    let mut lights = Vec::new();
+    for (number, light) in (0..).zip(&scene.lights) {
+        if let scene::Light::Rectangle {
+            rectangle,
+            color,
+            visible,
+        } = light
+        {
+            let shape = scene.shapes.len() as u32 + number;
+            primitives.push(parallelogram(RECTANGLE, rectangle, materials.len() as u32, shape));
+            materials.push(Material {
+                kind: EMITTER,
+                emission: color.as_vec3(),
+                hidden: (!visible).into(),
+                ..Material::zeroed()
+            });
+        }
+        lights.push(pack_light(light, number, scene.render.shadow_epsilon));
+    }
+    let has_area = |light: &Light| matches!(scene.lights[light.number as usize], scene::Light::Rectangle { .. });
+    lights.sort_by_key(|light| !has_area(light));
+    let area_lights = lights.iter().filter(|light| has_area(light)).count();
+    (lights, area_lights)
+}
+
+fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
     let reach = reach(shadow_epsilon);
     let unit = Light {
         finite: 1.0,

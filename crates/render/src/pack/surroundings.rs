@@ -21,7 +21,7 @@ const BIN_RADIUS: f64 = 0.06;
 
 /// The location of the environment map among the texels, if the scene has one.
 #[derive(Default)]
-pub struct Surroundings(Option<Around>);
+pub struct EnvironmentMap(Option<Around>);
 
 struct Around {
     rows: [Vec3; 3],
@@ -35,14 +35,14 @@ struct Around {
     sum: f64,
 }
 
-impl Surroundings {
+impl EnvironmentMap {
     /// Adds the image's texels and its cells' table to the scene's texels.
-    pub fn of(scene: &Scene, texels: &mut Vec<u32>) -> Surroundings {
+    pub fn of(scene: &Scene, texels: &mut Vec<u32>) -> EnvironmentMap {
         let image = scene
             .environment
             .as_ref()
             .and_then(|environment| environment.image.as_ref());
-        Surroundings(image.and_then(|image| around(image, texels)))
+        EnvironmentMap(image.and_then(|image| around(image, texels)))
     }
 
     /// Returns the integral of the radiance over all directions.

@@ -10,8 +10,8 @@ use super::pyramid::pyramid;
 use super::*;
 use crate::cpu::lobe::{facet_alpha, is_polished};
 use wgray_scene::{
-    self, AlphaMode, Channel, Color, Encoding, Facets, Image, Integrator, Reflection, Scene, Texels, TextureFilter,
-    TextureKind, Value, VertexColors, Wrap,
+    self as scene, self, AlphaMode, Channel, Color, Encoding, Facets, Image, Integrator, Reflection, Scene, Texels,
+    TextureFilter, TextureKind, Value, VertexColors, Wrap,
 };
 
 /// The records of a scene's materials and of the textures that they use.

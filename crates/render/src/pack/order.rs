@@ -1,0 +1,46 @@
+//! The order of primitives: those outside of the BVH first, sorted by kind and by whether they can cast a shadow.
+
+use super::blocking::can_cast_shadow;
+use super::{MAX_LINEAR_PRIMITIVES, PLANE, Primitive};
+use wgray_scene::Scene;
+
+/// Primitives in their order, each with true if it can cast a shadow.
+pub struct Ordered {
+    all: Vec<(Primitive, bool)>,
+    outside: usize,
+}
+
+impl Ordered {
+    /// Sorts primitives. Many bounded primitives are in the BVH.
+    pub fn of(scene: &Scene, primitives: Vec<Primitive>) -> Ordered {
+        let casts = can_cast_shadow(scene, &primitives);
+        let bounded = primitives.iter().filter(|primitive| primitive.kind != PLANE).count();
+        let is_in_bvh = |primitive: &Primitive| bounded > MAX_LINEAR_PRIMITIVES && primitive.kind != PLANE;
+        let mut all: Vec<(Primitive, bool)> = primitives.into_iter().zip(casts).collect();
+        all.sort_by_key(|(primitive, casts)| (is_in_bvh(primitive), primitive.kind, !casts));
+        let outside = all.partition_point(|(primitive, _)| !is_in_bvh(primitive));
+        Ordered { all, outside }
+    }
+
+    /// Returns all primitives.
+    pub fn all(&self) -> &[(Primitive, bool)] {
+        &self.all
+    }
+
+    /// Returns the primitives outside of the BVH.
+    pub fn outside(&self) -> &[(Primitive, bool)] {
+        &self.all[..self.outside]
+    }
+
+    /// Returns the primitives in the BVH, with their indices.
+    pub fn in_bvh(&self) -> Vec<(u32, &Primitive, bool)> {
+        let numbers = self.outside as u32..;
+        let rest = numbers.zip(&self.all[self.outside..]);
+        rest.map(|(i, (primitive, casts))| (i, primitive, *casts)).collect()
+    }
+
+    /// Returns the primitives alone.
+    pub fn into_primitives(self) -> Vec<Primitive> {
+        self.all.into_iter().map(|(primitive, _)| primitive).collect()
+    }
+}

@@ -1,0 +1,216 @@
+//! The specialization of a kernel: the features that a scene uses, so that a kernel without them computes nothing for them.
+
+use glam::{UVec4, Vec3};
+
+use super::emitters::PackedEmitters;
+use super::geometry::Trees;
+use super::materials::Appearances;
+use super::surroundings::EnvironmentMap;
+use super::{
+    Counts, DIFFUSE, FACET_KINDS, FOR_ANISOTROPY, FOR_COAT, FOR_EMISSION, FOR_METALLIC, FOR_ROUGHNESS, FOR_SHEEN,
+    FOR_TRANSMISSION, FOR_WEIGHT, GRID, HALTON, INSTANCE, JITTERED, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN,
+    LOBE_SPECULAR, LOBE_TRANSMISSION, Light, Material, NO_COLORS, OPAQUE, PRINCIPLED, RANDOM, ROTATED_GRID, SOBOL,
+    SPECULAR_KINDS, SPOT, Specialization,
+};
+use crate::cpu::lobe::is_polished;
+use wgray_scene::{self as scene, Integrator, Pattern, Projection, Reflection, Samples, Scene};
+
+/// The parts of a packed scene that its specialization depends on.
+pub(super) struct Parts<'a> {
+    pub scene: &'a Scene,
+    pub appearances: &'a Appearances,
+    pub materials: &'a [Material],
+    /// The number of lights that are rectangles; they are the first.
+    pub area_lights: usize,
+    pub lights: &'a [Light],
+    pub shining: &'a PackedEmitters,
+    pub around: &'a EnvironmentMap,
+    pub trees: &'a Trees,
+    pub counts: &'a Counts,
+    pub filter_bins: usize,
+}
+
+impl Parts<'_> {
+    /// Returns the specialization of the scene's kernels.
+    pub fn specialization(&self) -> Specialization {
+        let Parts {
+            scene,
+            appearances,
+            materials,
+            area_lights,
+            lights,
+            ..
+        } = *self;
+        let (pixels, light_samples) = (scene.render.pixel_samples, scene.render.light_samples);
+        let adaptive = scene.render.adaptive;
+        let is_path = scene.render.integrator == Integrator::Path;
+        let (lookups, specular_lookups) = appearances.lookups(scene.render.integrator);
+        let has_vertex_colors = materials.iter().any(|material| material.vertex_colors != NO_COLORS)
+            && self.trees.meshes.iter().any(|mesh| !mesh.colors.is_empty());
+        Specialization {
+            primitives: self.kinds(|range| range.z),
+            shadow_casters: self.kinds(|range| range.y),
+            in_tree: (self.trees.items.iter()).fold(0, |bits, item| bits | 1 << (item.kind & 0xff)),
+            lights: u32::from(area_lights > 0)
+                | u32::from(lights.len() > area_lights) << 1
+                | u32::from(lights.iter().any(|light| light.kind == SPOT)) << 2,
+            lens: scene.camera.lens.is_some().into(),
+            panoramic: (scene.camera.projection == Projection::Panorama).into(),
+            hidden: materials.iter().any(|material| material.hidden != 0).into(),
+            pixel_pattern: pattern(pixels),
+            pixel_side: side(pixels),
+            pixel_samples: pixels.count,
+            light_pattern: pattern(light_samples),
+            light_side: side(light_samples),
+            light_samples: light_samples.count,
+            filter_bins: self.filter_bins as u32,
+            first_look: adaptive.map_or(pixels.count, |adaptive| {
+                first_look(scene.render.integrator, pixels.count, adaptive.max_samples)
+            }),
+            squared_error: adaptive
+                .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
+                .to_bits(),
+            exponent_bits: exponent_bits(&scene.materials, &materials[..scene.materials.len()]),
+            bounces: match is_path || scene.materials.iter().any(is_specular) {
+                true => scene.render.max_depth,
+                false => 0,
+            },
+            differentials: (scene.render.ray_differentials && appearances.needs_footprints()).into(),
+            lookups,
+            specular_lookups,
+            normal_maps: appearances.has_normal_maps().into(),
+            uv_sets: appearances.lookups.iter().any(|lookup| lookup.uv_set != 0).into(),
+            vertex_colors: has_vertex_colors.into(),
+            texture_kinds: appearances.kinds(),
+            texel_formats: appearances.formats(),
+            ..match is_path {
+                true => Specialization {
+                    surroundings: self.around.bits(scene),
+                    ..of_paths(scene, materials, appearances, self.shining, lights)
+                },
+                false => Specialization::default(),
+            }
+        }
+    }
+
+    /// Returns the bits of the kinds of primitives whose range in [`Counts`] is not empty up to `end`.
+    fn kinds(&self, end: fn(UVec4) -> u32) -> u32 {
+        let kinds = (0..).zip(self.counts.primitives);
+        kinds.fold(0, |bits, (kind, range)| bits | u32::from(end(range) > range.x) << kind)
+    }
+}
+
+/// The samples that adaptive sampling gives all pixels before it decides on more: a round, or as many as it takes for an
+/// estimate of the variance. Where light bounces, some of it is rarely found, and few samples do not know of it.
+fn first_look(integrator: Integrator, round: u32, most: u32) -> u32 {
+    let least: u32 = match integrator {
+        Integrator::Phong => 16,
+        Integrator::Path => 64,
+    };
+    least.next_multiple_of(round).max(round).min(most)
+}
+
+fn pattern(samples: Samples) -> u32 {
+    match samples.pattern {
+        Pattern::Grid => GRID,
+        Pattern::Random => RANDOM,
+        Pattern::RotatedGrid => ROTATED_GRID,
+        Pattern::Jittered => JITTERED,
+        Pattern::Halton => HALTON,
+        Pattern::Sobol => SOBOL,
+    }
+}
+
+/// The side of a pattern's grid of cells, or else the number of its samples.
+fn side(samples: Samples) -> u32 {
+    if samples.pattern.needs_square() {
+        samples.count.isqrt()
+    } else {
+        samples.count
+    }
+}
+
+fn is_specular(material: &scene::Material) -> bool {
+    match material.reflection {
+        Reflection::Phong { .. } | Reflection::Diffuse { .. } => false,
+        Reflection::Mirror { .. } | Reflection::Glass { .. } => true,
+        Reflection::Conductor { .. } | Reflection::Dielectric { .. } => true,
+        Reflection::Principled(_) => false,
+    }
+}
+
+/// Bits of the largest shininess, if all are whole numbers so small that squaring beats the general power.
+fn exponent_bits(validated: &[scene::Material], packed: &[Material]) -> u32 {
+    let whole = validated.iter().all(|material| {
+        if let Reflection::Phong { shininess, .. } = &material.reflection {
+            return shininess.fract() == 0.0 && *shininess <= 4096.0;
+        }
+        true
+    });
+    let largest = packed.iter().map(|material| material.exponent).max().unwrap_or(1);
+    if whole { u32::BITS - largest.leading_zeros() } else { 0 }
+}
+
+/// Bits of the kinds of materials that may mirror or refract alone.
+fn delta_kinds(materials: &[Material], appearances: &Appearances) -> u32 {
+    let may = |material: &&Material| {
+        let textured = appearances.has_lookup(material, FOR_ROUGHNESS);
+        let faceted = FACET_KINDS >> material.kind & 1 != 0;
+        SPECULAR_KINDS >> material.kind & 1 != 0 || faceted && (textured || is_polished(material))
+    };
+    materials
+        .iter()
+        .filter(may)
+        .fold(0, |bits, material| bits | 1 << material.kind)
+}
+
+/// Returns the constants that only the integrator `path` reads.
+fn of_paths(
+    scene: &Scene,
+    materials: &[Material],
+    appearances: &Appearances,
+    shining: &PackedEmitters,
+    lights: &[Light],
+) -> Specialization {
+    let any = |test: fn(&Material) -> bool| u32::from(materials.iter().any(test));
+    let has_lookup = |purpose: u32| u32::from(appearances.have_lookup(purpose));
+    let emitters = &shining.emitters;
+    let meshes_emit = emitters.iter().any(|emitter| emitter.instance != 0)
+        || shining.nodes.iter().any(|node| node.instance != UVec4::ZERO);
+    Specialization {
+        materials: materials.iter().fold(0, |bits, material| bits | 1 << material.kind),
+        rough: any(|material| material.kind == DIFFUSE && material.roughness > 0.0) | has_lookup(FOR_ROUGHNESS),
+        delta_kinds: delta_kinds(materials, appearances),
+        anisotropic: any(|material| material.anisotropy > 0.0) | has_lookup(FOR_ANISOTROPY),
+        lobes: lobes(materials, appearances),
+        sees_through: any(|material| material.alpha_mode != OPAQUE),
+        absorption: any(|material| material.absorption != Vec3::ZERO),
+        shines: any(|material| material.density > 0.0),
+        emitters: emitters.len().min(2) as u32,
+        light_tree: (!shining.nodes.is_empty()).into(),
+        emitter_kinds: lights
+            .iter()
+            .fold(u32::from(meshes_emit) << INSTANCE, |bits, light| bits | 1 << light.kind),
+        emission_textures: has_lookup(FOR_EMISSION),
+        rr_depth: scene.render.rr_depth,
+        most_indirect: scene.render.clamp.map_or(0, |clamp| (clamp as f32).to_bits()),
+        alpha: scene.render.alpha.into(),
+        layers: scene.render.alpha.into(),
+        ..Specialization::default()
+    }
+}
+
+/// The lobes that any principled material has.
+fn lobes(materials: &[Material], appearances: &Appearances) -> u32 {
+    let principled = || materials.iter().filter(|material| material.kind == PRINCIPLED);
+    let lobe = |lobe: u32, textured: u32, has: fn(&Material) -> bool| {
+        let there = principled().any(has) || principled().next().is_some() && appearances.have_lookup(textured);
+        if there { lobe } else { 0 }
+    };
+    lobe(LOBE_SPECULAR, FOR_METALLIC | FOR_WEIGHT, |m| {
+        m.metallic > 0.0 || m.specular_weight > 0.0
+    }) | lobe(LOBE_TRANSMISSION, FOR_TRANSMISSION, |m| m.transmission > 0.0)
+        | lobe(LOBE_COAT, FOR_COAT, |m| m.clearcoat > 0.0)
+        | lobe(LOBE_SHEEN, FOR_SHEEN, |m| m.sheen != Vec3::ZERO)
+        | lobe(LOBE_ANISOTROPY, FOR_ANISOTROPY, |m| m.anisotropy > 0.0)
+}
