@@ -27,8 +27,8 @@ const EXPRESSION: &str = "path_value(path)";
 type Times = [Duration; 3];
 
 fn main() {
-    let arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
-    let scene = arguments.last().unwrap_or_else(|| "scenes/cornell.toml".to_owned());
+    let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench"); // which cargo adds
+    let scene = arguments.next().unwrap_or_else(|| "scenes/cornell.toml".to_owned());
     let text = fs::read_to_string(&scene).unwrap_or_else(|error| panic!("{scene}: {error}"));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("scene.toml");
