@@ -67,7 +67,8 @@ fn main() {
     let seeded = |i: usize| {
         let mut table: toml::Table = text.parse().expect("a scene in TOML");
         let render = table.entry("render").or_insert(toml::Table::new().into());
-        render["seed"] = toml::Value::from((number(i) + ROUNDS) as i64);
+        let render = render.as_table_mut().expect("a table");
+        render.insert("seed".to_owned(), ((number(i) + ROUNDS) as i64).into());
         table.to_string()
     };
     let kernel = Shaders::built_in().text("kernels/render.wgsl").to_owned();
