@@ -7,7 +7,7 @@ struct LightSample {
     pdf: f32,              // per solid angle, with the light's choice; the choice's alone of a light without extent
     is_delta: bool,        // has no extent, so that no other ray finds it
     reach: f32,            // where shadow rays end, as a multiple of `to`
-    primitive: u32,        // what shines and does not hide itself, NO_INDEX for none
+    primitive: u32,        // the emissive primitive, which does not occlude itself, or NO_INDEX
 }
 
 // One of all that shines, by its power: Walker, "An Efficient Method for Generating Discrete Random Variables with General

@@ -1,7 +1,6 @@
-// What facets reflect, or let pass, at once of light from everywhere, where tables know it (`crates/render/src/pack/energy.rs`).
+// Directional albedo of microfacet lobes by single scattering, from tables (`crates/render/src/pack/energy.rs`).
 
-// What rough glass reflects and lets pass at once of light from everywhere: from its table (`crates/render/src/pack/energy.rs`), between rows by
-// roughness and columns by the cosine.
+// Directional albedo of rough glass, reflected and transmitted: interpolated in its table, rows by roughness and columns by the cosine.
 fn energy_kept(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     let last = f32(ENERGY_SIZE - 1u);
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);

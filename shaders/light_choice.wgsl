@@ -57,7 +57,7 @@ fn met_density(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     return density;
 }
 
-// Which child of which node is what was hit, as `LightNode.parent` has it; NO_INDEX if there is none.
+// Returns the leaf of a hit in the light tree, encoded as `LightNode.parent`, or NO_INDEX.
 fn light_leaf(hit: Hit) -> u32 {
     var place = hit.primitive;
     if (IN_TREE & (1u << INSTANCE)) != 0u {

@@ -1,6 +1,6 @@
-// Quotients and square roots rounded correctly (IEEE 754-2019, 4.3.1: to nearest, ties to even), on devices whose own are
-// only near: WGSL allows 2.5 units in the last place. The device's answer is a guess; its remainder, which integers modulo
-// 2^32 hold exactly, tells what is missing. `crates/render/src/gpu/rounding.rs` puts these in the place of a kernel's own.
+// Correctly rounded quotients and square roots (IEEE 754-2019, 4.3.1: to nearest, ties to even), for devices whose own may be off: WGSL
+// allows 2.5 units in the last place. The result of the device is corrected by its remainder, which is exact in integers modulo 2^32.
+// `crates/render/src/gpu/rounding.rs` replaces the operations of a kernel by these functions.
 
 const INFINITE = 0x7f800000u;
 

@@ -20,12 +20,11 @@ use wgray_scene::Scene;
 /// Renders a scene. The picture is kept in memory, in 16 bytes a pixel; in 80 more where it has alpha, or layers that are means
 /// over the samples.
 ///
-/// Where [`Device::Auto`](crate::Device::Auto) finds no adapter, or one that has no room for the scene or the picture, the CPU renders. So it does,
-/// whatever device was chosen, where the driver ends long loops early and a single sample has longer ones. A device that is lost
-/// is opened anew, a few times within seconds, and goes on from the last finished part; where it does not come back, and
-/// [`Device::Auto`](crate::Device::Auto) chose it, the CPU goes on. Warnings by `tracing` say why; [`Picture::device`] tells what has rendered last.
-/// wgpu panics at some losses: that is contained, but a panic hook hears of it, and a program that is built with
-/// `panic = "abort"` ends. Mesa's drivers print a line on standard error if the environment has no `XDG_RUNTIME_DIR`.
+/// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, or if the scene or image does not fit into its memory. With any
+/// device, it renders if the driver ends long loops early and a single sample needs longer ones. A lost device is opened again a few times, and
+/// the render continues from the last finished part; if that fails, [`Device::Auto`](crate::Device::Auto) continues on the CPU. Warnings by
+/// `tracing` give the reason; [`Picture::device`] returns the device that rendered last. wgpu panics at some losses: the panic is caught, but a
+/// panic hook observes it, and a program built with `panic = "abort"` ends. Mesa's drivers print a line on standard error if the environment has no `XDG_RUNTIME_DIR`.
 ///
 /// # Errors
 ///

@@ -230,7 +230,7 @@ records! {
         pub finite: f32,
         /// Half the second edge.
         pub v: Vec3,
-        /// The primitive that shines, [`NO_INDEX`] if there is none.
+        /// The index of its emissive primitive, or [`NO_INDEX`].
         pub primitive: u32,
         /// Its colour.
         pub color: Vec3,
@@ -259,7 +259,7 @@ records! {
         pub other: u32,
         /// 0 for a light, else one more than the number of a mesh's instance.
         pub instance: u32,
-        /// The number of the light, or where the triangle is in its mesh; [`NO_INDEX`] for the tree over what shines.
+        /// The index of the light, or of the triangle in its mesh; [`NO_INDEX`] for the light tree.
         pub index: u32,
     }
 
@@ -287,7 +287,7 @@ records! {
         pub edge: Vec4,
         /// 1, or 2 where the opposite directions get light too.
         pub sides: UVec4,
-        /// The children that are nodes; [`NO_INDEX`] for one thing that shines, and where there is no child. What follows is of such things.
+        /// The indices of children that are nodes; [`NO_INDEX`] for a single emitter, which the following fields describe, and for no child.
         pub children: UVec4,
         /// How densely samples of light lie on it once it is chosen, per area; 1 for what has no extent. Of these samples those of the tree
         /// alone, whose share it is multiplied by.
@@ -374,7 +374,7 @@ records! {
         pub vertices: u32,
         /// Where the mesh's origin is.
         pub anchor: Vec3,
-        /// The row of its triangles' groups, [`NO_INDEX`] if there is one group alone.
+        /// The row of the groups of its triangles, or [`NO_INDEX`] if it has a single group.
         pub groups: u32,
         /// First column of the map from the mesh's space.
         pub u: Vec3,
@@ -386,7 +386,7 @@ records! {
         pub shape: u32,
         /// Third column.
         pub w: Vec3,
-        /// The row of its mesh's first vertex's normal and v, [`NO_INDEX`] if there are none.
+        /// The row of normal and v of its first vertex, or [`NO_INDEX`] without normals and texture coordinates.
         pub attributes: u32,
         /// The largest coordinate of its mesh.
         pub size: f32,
@@ -400,14 +400,13 @@ records! {
         pub shadows: u32,
         /// The number of its mesh.
         pub mesh: u32,
-        /// The first of the two rows of its mesh's first vertex's tangents, [`NO_INDEX`] if there are none.
+        /// The first of the two rows of the tangents of its first vertex, or [`NO_INDEX`] without tangents.
         pub tangents: u32,
-        /// Where the numbers of its triangles' leaves start in the list of what shines, [`NO_INDEX`] if none of them shines; 0 where there
-        /// is no tree over what shines.
+        /// The offset of its triangles in `Packed::light_leaves`, or [`NO_INDEX`] if none is emissive; 0 without a light tree.
         pub leaves: u32,
-        /// The row of its mesh's first vertex's colour, [`NO_INDEX`] if there are none.
+        /// The row of the color of its first vertex, or [`NO_INDEX`] without vertex colors.
         pub colors: u32,
-        /// The first of the rows of its mesh's first vertex's further texture coordinates, two sets in each; [`NO_INDEX`] if there are none.
+        /// The first row of further texture coordinates of its first vertex, two sets per row; [`NO_INDEX`] if it has a single set.
         pub more_uvs: u32,
         /// How many further sets there are.
         pub uv_sets: u32,
@@ -415,7 +414,7 @@ records! {
         pub unused: u32,
     }
 
-    /// What the ray through a pixel's centre meets first; depth 0 and shape [`NO_INDEX`] where that is nothing.
+    /// The first hit of the ray through the center of a pixel; depth 0 and shape [`NO_INDEX`] for a miss.
     pub struct FirstHit {
         /// The outward normal, unit length.
         pub normal: Vec3,

@@ -13,7 +13,7 @@ use serde_json::json;
 use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
 use crate::limits::{DEEPEST, MOST};
 
-/// What light is simulated. In a file the names are in snake case: `"path"`.
+/// A light transport algorithm. In a file the names are in snake case: `"path"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {

@@ -82,7 +82,7 @@ pub struct Mesh {
     pub notes: Vec<Note>,
     /// Damage to the file, as the errors that it is where damage is refused.
     pub(crate) damage: Vec<Fault>,
-    /// What was computed from it: its bounding box, its BVH.
+    /// Values derived from it, such as its bounding box and BVH.
     cache: Cache,
 }
 
