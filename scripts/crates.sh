@@ -4,7 +4,8 @@
 package_crates() {
     folder=$1
     mkdir -p "$folder/.cargo"
-    cargo package --quiet --workspace --no-verify --allow-dirty --target-dir "$folder/cargo" 2>/dev/null
+    # `wgray-wasm-test` is not published.
+    cargo package --quiet --workspace --exclude wgray-wasm-test --no-verify --allow-dirty --target-dir "$folder/cargo"
     mv "$folder"/cargo/package/*.crate "$folder"
     rm -rf "$folder/cargo"
     echo '[patch.crates-io]' >"$folder/.cargo/config.toml"
