@@ -25,7 +25,6 @@ fn command() -> Command {
     let all = below(super::Cli::command());
     let names: Vec<String> = all
         .get_subcommands()
-        .flat_map(|command| std::iter::once(command).chain(command.get_subcommands()))
         .map(|command| command.get_name().to_owned())
         .collect();
     all.mut_subcommand("man", |man| {

@@ -10,7 +10,6 @@ use crate::scene::{Define, Description, Overrides, Scene};
 use anyhow::anyhow;
 use clap::ValueHint;
 
-use super::farm::text::word;
 use super::log::{self, Level};
 use super::numbers::samples;
 use super::outputs::keep_inputs;
@@ -103,7 +102,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     written.and_then(|()| file.finish()).map_err(RenderError::Output)?;
     if let Some(needed) = needed_root {
         let (name, folder) = (args.output.display(), folder.display());
-        let option = word(&from_here(&needed).to_string_lossy());
+        let option = quoted(&from_here(&needed).to_string_lossy());
         let text = format!("{name}: refers to files outside of {folder}; pass --asset-root {option} to render it");
         log::say(Level::Note, &text);
     }
@@ -138,8 +137,36 @@ fn from_here(folder: &Path) -> PathBuf {
     }
 }
 
+/// Quotes a word for a shell.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,@%+".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
 /// Returns the name of a file with control characters replaced by spaces.
 fn name_of(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shell_reads_quoted_words_unchanged() {
+        assert_eq!(quoted("a/b-c_1.toml"), "a/b-c_1.toml");
+        for word in ["", "a b", "$HOME", "`id`", "it's", "\"", "\\", "é", "#", "~"] {
+            assert_ne!(quoted(word), word);
+            #[cfg(unix)]
+            {
+                let line = format!("printf %s/ {}", quoted(word));
+                let printed = std::process::Command::new("sh").args(["-c", &line]).output().unwrap();
+                assert_eq!(String::from_utf8(printed.stdout).unwrap(), format!("{word}/"));
+            }
+        }
+    }
 }

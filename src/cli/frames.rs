@@ -19,37 +19,6 @@ impl Frames {
     pub fn first(count: u32) -> Frames {
         Frames((1..=count).collect())
     }
-
-    /// Returns the frames as ranges (first, last, step), as few as possible.
-    pub fn ranges(&self) -> Vec<(u32, u32, u32)> {
-        let mut sorted = self.0.clone();
-        sorted.sort_unstable();
-        let (mut ranges, mut rest) = (Vec::new(), sorted.as_slice());
-        while let [first, more @ ..] = rest {
-            let step = more.first().map_or(1, |next| next - first);
-            let mut count = 1;
-            while rest.get(count).is_some_and(|next| *next - rest[count - 1] == step) {
-                count += 1;
-            }
-            if count == 2 && step > 1 {
-                count = 1; // not yet a range; the second number may begin one with another step
-            }
-            let range = &rest[..count];
-            ranges.push((*first, range[count - 1], if count > 1 { step } else { 1 }));
-            rest = &rest[count..];
-        }
-        ranges
-    }
-
-    /// Returns the number of frames.
-    pub fn count(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Returns the middle frame.
-    pub fn middle(&self) -> Option<u32> {
-        self.0.get(self.0.len() / 2).copied()
-    }
 }
 
 impl FromStr for Frames {
@@ -197,28 +166,6 @@ mod tests {
         }
         assert_eq!(frames("1-100000").unwrap().len(), 100_000);
         assert_eq!(frames("0-999999999:10000").unwrap().len(), 100_000);
-    }
-
-    #[test]
-    fn ranges_are_few() {
-        for (text, wanted) in [
-            ("5", vec![(5, 5, 1)]),
-            ("1-4", vec![(1, 4, 1)]),
-            ("9,1-7:2", vec![(1, 9, 2)]),
-            ("1-10:9", vec![(1, 1, 1), (10, 10, 1)]),
-            ("3,1-2,7,9,11", vec![(1, 3, 1), (7, 11, 2)]),
-            ("1,5,6,7", vec![(1, 1, 1), (5, 7, 1)]),
-            ("0,999999999", vec![(0, 0, 1), (999_999_999, 999_999_999, 1)]),
-        ] {
-            let frames: Frames = text.parse().unwrap();
-            assert_eq!(frames.ranges(), wanted, "{text}");
-            let all = wanted
-                .into_iter()
-                .flat_map(|(first, last, step)| (first..=last).step_by(step as usize));
-            let mut sorted = frames.0.clone();
-            sorted.sort_unstable();
-            assert_eq!(all.collect::<Vec<_>>(), sorted, "{text}");
-        }
     }
 
     #[test]

@@ -1,25 +1,21 @@
 //! `wgray man`: manual pages, generated from the same definitions as the help.
 
-mod text;
-
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::error::RenderError;
-use crate::image::{Output, Pending};
-use clap::{CommandFactory as _, ValueHint};
+use clap::{Command, CommandFactory as _, ValueHint};
 use clap_mangen::Man;
 use clap_mangen::roff::{Roff, bold, roman};
 
-use super::exit_codes::EXIT_CODES;
 use super::{Cli, Usage};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The command to document, such as render or farm slurm [default: the program]
+    /// The command to document, such as render [default: the program]
     #[arg(value_name = "COMMAND", conflicts_with = "output")]
-    command: Vec<String>,
+    command: Option<String>,
 
     /// Write all pages (wgray.1, wgray-render.1, ...) to DIR, which is created if it does not exist
     #[arg(short, long, value_name = "DIR", value_hint = ValueHint::DirPath)]
@@ -27,73 +23,41 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let commands = commands();
-    let Some(folder) = &args.output else {
-        let name = [&["wgray".to_owned()], args.command.as_slice()].concat().join("-");
-        let Some(command) = commands.iter().find(|command| name_of(command) == name) else {
-            let names = commands
-                .iter()
-                .filter_map(|command| name_of(command).strip_prefix("wgray-"));
-            let names = names.map(|name| name.replace('-', " ")).collect::<Vec<_>>().join(", ");
-            let wanted = args.command.join(" ");
-            return Err(Usage(format!("COMMAND: {wanted:?} must be one of {names}")).into());
-        };
-        let text = page(command)?;
-        return Ok(super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS));
-    };
-    std::fs::create_dir_all(folder).map_err(|error| not_written(folder, &error))?;
-    for command in &commands {
-        let path = folder.join(format!("{}.1", name_of(command)));
-        write(&path, &page(command)?).map_err(|error| not_written(&path, &error))?;
+    let mut program = super::with_all_options(Cli::command()).disable_help_subcommand(true);
+    program.build(); // sets the full names of the subcommands
+    if let Some(folder) = &args.output {
+        std::fs::create_dir_all(folder).map_err(|error| not_written(folder, &error))?;
+        for command in std::iter::once(&program).chain(program.get_subcommands()) {
+            let path = folder.join(format!("{}.1", name_of(command)));
+            std::fs::write(&path, page(command, &program)?).map_err(|error| not_written(&path, &error))?;
+        }
+        return Ok(ExitCode::SUCCESS);
     }
-    Ok(ExitCode::SUCCESS)
+    let command = match &args.command {
+        None => &program,
+        Some(name) => program.find_subcommand(name).ok_or_else(|| {
+            let names: Vec<&str> = program.get_subcommands().map(Command::get_name).collect();
+            Usage(format!("COMMAND: {name:?} must be one of {}", names.join(", ")))
+        })?,
+    };
+    let text = page(command, &program)?;
+    Ok(super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS))
 }
 
 fn not_written(path: &Path, error: &io::Error) -> RenderError {
-    let message = match error.to_string() {
-        text if text.contains(&*path.to_string_lossy()) => text,
-        text => format!("{}: {text}", path.display()),
-    };
-    RenderError::Output(io::Error::new(error.kind(), message))
-}
-
-fn write(path: &Path, text: &[u8]) -> io::Result<()> {
-    let mut file = Pending::start(Output::find(path)?)?;
-    file.write_all(text)?;
-    file.finish()
-}
-
-/// Returns the program and each of its subcommands.
-fn commands() -> Vec<clap::Command> {
-    let mut program = super::with_all_options(Cli::command()).disable_help_subcommand(true);
-    program.build(); // sets the full names of the subcommands
-    let mut all = Vec::new();
-    add(program, &mut all);
-    all
-}
-
-/// Adds a command and its subcommands.
-fn add(command: clap::Command, all: &mut Vec<clap::Command>) {
-    let below: Vec<_> = command
-        .get_subcommands()
-        .filter(|below| below.get_name() != "help")
-        .cloned()
-        .collect();
-    all.push(command);
-    below.into_iter().for_each(|command| add(command, all));
+    RenderError::Output(io::Error::new(error.kind(), format!("{}: {error}", path.display())))
 }
 
 /// Returns the name of a page: `wgray-render`.
-fn name_of(command: &clap::Command) -> &str {
+fn name_of(command: &Command) -> &str {
     command.get_display_name().unwrap_or(command.get_name())
 }
 
 /// Returns a page in roff.
-fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
+fn page(command: &Command, program: &Command) -> io::Result<Vec<u8>> {
     let name = name_of(command);
-    let is_program = name == "wgray";
     let man = Man::new(command.clone());
-    // Written by hand: reproducible builds need an empty date, which `clap_mangen` would omit, shifting the other fields.
+    // Without a date, which reproducible builds need, `clap_mangen` would shift the other fields.
     let (title, version) = (name.to_uppercase(), env!("CARGO_PKG_VERSION"));
     let mut text = format!(".TH {title} 1 \"\" \"wgray {version}\" \"User Commands\"\n").into_bytes();
     man.render_name_section(&mut text)?;
@@ -104,82 +68,102 @@ fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     }
     man.render_options_section(&mut text)?;
     let mut rest = Roff::default();
-    if is_program {
-        section(&mut rest, "SCENES", text::SCENES);
-    }
+    let codes = command.get_after_help().unwrap_or_default().to_string();
     rest.control("SH", ["EXIT STATUS"]);
-    match own_exit_codes(command) {
-        Some(text) => paragraphs(&mut rest, &text),
-        None => entries(&mut rest, EXIT_CODES.iter().copied()),
+    for paragraph in codes.trim_start_matches("Exit codes: ").split("\n\n") {
+        rest.control("PP", []).text([roman(paragraph)]);
     }
-    let of_all = is_program || name == "wgray-render";
-    let variables = text::ENVIRONMENT
-        .iter()
-        .filter(|(_, _, commands)| is_program || commands.contains(&name));
-    let mut variables = variables.map(|(name, meaning, _)| (*name, *meaning)).peekable();
-    if variables.peek().is_some() {
-        rest.control("SH", ["ENVIRONMENT"]);
-        entries(&mut rest, variables);
-    }
-    if of_all {
-        rest.control("SH", ["FILES"]);
-        entries(&mut rest, text::FILES.iter().copied());
-    }
-    let mut examples = text::EXAMPLES.iter().filter(|example| example.of(name)).peekable();
-    if examples.peek().is_some() {
-        rest.control("SH", ["EXAMPLES"]);
-        for (i, example) in examples.enumerate() {
-            if i > 0 {
-                rest.control("PP", []);
+    if name == "wgray" || name == "wgray-render" {
+        for (section, entries) in [("ENVIRONMENT", ENVIRONMENT), ("FILES", FILES)] {
+            rest.control("SH", [section]);
+            for (term, meaning) in entries {
+                rest.control("TP", []).text([bold(*term)]).text([roman(*meaning)]);
             }
-            rest.text([roman(example.what)]);
-            rest.control("PP", []);
-            rest.control("RS", ["4"]);
-            rest.text([bold(example.line)]);
-            rest.control("RE", []);
         }
     }
+    rest.control("SH", ["EXAMPLES"]);
+    for (purpose, line) in examples(name) {
+        rest.control("PP", []).text([roman(format!("{purpose}:"))]);
+        rest.control("RS", ["4"]).text([bold(line)]).control("RE", []);
+    }
     rest.control("SH", ["SEE ALSO"]);
-    let names = commands()
-        .iter()
-        .map(|command| name_of(command).to_owned())
-        .collect::<Vec<_>>();
-    let others = names.iter().filter(|other| *other != name);
-    let others = others.map(|other| format!("{other}(1)")).collect::<Vec<_>>();
+    let all = std::iter::once(program).chain(program.get_subcommands()).map(name_of);
+    let others: Vec<String> = all
+        .filter(|other| *other != name)
+        .map(|other| format!("{other}(1)"))
+        .collect();
     rest.text([roman(others.join(", "))]);
     rest.to_writer(&mut text)?;
     Ok(text)
 }
 
-/// Returns the exit codes that a command documents itself, if any.
-fn own_exit_codes(command: &clap::Command) -> Option<String> {
-    let text = command.get_after_help()?.to_string();
-    let own = text.strip_prefix("Exit codes: ")?;
-    (text != super::EXIT_CODES).then(|| own.to_owned())
+/// Returns the examples of a page with their purposes; the page of the program shows all.
+fn examples(name: &str) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let words = name.replace('-', " ");
+    let pairs = EXAMPLES.lines().filter_map(|line| line.split_once(": "));
+    pairs.filter(move |(_, line)| {
+        line.strip_prefix(&words)
+            .is_some_and(|rest| !rest.starts_with(char::is_alphabetic))
+    })
 }
 
-fn section(roff: &mut Roff, title: &str, text: &str) {
-    roff.control("SH", [title]);
-    paragraphs(roff, text);
-}
+/// Environment variables that the program or its libraries read.
+const ENVIRONMENT: &[(&str, &str)] = &[
+    (
+        "VK_DRIVER_FILES",
+        "Vulkan drivers to use instead of all installed ones.",
+    ),
+    (
+        "WGPU_BACKEND",
+        "Graphics APIs to use: vulkan, metal or dx12, separated by commas.",
+    ),
+    (
+        "LP_NUM_THREADS",
+        "Number of threads of Mesa's software Vulkan. --threads sets it.",
+    ),
+    ("MESA_SHADER_CACHE_DIR", "Folder in which Mesa caches compiled kernels."),
+    (
+        "RAYON_NUM_THREADS",
+        "Number of CPU threads unless --threads is given; by default all.",
+    ),
+    ("NO_COLOR", "Disables colors in messages of wgray dev."),
+];
 
-fn paragraphs(roff: &mut Roff, text: &str) {
-    for (i, paragraph) in text.split("\n\n").enumerate() {
-        if i > 0 {
-            roff.control("PP", []);
-        }
-        roff.text([roman(paragraph)]);
-    }
-}
+/// Output files.
+const FILES: &[(&str, &str)] = &[
+    (
+        "NAME.png, NAME.exr, NAME.jpg, NAME.webp",
+        "Images, written as .wgray-* in the same folder and renamed when complete.",
+    ),
+    (
+        "NAME.checkpoint",
+        "Saved progress of an image, for --checkpoint and --resume. It is kept after success.",
+    ),
+    (
+        "NAME.part",
+        "A part of an image, written by --tile; wgray merge joins parts.",
+    ),
+];
 
-/// Writes a list of terms and definitions.
-fn entries<'a>(roff: &mut Roff, all: impl Iterator<Item = (&'a str, &'a str)>) {
-    for (term, meaning) in all {
-        roff.control("TP", []);
-        roff.text([bold(term)]);
-        roff.text([roman(meaning)]);
-    }
-}
+/// Purposes and commands.
+const EXAMPLES: &str = "\
+Render a model, in a neutral studio if it has no lights: wgray render model.glb -o image.png
+Render an EXR with layers: wgray render a.toml --size 1920x1200 --spp 64 -o a.exr --aov normal,depth
+Render the missing frames of an animation: wgray render a.toml --frames 1-100 -o 'out.####.png' --skip-existing
+Resume a long render after any interruption: wgray render a.toml --spp 4096 --checkpoint a.checkpoint --resume
+Render the second of four parts of an image: wgray render a.toml --tile 2/4 -o 2.part
+Join four parts: wgray merge 1.part 2.part 3.part 4.part -o image.exr
+Validate a scene: wgray check scene.toml
+Print the contents of a scene and the device that would render it: wgray info scene.toml
+Convert a model to an editable scene that renders the same bits: wgray convert model.glb -o scene.toml
+Check whether two images differ visibly: wgray diff new.png golden.png --fail flip=0.01 --out differences.png
+Show a scene on a web page that updates after every save: wgray dev scene.toml
+List the devices: wgray devices
+Write the JSON Schema of scene files for an editor: wgray schema > wgray.schema.json
+Print completions for bash: wgray completions bash
+Read a page: wgray man render | man -l -
+Write all pages: wgray man -o man1
+";
 
 #[cfg(test)]
 mod tests {
@@ -187,12 +171,14 @@ mod tests {
     use clap::Parser as _;
 
     #[test]
-    fn every_example_can_be_read() {
-        for example in text::EXAMPLES {
-            let words = example.line.split_whitespace().map(|word| word.trim_matches('\''));
+    fn every_example_can_be_parsed() {
+        assert_eq!(examples("wgray").count(), EXAMPLES.lines().count());
+        for (_, line) in examples("wgray").filter(|(_, line)| cfg!(feature = "dev") || !line.starts_with("wgray dev "))
+        {
+            let words = line.split_whitespace().map(|word| word.trim_matches('\''));
             let words: Vec<&str> = words.take_while(|word| !["|", ">"].contains(word)).collect();
             if let Err(error) = Cli::try_parse_from(words) {
-                panic!("{}: {error}", example.line);
+                panic!("{line}: {error}");
             }
         }
         assert!(Cli::try_parse_from(["wgray", "render", "a.toml", "--bad"]).is_err());
@@ -200,21 +186,9 @@ mod tests {
 
     #[test]
     fn every_command_has_an_example() {
-        for command in commands() {
-            let name = name_of(&command);
-            assert!(text::EXAMPLES.iter().any(|example| example.of(name)), "{name}");
-        }
-    }
-
-    #[test]
-    fn variables_are_of_commands() {
-        let commands = commands();
-        let names: Vec<&str> = commands.iter().map(name_of).collect();
-        for (variable, _, of) in text::ENVIRONMENT {
-            for name in *of {
-                let is_left_out = cfg!(not(feature = "dev")) && *name == "wgray-dev";
-                assert!(is_left_out || names.contains(name), "{variable}: {name}");
-            }
+        for command in Cli::command().get_subcommands() {
+            let name = format!("wgray-{}", command.get_name());
+            assert!(examples(&name).next().is_some(), "{name}");
         }
     }
 }

@@ -8,8 +8,6 @@ mod convert;
 mod dev;
 mod devices;
 mod diff;
-mod exit_codes;
-mod farm;
 mod frames;
 mod hints;
 mod info;
@@ -79,9 +77,6 @@ enum Command {
     Info(Box<info::Args>),
     /// Join the parts of `render --tile` into an image
     Merge(Box<merge::Args>),
-    /// Write the jobs that render a scene on a render farm
-    #[command(subcommand)]
-    Farm(farm::Engine),
     /// Write a scene or model as a TOML scene that renders the same image
     Convert(Box<convert::Args>),
     /// Compare two images; fail if they differ
@@ -130,7 +125,6 @@ pub fn main() -> ExitCode {
     allocator::catch_signal_stacks();
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
-        Command::Farm(engine) => engine.threads(),
         _ => None,
     };
     let requeue = match &cli.command {
@@ -146,7 +140,6 @@ pub fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Merge(args) => merge::run(&args),
-        Command::Farm(engine) => farm::run(&engine, start),
         Command::Diff(args) => diff::run(*args),
         Command::Devices => Ok(devices::run()),
         Command::Schema => Ok(schema::run()),

@@ -320,7 +320,7 @@ fn parse_fps(text: &str) -> Result<f64, String> {
 const MAX_TIME: Duration = Duration::from_secs(1_000_000_000);
 
 /// Parses a duration: a decimal number of seconds, or one with a unit.
-pub fn parse_duration(text: &str) -> Result<Duration, String> {
+fn parse_duration(text: &str) -> Result<Duration, String> {
     const UNITS: [(&str, f64); 4] = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
     let number = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let unit = &text[number.len()..];

@@ -4,7 +4,6 @@ mod args;
 mod once_log;
 mod plan;
 mod preview;
-mod trial;
 mod work;
 
 use crate::scene::Note;
@@ -14,10 +13,9 @@ use std::time::Instant;
 
 use crate::device::DeviceInfo;
 use crate::error::RenderError;
-use crate::scene::{Problem, Scene, is_model};
+use crate::scene::{Scene, is_model};
 use anyhow::Context as _;
 use tracing::info;
-use wgray_image::Region;
 use wgray_render::job::{CheckpointStore, NoCheckpoint};
 
 use self::once_log::OnceLog;
@@ -31,8 +29,7 @@ use super::signal::{Signals, Stop};
 use super::stats::Stats;
 use super::{Interrupted, Usage, facts_of, located, plain, progress};
 
-pub use args::{Args, parse_duration, parse_size};
-pub use trial::Trial;
+pub use args::{Args, parse_size};
 
 pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     let mut signals = Signals::immediate(args.requeue_exit).context("signal handler")?;
@@ -71,19 +68,19 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
 }
 
 /// The scene and the frames that the options request.
-pub struct Job<'a> {
+struct Job<'a> {
     args: &'a Args,
-    pub log: OnceLog,
+    log: OnceLog,
     /// The scene at the current frame.
-    pub scene: Scene,
+    scene: Scene,
     fps: Option<f64>,
     /// The frames to render, with their destinations.
-    pub frames: Vec<(Frame, Outputs)>,
+    frames: Vec<(Frame, Outputs)>,
 }
 
 impl<'a> Job<'a> {
     /// Reads the scene and checks all frames.
-    pub fn new(args: &'a Args) -> anyhow::Result<Job<'a>> {
+    fn new(args: &'a Args) -> anyhow::Result<Job<'a>> {
         if args.verbose {
             log::print_events();
         }
@@ -113,13 +110,8 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Returns the region of the image to render.
-    pub fn region(&self) -> Result<Region, Problem> {
-        self.args.rendering().region(&self.scene)
-    }
-
     /// Sets the scene to a frame.
-    pub fn go_to(&mut self, frame: Frame) -> anyhow::Result<()> {
+    fn go_to(&mut self, frame: Frame) -> anyhow::Result<()> {
         if let Some((number, fps)) = frame.number.zip(self.fps) {
             let mut overrides = self.args.overrides();
             overrides.gltf.time = Some(f64::from(number) / fps);
