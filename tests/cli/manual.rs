@@ -9,7 +9,7 @@ fn commands(place: &Place) -> Vec<String> {
     let names = list
         .lines()
         .filter_map(|line| line.strip_prefix("  ")?.split_whitespace().next());
-    // A description that goes on in the next line is farther to the right.
+    // Continuation lines of descriptions are indented further.
     let names: Vec<String> = (names.zip(list.lines()))
         .filter(|(name, line)| !line.starts_with("   ") && *name != "help")
         .map(|(name, _)| name.to_owned())
@@ -23,8 +23,7 @@ fn every_command_has_a_page() {
     let place = Place::new();
     place.quietly(&["man", "-o", "pages/man1"]);
     let mut wanted: Vec<String> = commands(&place).iter().map(|name| format!("wgray-{name}.1")).collect();
-    let others = ["wgray.1", "wgray-farm-openjd.1", "wgray-farm-slurm.1"];
-    wanted.extend(others.map(str::to_owned));
+    wanted.push("wgray.1".to_owned());
     wanted.sort();
     let folder = place.folder().join("pages/man1");
     let mut there: Vec<String> = std::fs::read_dir(&folder)
@@ -45,10 +44,24 @@ fn every_command_has_a_page() {
         ] {
             assert!(page.contains(part), "{name}: {part}");
         }
-        let own = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
-        let own = own.into_iter().flat_map(|name| name.split('-'));
-        let arguments: Vec<&str> = std::iter::once("man").chain(own).collect();
+        let command = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
+        let arguments: Vec<&str> = std::iter::once("man").chain(command).collect();
         assert_eq!(place.run(&arguments).stdout, page, "{name} is printed");
+        // The page lists every option of the help, in bold and with escaped dashes.
+        let arguments: Vec<&str> = command.into_iter().chain(["--help"]).collect();
+        let help = place.run(&arguments).stdout;
+        let options = help.lines().filter_map(|line| line.trim_start().split_once("--"));
+        let options = options.filter(|(before, _)| before.is_empty() || before.ends_with(", ") && before.len() == 4);
+        let names = options.map(|(_, rest)| rest.split([' ', ',', '=', '[']).next().unwrap());
+        let names: Vec<String> = names
+            .map(|name| format!("\\fB\\-\\-{}\\fR", name.replace('-', "\\-")))
+            .collect();
+        assert!(names.contains(&"\\fB\\-\\-log\\-format\\fR".to_owned()), "{help}");
+        for option in names {
+            assert!(page.contains(&option), "{name}: {option}");
+        }
+        assert!(!page.contains("\\fB\\-\\-no\\-such\\-option\\fR"));
+        has_no_warnings(&folder.join(&name));
     }
     let render = place.run(&["man", "render"]).stdout;
     for part in [
@@ -60,14 +73,14 @@ fn every_command_has_a_page() {
     ] {
         assert!(render.contains(part), "{part}");
     }
-    // Pages are written anew.
+    // Existing pages are replaced.
     std::fs::write(folder.join("wgray.1"), "old").unwrap();
     place.quietly(&["man", "-o", "pages/man1"]);
     assert_ne!(std::fs::read_to_string(folder.join("wgray.1")).unwrap(), "old");
 }
 
 #[test]
-fn pages_that_there_are_not_are_told() {
+fn unknown_pages_are_rejected() {
     let place = Place::new();
     let ran = place.run(&["man", "paint"]);
     assert_eq!((ran.code, ran.stdout.as_str()), (2, ""));
@@ -83,6 +96,42 @@ fn pages_that_there_are_not_are_told() {
     let ran = place.run(&["man", "render", "-o", "pages"]);
     assert_eq!(ran.code, 2);
     assert!(place.files().is_empty());
+}
+
+/// Formats a page with groff, if it is installed, which must not warn.
+fn has_no_warnings(page: &std::path::Path) {
+    let groff = std::process::Command::new("groff")
+        .args(["-man", "-Tutf8", "-ww", "-z"])
+        .arg(page)
+        .output();
+    if let Ok(ran) = groff {
+        let warnings = String::from_utf8_lossy(&ran.stderr);
+        assert!(
+            ran.status.success() && warnings.is_empty(),
+            "{}: {warnings}",
+            page.display()
+        );
+    }
+}
+
+/// The table in the documentation has the exit codes of the help, which the pages repeat.
+#[test]
+fn exit_codes_are_documented() {
+    let page = std::fs::read_to_string(super::project("docs/command-line.md")).unwrap();
+    let (_, table) = page.split_once("| exit code | meaning |").expect("the table");
+    let rows = table
+        .lines()
+        .skip(2)
+        .map_while(|line| line.strip_prefix("| ")?.split_once(" | "));
+    let documented: Vec<&str> = rows.map(|(code, _)| code).filter(|code| code.len() == 1).collect();
+    let help = Place::new().run(&["--help"]).stdout;
+    let (_, codes) = help.split_once("Exit codes: ").expect("exit codes");
+    let codes: Vec<&str> = codes
+        .split_whitespace()
+        .filter(|word| word.parse::<u8>().is_ok_and(|code| code < 9))
+        .collect();
+    assert_eq!(codes, documented);
+    assert!(page.contains("| 128 + n |") && help.contains("128 + n"));
 }
 
 #[test]
@@ -101,7 +150,7 @@ fn every_shell_has_completions_that_know_every_command() {
     assert!(ran.stderr.contains("possible values: bash"), "{}", ran.stderr);
 }
 
-/// What bash offers for the last of these words.
+/// Returns what bash offers for the last of these words.
 #[cfg(unix)]
 fn offered(place: &Place, words: &[&str]) -> Vec<String> {
     let line = words.join("' '");
@@ -129,7 +178,6 @@ fn bash_completes_commands_options_names_and_files() {
         ["phong", "path"]
     );
     assert_eq!(offered(&place, &["wgray", "man", "che"]), ["check"]);
-    assert_eq!(offered(&place, &["wgray", "man", "farm", "slu"]), ["slurm"]);
     for command in ["render", "info"] {
         let devices = offered(&place, &["wgray", command, "a.toml", "--device", ""]);
         assert_eq!(devices, ["auto", "gpu", "cpu"], "{command}");
@@ -145,7 +193,7 @@ fn bash_completes_commands_options_names_and_files() {
         files
     };
     assert_eq!(files("--checkpoint"), ["small.toml", "smalls"]);
-    // Bash finds folders by itself.
+    // Bash completes folders without further candidates.
     assert_eq!(files("--asset-root"), ["", "compopt -o plusdirs"]);
     assert!(offered(&place, &["wgray", "xyz"]).iter().all(String::is_empty));
 }
