@@ -106,7 +106,7 @@ impl PictureOptions {
 }
 
 /// Returns a parser that accepts one of these names.
-fn named<T: Clone + Send + Sync + 'static, const N: usize>(
+pub fn named<T: Clone + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
 ) -> impl clap::builder::TypedValueParser<Value = T> {

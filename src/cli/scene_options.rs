@@ -4,7 +4,8 @@ use crate::scene::{
     Background, EnvironmentDescription, GltfChoice, Orbit, Overrides, Presentation, Scene, Selection, UpAxis, View,
 };
 use clap::ValueHint;
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+
+use super::picture_options::named;
 
 /// The options as parsed.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -55,7 +56,7 @@ struct PresentationOptions {
 #[command(next_help_heading = "Scene")]
 struct GltfOptions {
     /// Frame a model: corner, front, back, left, right, top, bottom or iso
-    #[arg(long, help_heading = None::<&'static str>, display_order = 3, value_name = "VIEW", value_parser = view_parser(), hide_possible_values = true)]
+    #[arg(long, help_heading = None::<&'static str>, display_order = 3, value_name = "VIEW", value_parser = named(View::ALL, View::name), hide_possible_values = true)]
     view: Option<View>,
 
     /// Use this camera of a glTF file, counted from 0
@@ -130,11 +131,4 @@ impl GltfOptions {
 /// Parses a number or a name; never fails.
 fn selection(text: &str) -> Result<Selection, String> {
     Ok(Selection::from(text))
-}
-
-fn view_parser() -> impl clap::builder::TypedValueParser<Value = View> {
-    PossibleValuesParser::new(View::ALL.map(View::name)).try_map(|name| {
-        let found = View::ALL.into_iter().find(|view| view.name() == name);
-        found.ok_or(format!("unknown view: {name}"))
-    })
 }

@@ -8,7 +8,7 @@ use crate::image::Aov;
 use crate::options::Options;
 use crate::scene::{Define, Integrator, Overrides, Pattern, Scene, is_gltf};
 use clap::ValueHint;
-use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser as _};
+use clap::builder::NonEmptyStringValueParser;
 use wgray_image::Region;
 use wgray_render::job::Tile;
 
@@ -16,7 +16,7 @@ use crate::cli::Usage;
 use crate::cli::frames::{Frame, Frames};
 use crate::cli::numbers::{bounces, samples, whole};
 use crate::cli::outputs::{Layered, Outputs};
-use crate::cli::picture_options::PictureOptions;
+use crate::cli::picture_options::{PictureOptions, named};
 use crate::cli::progress::Mode;
 use crate::cli::scene_options::SceneOptions;
 
@@ -41,7 +41,7 @@ pub struct Args {
     pub device: String,
 
     /// Use integrator phong (direct light) or path (global illumination)
-    #[arg(long, display_order = 5, value_name = "NAME", value_parser = integrator_parser(), hide_possible_values = true)]
+    #[arg(long, display_order = 5, value_name = "NAME", value_parser = named(Integrator::ALL, Integrator::name), hide_possible_values = true)]
     pub integrator: Option<Integrator>,
 
     /// Stop after TIME (30, 90s, 1.5m, 2h) and write the samples taken so far
@@ -84,7 +84,7 @@ pub struct Args {
     pub light_samples: Option<u32>,
 
     /// Set the sampling pattern within a pixel
-    #[arg(long, help_heading = "Sampling", value_name = "PATTERN", value_parser = pattern_parser(), hide_short_help = true)]
+    #[arg(long, help_heading = "Sampling", value_name = "PATTERN", value_parser = named(Pattern::ALL, Pattern::name), hide_short_help = true)]
     pub pixel_pattern: Option<Pattern>,
 
     /// Set the seed of all random numbers
@@ -111,7 +111,7 @@ pub struct Args {
     pub pictures: PictureOptions,
 
     /// Also write layers, such as depth,normal, into an EXR or beside a PNG
-    #[arg(long, help_heading = "Output images", value_name = "LAYERS", value_delimiter = ',', value_parser = aov_parser(), hide_possible_values = true)]
+    #[arg(long, help_heading = "Output images", value_name = "LAYERS", value_delimiter = ',', value_parser = named(Aov::ALL, Aov::name), hide_possible_values = true)]
     pub aov: Vec<Aov>,
 
     /// Render only the columns x0 to x1 - 1 and the rows y0 to y1 - 1
@@ -268,27 +268,6 @@ impl Args {
             ..Overrides::default()
         })
     }
-}
-
-fn pattern_parser() -> impl clap::builder::TypedValueParser<Value = Pattern> {
-    PossibleValuesParser::new(Pattern::ALL.map(Pattern::name)).try_map(|name| {
-        let found = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name);
-        found.ok_or(format!("unknown pattern: {name}"))
-    })
-}
-
-fn integrator_parser() -> impl clap::builder::TypedValueParser<Value = Integrator> {
-    PossibleValuesParser::new(Integrator::ALL.map(Integrator::name)).try_map(|name| {
-        let found = Integrator::ALL.into_iter().find(|integrator| integrator.name() == name);
-        found.ok_or(format!("unknown integrator: {name}"))
-    })
-}
-
-fn aov_parser() -> impl clap::builder::TypedValueParser<Value = Aov> {
-    PossibleValuesParser::new(Aov::ALL.map(Aov::name)).try_map(|name| {
-        let found = Aov::ALL.into_iter().find(|aov| aov.name() == name);
-        found.ok_or(format!("unknown layer: {name}"))
-    })
 }
 
 /// Parses the error threshold of adaptive sampling.
