@@ -198,7 +198,7 @@ fn signaled_tasks_of_slurm_are_requeued() {
         }
         for signal in signals {
             let status = std::process::Command::new("kill")
-                .args([signal, &child.id().to_string()])
+                .args([*signal, child.id().to_string().as_str()])
                 .status();
             assert!(status.expect("kill").success());
             // bash postpones a signal that arrives while it handles another one.

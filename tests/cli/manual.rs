@@ -50,8 +50,8 @@ fn every_command_has_a_page() {
         // The page lists every option of the help, in bold and with escaped dashes.
         let arguments: Vec<&str> = command.into_iter().chain(["--help"]).collect();
         let help = place.run(&arguments).stdout;
-        let options = help.lines().filter_map(|line| line.trim_start().split_once("--"));
-        let options = options.filter(|(before, _)| before.is_empty() || before.ends_with(", ") && before.len() == 4);
+        let is_option = |line: &&str| line.starts_with("  -") || line.starts_with("      -");
+        let options = help.lines().filter(is_option).filter_map(|line| line.split_once("--"));
         let names = options.map(|(_, rest)| rest.split([' ', ',', '=', '[']).next().unwrap());
         let names: Vec<String> = names
             .map(|name| format!("\\fB\\-\\-{}\\fR", name.replace('-', "\\-")))
