@@ -30,7 +30,7 @@ pub const CALL: usize = 0;
 /// The group of the scene, which ends with its texels.
 pub const SCENE: usize = 1;
 
-/// How many of them are storage buffers.
+/// The number of storage buffers.
 pub const STORAGE_BUFFERS: usize = {
     let (mut count, mut group) = (0, 0);
     while group < GROUPS.len() {
