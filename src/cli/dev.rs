@@ -29,7 +29,7 @@ pub struct Args {
 
     /// Serve the page at this address
     ///
-    /// Anyone who can reach the address can view the scene and edit values of the scene file and annotated shader constants.
+    /// Anyone who can reach the address can view the scene and edit values of the scene file.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7878", value_parser = NonEmptyStringValueParser::new())]
     listen: String,
 
@@ -141,7 +141,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !address.ip().is_loopback() {
         let warning = format!(
             "{address} is not a loopback address: anyone who can reach it can view the scene and edit values of the scene \
-             file and annotated shader constants"
+             file"
         );
         log::say(Level::Warning, &warning);
     }
@@ -291,8 +291,6 @@ impl Terminal {
             ),
             Report::Wrote(what, Ok(())) => self.line(GREEN, &format!("Saved {what} to the scene file")),
             Report::Wrote(what, Err(error)) => self.line(RED, &format!("Cannot save {what}: {error}")),
-            Report::Written(what, Ok(())) => self.line(GREEN, what),
-            Report::Written(what, Err(error)) => self.line(RED, &format!("{what}: failed: {error}")),
             Report::Turned(what, Ok(())) => self.line(GREEN, what),
             Report::Turned(what, Err(error)) => self.line(RED, &format!("{what}: failed: {error}")),
         }

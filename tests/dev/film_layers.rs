@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use wgray_dev::{Command, Content, FilmLayer, Frame, LayerName, View};
+use wgray_dev::{Command, Content, FilmLayer, Frame, View};
 use wgray_render::film::{Film, Layer};
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
@@ -119,35 +119,25 @@ fn layers_are_those_that_render_gives_and_light_is_their_sum() {
 }
 
 #[test]
-fn the_kernel_of_light_is_kept_whatever_layers_are_looked_at() {
+fn the_kernels_of_color_and_of_layers_are_kept() {
     let files = Files::new(&path());
-    files.write(
-        "shaders/pixel.wgsl",
-        &format!(
-            "{}\nvar<private> seen: f32; // layer\n",
-            files.read("shaders/pixel.wgsl")
-        ),
-    );
     let running = files.start();
     running.wait_rendered(&files);
     let colors = running.colors();
-    let seen = View::Layer(LayerName::new("seen").unwrap());
-    let mut compiled = running.state().compile_seconds;
-    for view in [View::Direct, seen] {
+    let show = |view| {
         running.session.send(Command::View(view));
         running.wait("the view", |running| {
-            running
-                .frame()
-                .filter(|frame| frame.header.done && frame.header.view == view)
-        });
-        let last = std::mem::replace(&mut compiled, running.state().compile_seconds);
-        assert_ne!(compiled, last, "{view:?} takes a kernel");
-    }
-    running.session.send(Command::View(View::Color));
-    running.wait("light", |running| {
-        let frame = running.frame()?;
-        matches!(&frame.content, Content::Color(pixels) if frame.header.done && *pixels == colors).then_some(())
-    });
+            let frame = running.frame()?;
+            (frame.header.done && frame.header.view == view).then_some(frame)
+        })
+    };
+    let first = running.state().compile_seconds;
+    show(View::Direct);
+    let compiled = running.state().compile_seconds;
+    assert_ne!(compiled, first, "layers have a kernel of their own");
+    let color = show(View::Color);
+    assert!(matches!(&color.content, Content::Color(pixels) if *pixels == colors));
+    show(View::Albedo);
     assert_eq!(running.state().compile_seconds, compiled);
 }
 

@@ -13,7 +13,6 @@ mod reload;
 mod responsive;
 mod running;
 mod server;
-mod shader_layers;
 mod shader_sliders;
 mod slow_viewer;
 mod viewer;

@@ -6,7 +6,7 @@ import { after, afterEach, before, beforeEach, test } from "node:test";
 import { LONGEST, SCENE, Studio, canvas, decoded, launch, open, settled, visit } from "./studio.mjs";
 
 const KERNEL = "shaders/kernels/render.wgsl";
-const LEVEL = "const level: f32 = 0.5; // slider 0..1\n";
+const LEVEL = "override level: f32 = 0.5; // 0..1\n";
 const PHONE = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
 
 let browser;
@@ -119,7 +119,7 @@ test("a half-typed number of a shader stays while sliders come and go, and slide
   await level.focus();
   await page.keyboard.press("Control+a");
   await page.keyboard.type("0.2");
-  mark(`const early: f32 = 0.5; // slider 0..1\n${LEVEL}const wide: f32 = 5.0; // slider 0..1000\n`);
+  mark(`override early: f32 = 0.5; // 0..1\n${LEVEL}override wide: f32 = 5.0; // 0..1000\n`);
   await slider(page, "wide").waitFor();
   assert.equal(await level.inputValue(), "0.2");
   await page.keyboard.type("5");
@@ -137,11 +137,11 @@ test("a half-typed number of a shader stays while sliders come and go, and slide
   await says(level, "0.26");
   const wide = slider(page, "wide");
   assert.equal(await wide.getAttribute("step"), "1");
-  mark(`const wide: f32 = 0.05; // slider 0..0.1\n${LEVEL}`);
+  mark(`override wide: f32 = 0.05; // 0..0.1\n${LEVEL}`);
   await says(wide, "0.05");
   assert.deepEqual(await wide.evaluate((node) => [node.min, node.max, Number(node.step)]), ["0", "0.1", 0.0001]);
-  mark(`const wide: f32 = 0.05; // slider 0..0.1 step 0.05\n${LEVEL}`);
-  await page.waitForFunction(() => document.querySelector("#sliders input[max='0.1']").step === "0.05");
+  mark(`override wide: f32 = 0.05; // 0..0.2\n${LEVEL}`);
+  await page.locator("#sliders input[max='0.2']").waitFor();
   assert.equal(await slider(page, "early").count(), 0);
   // A slider that is removed while its number is typed discards it.
   await sent();

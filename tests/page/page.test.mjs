@@ -351,7 +351,7 @@ test("all errors are shown at once, including those in unused kernels", async ()
   studio.edit("shaders/kernels/first_hits.wgsl", "fn first_hits", "fn hits_first");
   studio.edit("shaders/kernels/adaptive.wgsl", "= moments;", "= moments.xyz;");
   const problem = (words) => page.locator("#problems article", { hasText: words }).waitFor();
-  for (const words of ["simple", "(4, 4)", "must be called `first_hits`", "`moments.xyz` of type `vec3<f32>`"]) await problem(words);
+  for (const words of ["simple", "(4, 4)", "must be called `first_hits`", "`moments.xyz` (`vec3<f32>`)"]) await problem(words);
   assert.equal(await page.locator("#problems article").count(), 4);
   same(await shown(page), seen);
   // The session continues.

@@ -1,12 +1,11 @@
-// Shader features of the page: sliders of marked constants, layers, kernel timings, editor links.
+// Shader features of the page: sliders of overrides, kernel timings, editor links.
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { Studio, canvas, launch, open, same, settled, shown } from "./studio.mjs";
+import { Studio, launch, open, same, settled, shown } from "./studio.mjs";
 
 const KERNEL = "shaders/kernels/render.wgsl";
-const PLACE = "let place = vec2f(pixel) + at.xy;\n    var ray";
 
 let browser;
 let studio;
@@ -15,8 +14,8 @@ before(async () => (browser = await launch()));
 after(() => browser.close());
 beforeEach(() => {
   studio = new Studio();
-  studio.edit(KERNEL, "path_value(path)", "(path_value(path) * vec4f(tint * level, 1.0))");
-  studio.write(KERNEL, `${studio.read(KERNEL)}const level: f32 = 0.5; // slider 0..1\nconst tint: vec3f = vec3f(1.0, 1.0, 1.0); // color\n`);
+  studio.edit(KERNEL, "path_value(path)", "(path_value(path) * vec4f(level, select(0.0, level, green), level, 1.0))");
+  studio.write(KERNEL, `${studio.read(KERNEL)}override level: f32 = 0.5; // 0..1\noverride green: bool = true;\n`);
 });
 afterEach(async () => {
   await Promise.all(browser.contexts().map((context) => context.close()));
@@ -25,7 +24,7 @@ afterEach(async () => {
 
 const compiled = (page) => page.locator("#compile").innerText();
 
-test("a slider changes the image without the compiler, and is written to the shader", async () => {
+test("a slider changes the image without the compiler, and is copied", async () => {
   await studio.start();
   const page = await open(browser, studio);
   const [first, time] = [await shown(page), await compiled(page)];
@@ -41,46 +40,20 @@ test("a slider changes the image without the compiler, and is written to the sha
   await field.press("Enter");
   await settled(page);
   assert.equal(await slider.inputValue(), "0.25");
-  const quarter = await shown(page);
-  // `wgray render` uses the built-in shaders, so the edited file is compared instead.
-  const before = studio.read(KERNEL);
-  await page.click("#write-sliders");
-  await page.locator("#write-sliders:disabled").waitFor();
-  assert.equal(studio.read(KERNEL), before.replace("f32 = 0.5", "f32 = 0.25"));
-  await settled(page);
-  same(await shown(page), quarter);
-  await page.click("#undo-sliders");
-  await page.waitForFunction(() => document.querySelector("#sliders input[type=range]").value === "0.5");
-  await settled(page);
-  same(await shown(page), first);
-  assert.equal(await compiled(page), time, "nothing was compiled");
-  // A chosen colour is shown, and can be reset.
-  await page.getByRole("spinbutton", { name: "tint, green" }).fill("0");
-  await page.keyboard.press("Enter");
+  await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
+  await page.click("#copy-sliders");
+  await page.locator("#notice", { hasText: "Declarations copied" }).waitFor();
+  assert.equal(await page.evaluate(() => navigator.clipboard.readText()), "override level: f32 = 0.25; // 0..1\n");
+  // A switch is shown, and can be reset.
+  await page.getByRole("checkbox", { name: "green", exact: true }).uncheck();
   await settled(page);
   const green = (await shown(page))[2].split(",").filter((_, i) => i % 3 === 1);
   assert.ok(green.every((value) => value === "0"));
   await page.click("#reset-sliders");
   await settled(page);
   same(await shown(page), first);
-  assert.deepEqual(page.faults, []);
-});
-
-test("a shader layer is a view with readable values", async () => {
-  studio.edit("shaders/pixel.wgsl", PLACE, PLACE.replace("\n", "\n    seen = vec3f(0.25, 0.5, 1.0);\n"));
-  studio.write("shaders/pixel.wgsl", `${studio.read("shaders/pixel.wgsl")}var<private> seen: vec3f; // layer\n`);
-  await studio.start();
-  const page = await open(browser, studio);
-  await page.selectOption("#layers", "layer:seen");
-  await page.waitForFunction(() => {
-    const { view, done } = document.getElementById("panels").dataset;
-    return view === "layer" && done === "true";
-  });
-  await settled(page);
-  const [, , bytes] = await shown(page);
-  assert.deepEqual([...new Set(bytes.match(/\d+,\d+,\d+/g))], ["64,128,255"]);
-  await canvas(page).hover();
-  await page.locator("#values", { hasText: "0.25 0.5 1" }).waitFor();
+  assert.equal(await compiled(page), time, "nothing was compiled");
+  await page.locator("#copy-sliders:disabled").waitFor();
   assert.deepEqual(page.faults, []);
 });
 

@@ -11,8 +11,8 @@ use super::source::Constants;
 use super::times::Times;
 use wgray_render::error::{RenderError, ShaderErrors};
 use wgray_render::gpu::compose::Shaders;
-use wgray_render::gpu::marks::Layer;
-use wgray_render::gpu::{AdapterChoice, Device, Forms, Gpu, Live, Options, check_kernels, choose};
+use wgray_render::gpu::sliders::sliders;
+use wgray_render::gpu::{AdapterChoice, Device, Forms, Gpu, Options, check_kernels, choose};
 use wgray_render::records::Packed;
 
 /// A request to compile a kernel.
@@ -25,8 +25,6 @@ pub struct Request {
     pub packed: Packed,
     /// The shaders.
     pub shaders: Arc<Shaders>,
-    /// The layer that replaces color.
-    pub layer: Option<Layer>,
     /// Known good shaders, for use if those have errors.
     pub fallback: Option<Arc<Shaders>>,
     /// The constants that the kernel is compiled for.
@@ -110,7 +108,6 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> Built {
         device,
         packed,
         shaders,
-        layer,
         fallback,
         constants,
         noticed,
@@ -130,8 +127,8 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> Built {
                 ..Options::best(&device)
             };
             let gpu = times.of("compile", || {
-                let live = Live::of(&shaders, packed.adaptive, packed.integrator, layer);
-                let mut gpu = Gpu::with_live(&device, &packed, &shaders, options, live)?;
+                let sliders = sliders(&shaders, packed.integrator, packed.adaptive);
+                let mut gpu = Gpu::with_sliders(&device, &packed, &shaders, options, sliders)?;
                 gpu.time_calls()?;
                 Ok::<_, RenderError>(gpu)
             })?;

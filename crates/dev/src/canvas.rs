@@ -9,7 +9,7 @@ use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 use wgray_render::error::RenderError;
 use wgray_render::film::Film;
-use wgray_render::gpu::{Call, Gpu, Live};
+use wgray_render::gpu::{Call, Gpu};
 use wgray_render::job::{Cut, Order, Steps};
 use wgray_render::output::Aov;
 use wgray_render::records::{Camera, FirstHit, Packed};
@@ -128,13 +128,8 @@ impl Canvas {
         Ok(same_kernel)
     }
 
-    /// Returns the parts of the kernel that differ from the files.
-    pub fn live(&self) -> &Live {
-        self.gpu.live()
-    }
-
-    /// Sets the values of the kernel's sliders. The image must be started again.
-    pub fn set_sliders(&mut self, values: &[[u32; 4]]) -> Result<(), RenderError> {
+    /// Sets the values of the kernel's sliders, as bits. The image must be started again.
+    pub fn set_sliders(&mut self, values: &[u32]) -> Result<(), RenderError> {
         self.gpu.set_sliders(values)
     }
 
@@ -344,10 +339,7 @@ impl Canvas {
                 let under = under.and_then(|(_, cpu)| cpu.as_ref());
                 (Content::Compare(colors, means(cpu, under, &has_samples)), size)
             }
-            None => match self.gpu.live().layer() {
-                Some(layer) => (Content::Layer(colors, layer.numbers), size),
-                None => (Content::Color(colors), size),
-            },
+            None => (Content::Color(colors), size),
         })
     }
 

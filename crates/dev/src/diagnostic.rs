@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn a_shader_error_is_shown_between_its_neighbours() {
         let text = "// first\n\nfn a() { b }\n| c\n";
-        let shaders = Shaders::built_in().changed(|file, _| (file == "phong.wgsl").then(|| text.to_string()));
+        let shaders = Shaders::built_in().with("phong.wgsl", text.to_string());
         let error = |place: &str| ShaderError {
             place: place.to_string(),
             message: "no".to_string(),

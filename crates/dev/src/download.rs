@@ -31,9 +31,7 @@ pub fn png_file(frame: &Frame) -> Vec<u8> {
 pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
     let [width, height] = frame.header.sent;
     let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = match &frame.content {
-        Content::Color(pixels) | Content::Compare(pixels, _) | Content::Layer(pixels, _) => {
-            colors(pixels, ["R", "G", "B"])
-        }
+        Content::Color(pixels) | Content::Compare(pixels, _) => colors(pixels, ["R", "G", "B"]),
         Content::Film(layer) => {
             let channels = layer.aov.channels();
             let names = channels.iter().map(Channel::name).collect::<Vec<_>>();

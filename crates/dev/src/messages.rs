@@ -9,11 +9,11 @@ use super::build::Built;
 use super::camera::{Move, Viewpoint};
 use super::diagnostic::Diagnostic;
 use super::look::DisplayOverrides;
-use super::picture::{LayerName, View};
+use super::picture::View;
 use super::reference::{Apart, Reference};
 use super::sliders::SliderState;
 use super::source::Snapshot;
-use wgray_render::gpu::marks::Value;
+use wgray_render::gpu::sliders::Value;
 use wgray_scene::ViewTransform;
 
 /// A report for the terminal.
@@ -39,8 +39,6 @@ pub enum Report {
     Note(String),
     /// The image is too large to display: its size, and the size that is shown.
     Smaller([u32; 2], [u32; 2]),
-    /// The sliders were saved to the shaders, or that was undone; or the error.
-    Written(&'static str, Result<(), String>),
     /// The camera or a value was saved to the scene file; or the error.
     Wrote(String, Result<(), String>),
     /// A change of the scene file was undone or redone; or the error.
@@ -94,9 +92,9 @@ pub enum Command {
     Marks(bool),
     /// Moves a slider of the shaders.
     Slide {
-        /// The file of the constant.
+        /// The file of the override.
         file: String,
-        /// The name of the constant.
+        /// The name of the override.
         name: String,
         /// The value.
         value: Value,
@@ -105,10 +103,6 @@ pub enum Command {
     ResetSlider(String, String),
     /// Resets all sliders.
     ResetSliders,
-    /// Saves the values of the sliders to the shaders.
-    WriteSliders,
-    /// Undoes that.
-    UndoSliders,
     /// Overrides exposure, transform and false colors.
     #[serde(rename = "look")]
     DisplaySettings(DisplayOverrides),
@@ -207,10 +201,6 @@ pub struct State {
     pub problems: Vec<Diagnostic>,
     /// The sliders of the shaders.
     pub sliders: Vec<SliderState>,
-    /// True if saving the sliders can be undone.
-    pub sliders_undo: bool,
-    /// The layers of the shaders.
-    pub layers: Vec<LayerName>,
     /// The views that the scene does not provide, and why.
     pub missing_views: Vec<(View, &'static str)>,
     /// The template of links to an editor, with `{file}`, `{line}` and `{column}`; absent if there are no links.

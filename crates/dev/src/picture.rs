@@ -10,7 +10,6 @@ use super::histogram::Histogram;
 use super::look::{DisplaySettings, Legend};
 use super::pixel_values::{Scaled, bits, bytes, numbers};
 use wgray_image::{Pixels, difference};
-use wgray_render::gpu::marks::MAX_NAME_LEN;
 use wgray_render::output::{self as image, Aov, AovSource};
 use wgray_render::records::{FirstHit, NO_INDEX};
 use wgray_scene::Integrator;
@@ -50,52 +49,6 @@ pub enum View {
     Samples,
     /// Radiance, another image of it, and their difference.
     Compare(Against),
-    /// A variable of the shaders with the annotation `layer`.
-    Layer(LayerName),
-}
-
-/// The name of a layer of the shaders.
-#[derive(Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(try_from = "String", into = "String")]
-pub struct LayerName {
-    bytes: [u8; MAX_NAME_LEN],
-    length: u8,
-}
-
-impl LayerName {
-    /// Returns a name; `None` if it is longer than any layer's.
-    pub fn new(name: &str) -> Option<LayerName> {
-        let mut bytes = [0; MAX_NAME_LEN];
-        bytes.get_mut(..name.len())?.copy_from_slice(name.as_bytes());
-        let length = u8::try_from(name.len()).ok()?;
-        Some(LayerName { bytes, length })
-    }
-
-    /// Returns the name as text.
-    pub fn as_str(&self) -> &str {
-        let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or_default();
-        std::str::from_utf8(bytes).unwrap_or_default()
-    }
-}
-
-impl std::fmt::Debug for LayerName {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.as_str().fmt(f)
-    }
-}
-
-impl TryFrom<String> for LayerName {
-    type Error = String;
-
-    fn try_from(name: String) -> Result<LayerName, String> {
-        LayerName::new(&name).ok_or_else(|| format!("a layer's name must have {MAX_NAME_LEN} bytes at most"))
-    }
-}
-
-impl From<LayerName> for String {
-    fn from(name: LayerName) -> String {
-        name.as_str().to_string()
-    }
 }
 
 /// The image that radiance is compared with.
@@ -111,14 +64,6 @@ pub enum Against {
 }
 
 impl View {
-    /// Returns the layer of the shaders.
-    pub fn layer(self) -> Option<LayerName> {
-        match self {
-            View::Layer(name) => Some(name),
-            _ => None,
-        }
-    }
-
     /// The views that are layers of `wgray render --aov`.
     pub const LAYERS: [View; 12] = [
         View::Normal,
@@ -160,7 +105,7 @@ impl View {
             View::Indirect => Some(Aov::Indirect),
             View::Emission => Some(Aov::Emission),
             View::Variance => Some(Aov::Variance),
-            View::Color | View::Samples | View::Compare(_) | View::Layer(_) => None,
+            View::Color | View::Samples | View::Compare(_) => None,
         }
     }
 
@@ -181,8 +126,6 @@ pub enum Content {
     Hits(Aov, Vec<FirstHit>),
     /// [`View::Compare`]: the image, and the other one of the same size.
     Compare(Pixels, Pixels),
-    /// [`View::Layer`], and the number of components.
-    Layer(Pixels, usize),
     /// The views of film layers.
     Film(FilmLayer),
 }
@@ -198,7 +141,6 @@ impl Content {
                 let middle_depth = middle.filter(|hit| hit.shape != NO_INDEX).map_or(1.0, |hit| hit.depth);
                 bytes(hits, |hit| aov.color_of_hit(hit, middle_depth))
             }
-            Content::Layer(values, _) => bytes(&values.colors, |color| Vec3::from(*color)),
             Content::Color(_) | Content::Compare(..) | Content::Film(_) => Vec::new(),
         }
     }
@@ -288,11 +230,6 @@ impl Frame {
         let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
         let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
             Content::Color(colors) => vec![marked("picture", look.bytes(colors), light(colors))],
-            // Raw values, which may be negative.
-            Content::Layer(values, _) => {
-                let found = faults(&values.colors, true, |color| *color);
-                vec![marked("picture", content.plain_bytes(header.sent), found)]
-            }
             Content::Film(layer) => {
                 let negative = look.negative || layer.may_be_negative();
                 let found = faults(&layer.values.colors, negative, |color| *color);
@@ -330,7 +267,7 @@ impl Frame {
         header.histogram = match &content {
             Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors, exposure)),
             Content::Film(layer) if layer.is_light() => Some(Histogram::of(&layer.values.colors, exposure)),
-            Content::Samples(..) | Content::Hits(..) | Content::Layer(..) | Content::Film(_) => None,
+            Content::Samples(..) | Content::Hits(..) | Content::Film(_) => None,
         };
         header.legend = match &content {
             Content::Film(layer) if layer.aov == Aov::Variance => Some(Legend::of_errors(exposure)),
@@ -369,12 +306,6 @@ impl Frame {
                 let color = *pixels.colors.get(i)?;
                 let shown = self.look.shown(color).map(|byte| byte.to_string()).join(" ");
                 vec![("linear RGB", numbers(color)), ("bits", bits(color)), ("shown", shown)]
-            }
-            Content::Layer(values, count) => {
-                let values = values.colors.get(i)?.iter().take(*count);
-                let joined = |told: fn(&f32) -> String| values.clone().map(told).collect::<Vec<_>>().join("  ");
-                let bits = joined(|v| format!("{:08x}", v.to_bits()));
-                vec![("layer", joined(|v| format!("{v}"))), ("bits", bits)]
             }
             Content::Film(layer) => layer.pixel(i, &self.look)?,
             Content::Samples(counts, total) => vec![("samples", format!("{} of {total}", counts.get(i)?))],

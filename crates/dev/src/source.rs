@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant, SystemTime};
 
 use super::diagnostic::Diagnostic;
-use super::picture::{LayerName, View};
+use super::picture::View;
 use wgray_render::gpu::compose::{self, Shaders};
 use wgray_render::output::AovSource;
 use wgray_render::pack::pack;
@@ -72,14 +72,11 @@ impl Loaded {
     }
 }
 
-/// The constants of a kernel: its constants, the integrator, whether sampling is adaptive, and the layer that
-/// replaces color.
-pub type Constants = (Specialization, Integrator, bool, Option<LayerName>);
+/// The constants of a kernel, the integrator, and whether sampling is adaptive.
+pub type Constants = (Specialization, Integrator, bool);
 
-/// Returns what a scene's kernel is compiled for, to show a view, and a layer of the shaders instead of color. The
-/// samples of such a layer are not adaptive: its variance says nothing about that of color.
-pub fn constants(packed: &Packed, view: View, layer: Option<LayerName>) -> Constants {
-    let adaptive = packed.adaptive && layer.is_none();
+/// Returns what a scene's kernel is compiled for, to show a view.
+pub fn constants(packed: &Packed, view: View) -> Constants {
     let integrator = packed.integrator;
     let of_samples = view
         .aov()
@@ -88,21 +85,15 @@ pub fn constants(packed: &Packed, view: View, layer: Option<LayerName>) -> Const
         layers: (of_samples && integrator == Integrator::Path).into(),
         ..packed.specialization
     };
-    (specialization, integrator, adaptive, layer)
+    (specialization, integrator, packed.adaptive)
 }
 
-/// Returns what a kernel shows when a view is selected: color, if the view needs another kernel. A kernel with a
-/// layer of the shaders shows nothing else.
-pub fn shown(constants: &Constants, view: View) -> View {
-    let (specialization, integrator, adaptive, layer) = constants;
-    match (layer, view) {
-        (Some(layer), _) => View::Layer(*layer),
-        (None, View::Layer(_)) => View::Color,
-        (None, view) => match view.aov().map(|aov| aov.source(*integrator)) {
-            Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
-            Some(AovSource::Adaptive) if !adaptive => View::Color,
-            _ => view,
-        },
+/// Returns what a kernel shows when a view is selected: color, if the view needs another kernel.
+pub fn shown((specialization, integrator, adaptive): &Constants, view: View) -> View {
+    match view.aov().map(|aov| aov.source(*integrator)) {
+        Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
+        Some(AovSource::Adaptive) if !adaptive => View::Color,
+        _ => view,
     }
 }
 

@@ -25,8 +25,7 @@ export function fit({ kind, range, gap, squares }, x, from) {
 const square = (x, steps) => Math.max((steps > 0 ? Math.floor : Math.ceil)(Math.sqrt(Math.max(x, 0))) + steps, 0) ** 2;
 
 // Returns the step size of a number, which depends on the largest magnitude in its list.
-function stepOf({ kind, unit, range, step }, list) {
-  if (step) return step;
+function stepOf({ kind, unit, range }, list) {
   if (kind === "whole") return 1;
   const largest = Math.max(0, ...list.map((x) => Math.abs(x ?? 0)));
   if (largest > 0) return 10 ** (Math.floor(Math.log10(largest)) - 1);

@@ -34,7 +34,7 @@ setUpCamera(picture, onPictureKey, showNotice);
 setUpCompare(picture, onKey, showNotice);
 setUpProbes(picture, onPictureKey);
 setUpRender(onKey, showNotice);
-setUpShader();
+setUpShader(showNotice);
 setUpTimes();
 setUpObject();
 setUpTouch();

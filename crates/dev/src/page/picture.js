@@ -101,7 +101,7 @@ export class Picture {
   // Names the canvases for screen readers.
   describe(state) {
     const names = {
-      color: "colour", compare: "comparison", uv: "texture coordinates", layer: `layer ${state.view.layer}`,
+      color: "colour", compare: "comparison", uv: "texture coordinates",
       direct: "direct light", indirect: "indirect light", emission: "emitted light",
     };
     const view = names[viewName(state.view)] ?? viewName(state.view).replace("_", " ");

@@ -1,8 +1,7 @@
-// Sliders for annotated shader constants.
+// Sliders for overrides of shaders.
 
-import { colorOf, hexOf } from "/color.js";
 import { editorLink } from "/editor.js";
-import { ask, element, onState } from "/link.js";
+import { ask, element, lastState, onState } from "/link.js";
 import { numberField } from "/numbers.js";
 import { enable, keep, make, place } from "/parts.js";
 
@@ -12,24 +11,33 @@ let [underWay, waiting] = [false, new Map()]; // values that are not sent yet, b
 
 const keyOf = ({ file, name }) => JSON.stringify([file, name]);
 const rowKey = (slider) => JSON.stringify([keyOf(slider), slider.kind]);
+const isMoved = (slider) => slider.value !== slider.default;
 
-export function setUpShader() {
-  element("write-sliders").addEventListener("click", () => ask("write_sliders"));
-  element("undo-sliders").addEventListener("click", () => ask("undo_sliders"));
+export function setUpShader(showNotice) {
+  element("copy-sliders").addEventListener("click", () => copy(showNotice));
   element("reset-sliders").addEventListener("click", () => ask("reset_sliders"));
   onState((state, heard) => {
     rows = keep(rows, state.sliders, rowKey, rowOf);
     for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, heard && !underWay);
     place([element("sliders"), [...rows.values()].map(({ item }) => item)]);
     const moved = state.sliders.some(isMoved);
-    enable(element("write-sliders"), moved && state.shaders);
-    enable(element("reset-sliders"), moved);
-    element("undo-sliders").hidden = !state.sliders_undo;
+    for (const id of ["copy-sliders", "reset-sliders"]) enable(element(id), moved);
     element("sliders-help").hidden = state.sliders.length > 0;
   });
 }
 
-const isMoved = ({ value, file_value }) => String(value) !== String(file_value);
+// Copies the declarations of the moved sliders.
+async function copy(showNotice) {
+  const range = ({ kind, min, max }) => (kind === "bool" ? "" : ` // ${min}..${max}`);
+  const line = (slider) => `override ${slider.name}: ${slider.kind} = ${slider.value};${range(slider)}\n`;
+  const text = lastState().sliders.filter(isMoved).map(line).join("");
+  try {
+    await navigator.clipboard.writeText(text);
+    showNotice("Declarations copied");
+  } catch {
+    showNotice(text); // the clipboard needs a secure connection
+  }
+}
 
 // Sends one value at a time, the newest of each slider: a drag produces more of them than the program can render.
 function slide({ file, name }, value) {
@@ -52,11 +60,10 @@ function rowOf(slider) {
   const id = `slider-${made++}`;
   const name = make("label", { textContent: slider.name, htmlFor: id });
   const link = make("a");
-  const note = make("small");
   const reset = make("button", { type: "button", textContent: "Reset" });
   reset.setAttribute("aria-label", `Reset ${slider.name}`);
-  const head = make("span", { className: "head" }, name, link, note, reset);
-  const { inputs, update } = ({ bool: switchOf, color: colorsOf }[slider.kind] ?? numberOf)(slider);
+  const head = make("span", { className: "head" }, name, link, reset);
+  const { inputs, update } = (slider.kind === "bool" ? switchOf : numberOf)(slider);
   inputs[0].id = id;
   reset.addEventListener("click", () => {
     if (reset.matches(":focus-visible")) inputs[0].focus(); // the button disappears
@@ -69,7 +76,6 @@ function rowOf(slider) {
     const href = editorLink(editor, { file: now.path, line: now.line });
     if (href) link.href = href;
     else link.removeAttribute("href");
-    note.textContent = [now.recompiles && "recompiles", !now.used && "not used by this scene"].filter(Boolean).join(", ");
     reset.hidden = !isMoved(now);
     if (heard || isNew) update(now);
     isNew = false;
@@ -83,17 +89,12 @@ function switchOf(slider) {
   return { inputs: [box], update: ({ value }) => (box.checked = value) };
 }
 
-function numberBox(label) {
-  const box = make("input", { type: "number", step: "any" });
-  box.setAttribute("aria-label", label);
-  return box;
-}
-
 function numberOf(slider) {
-  const field = { kind: slider.kind === "f32" ? "number" : "whole" }; // range and step follow the file
+  const field = { kind: slider.kind === "f32" ? "number" : "whole" }; // the range follows the file
   let last = slider.value;
   const range = make("input", { type: "range" });
-  const box = numberBox(`${slider.name}, as a number`);
+  const box = make("input", { type: "number", step: "any" });
+  box.setAttribute("aria-label", `${slider.name}, as a number`);
   const use = (value) => {
     last = value;
     slide(slider, value);
@@ -103,32 +104,12 @@ function numberOf(slider) {
     use(range.valueAsNumber);
   });
   const show = numberField(box, field, () => [last], use);
-  const update = ({ min, max, step, value }) => {
-    Object.assign(field, { range: [min, max], step });
+  const update = ({ min, max, value }) => {
+    field.range = [min, max];
     last = value;
-    const fine = field.kind === "whole" ? 1 : 10 ** Math.floor(Math.log10((max - min) / 500));
-    Object.assign(range, { min, max, step: step ?? fine, value });
+    const step = field.kind === "whole" ? 1 : 10 ** Math.floor(Math.log10((max - min) / 500));
+    Object.assign(range, { min, max, step, value });
     show(value);
   };
   return { inputs: [range, box], update };
-}
-
-const LIGHT = { kind: "number", range: [0, 3.4e38] };
-
-function colorsOf(slider) {
-  let last = slider.value;
-  const use = (color) => {
-    last = color;
-    slide(slider, color);
-  };
-  const picker = make("input", { type: "color" });
-  picker.addEventListener("input", () => use(colorOf(picker.value, last)));
-  const boxes = ["red", "green", "blue"].map((name) => numberBox(`${slider.name}, ${name}`));
-  const shows = boxes.map((box, i) => numberField(box, LIGHT, () => last, (value) => use(last.with(i, value))));
-  const update = ({ value }) => {
-    last = value;
-    if (picker.value !== hexOf(value)) picker.value = hexOf(value);
-    shows.forEach((show, i) => show(value[i]));
-  };
-  return { inputs: [picker, ...boxes], update };
 }

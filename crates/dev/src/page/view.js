@@ -17,10 +17,7 @@ export const viewName = (view) => (typeof view === "string" ? view : Object.keys
 
 export function setUpView(picture, onKey, showNotice) {
   element("views").addEventListener("change", ({ target }) => choose(target.value));
-  element("layers").addEventListener("change", ({ target }) => {
-    if (target.value.startsWith("layer:")) ask({ view: { layer: target.value.slice(6) } });
-    else choose(target.value || "color");
-  });
+  element("layers").addEventListener("change", ({ target }) => choose(target.value || "color"));
   VIEWS.forEach((view, i) => onKey(String(i + 1), () => choose(view)));
   element("zoom-in").addEventListener("click", () => picture.zoom(1.5));
   element("zoom-out").addEventListener("click", () => picture.zoom(1 / 1.5));
@@ -84,10 +81,9 @@ function showState(state, heard) {
   if (!heard) return;
   const name = viewName(state.view);
   for (const radio of radios()) radio.checked = radio.value === name;
-  showLayers(state.layers ?? []);
   showMissing(Object.fromEntries(state.missing_views));
   const layers = element("layers");
-  layers.value = name === "layer" ? `layer:${state.view.layer}` : name;
+  layers.value = name;
   if (layers.selectedIndex < 0) layers.value = "";
   const isLayer = layers.value !== "";
   layers.classList.toggle("chosen", isLayer);
@@ -109,16 +105,6 @@ function reveal(button) {
   revealed = button;
   const [bar, { offsetLeft, offsetWidth }] = [element("toolbar"), button];
   bar.scrollLeft = Math.min(offsetLeft, Math.max(bar.scrollLeft, offsetLeft + offsetWidth - bar.clientWidth));
-}
-
-// Lists the layers that shaders write.
-let layersShown = "";
-function showLayers(names) {
-  if (String(names) === layersShown) return;
-  layersShown = String(names);
-  const group = element("layers").querySelector("optgroup:last-of-type");
-  group.replaceChildren(...names.map((name) => new Option(name, `layer:${name}`)));
-  group.hidden = !names.length;
 }
 
 // Disables views that the scene lacks; the label of their group gives the reason.

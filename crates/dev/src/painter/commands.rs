@@ -7,7 +7,7 @@ use super::Painter;
 use crate::build::guarded;
 use crate::canvas::Limits;
 use crate::messages::{Command, Notice};
-use crate::picture::{LayerName, View};
+use crate::picture::View;
 use crate::source::{Constants, Loaded, constants};
 use wgray_render::pack::pack_camera;
 use wgray_render::records::{Camera, Packed};
@@ -34,10 +34,8 @@ impl Painter {
                 }
             }
             Command::Slide { file, name, value } => self.slide(&file, &name, value),
-            Command::ResetSlider(file, name) => self.reset_sliders(Some((&file, &name))),
+            Command::ResetSlider(file, name) => self.reset_sliders(Some((file, name))),
             Command::ResetSliders => self.reset_sliders(None),
-            Command::WriteSliders => self.write_sliders(),
-            Command::UndoSliders => self.take_back_sliders(),
             Command::Marks(marks) => {
                 self.marks = marks;
                 self.show();
@@ -117,16 +115,14 @@ impl Painter {
 
     /// Returns the constants that a scene's kernel is compiled for, to show the selected view.
     pub(super) fn constants(&self, loaded: &Loaded) -> Constants {
-        let layer = self.layer().and_then(|layer| LayerName::new(&layer.name));
-        constants(&loaded.packed, self.view, layer)
+        constants(&loaded.packed, self.view)
     }
 
-    /// Returns a scene with the current camera, sampled as the selected view needs it.
+    /// Returns a scene with the current camera, for the kernel of the selected view.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
-        let (specialization, _, adaptive, _) = self.constants(loaded);
+        let (specialization, ..) = self.constants(loaded);
         Packed {
             camera: self.packed_camera(loaded),
-            adaptive,
             specialization,
             ..loaded.packed.clone()
         }

@@ -83,12 +83,12 @@ impl Painter {
         self.device = Some(gpu.device().clone());
         let (packed, limits) = (self.packed(&loaded), self.limits);
         let view = shown(&constants, self.view);
-        self.sliders.runs(gpu.live().sliders());
-        let sliders = self.sliders.values(gpu.live().sliders());
+        let sliders = gpu.sliders().to_vec();
+        let slider_values = self.sliders.bits(&sliders);
         self.park(&shaders, &constants);
         let canvas = guarded(|| {
             self.times.of("upload", || gpu.update(&packed))?; // the scene may have changed since it was uploaded
-            gpu.set_sliders(&sliders)?;
+            gpu.set_sliders(&slider_values)?;
             Canvas::new(gpu, packed, view, limits)
         });
         match canvas {
@@ -99,13 +99,10 @@ impl Painter {
                     shaders,
                     constants,
                     sliders,
+                    slider_values,
                 });
                 self.problems.device = None;
                 self.begun((noticed, true));
-                // It may be known only now that a slider's value must be compiled in.
-                if self.take_shaders() {
-                    self.settle((Instant::now(), true));
-                }
             }
             Err(error) => self.fail(&error),
         }
@@ -186,19 +183,19 @@ impl Painter {
         drop_contained(self.running.take());
     }
 
-    /// Keeps one of the kernels that differ from the new one by their layers only, preferably the one of color, which viewers
-    /// return to from a layer.
+    /// Keeps the kernel that differs from the new one by its layers only, which viewers return to.
     fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
         let is_sibling = |known: &Running| {
             let same_scene = are_of_one_scene(&known.constants, constants);
             known.shaders == *shaders && same_scene && known.constants != *constants
         };
-        let is_of_light = |known: &Running| known.constants.3.is_none() && known.constants.0.layers == 0;
-        let known = [self.parked.take(), self.running.take()].into_iter().flatten();
-        let (mut siblings, others): (Vec<Running>, Vec<Running>) = known.partition(is_sibling);
-        siblings.sort_by_key(is_of_light);
-        self.parked = siblings.pop();
-        siblings.into_iter().chain(others).map(Some).for_each(drop_contained);
+        for known in [self.parked.take(), self.running.take()].into_iter().flatten() {
+            let dropped = match is_sibling(&known) {
+                true => self.parked.replace(known),
+                false => Some(known),
+            };
+            drop_contained(dropped);
+        }
     }
 }
 

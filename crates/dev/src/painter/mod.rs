@@ -35,6 +35,7 @@ use super::times::Times;
 use super::watch::Writes;
 use wgray_render::gpu::Device;
 use wgray_render::gpu::compose::Shaders;
+use wgray_render::gpu::sliders::Slider;
 use wgray_scene::CameraDescription;
 
 /// Minimum time between frames of a refining image, of which at most a tenth is spent on them.
@@ -61,7 +62,7 @@ pub struct Painter {
 
     /// The last valid scene.
     loaded: Option<Arc<Loaded>>,
-    /// The newest readable shaders, with the slider values that are compiled in.
+    /// The newest readable shaders.
     shaders: Option<Arc<Shaders>>,
     /// The last shaders that rendered an image.
     good: Option<Arc<Shaders>>,
@@ -71,7 +72,7 @@ pub struct Painter {
     cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
-    /// The kernel of color while one for a layer runs; otherwise the last kernel for a layer, if any.
+    /// The kernel of color while one for layers runs; otherwise the last kernel for layers, if any.
     parked: Option<Running>,
     pending: Option<Pending>,
     requests: u64,
@@ -130,8 +131,10 @@ struct Running {
     halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,
-    /// The values of the kernel's sliders.
-    sliders: Vec<[u32; 4]>,
+    /// The kernel's sliders, as the current shaders describe them.
+    sliders: Vec<Slider>,
+    /// The bits of their values.
+    slider_values: Vec<u32>,
 }
 
 struct Pending {
@@ -288,10 +291,7 @@ impl Painter {
         match snapshot.shaders {
             Ok(shaders) => {
                 self.problems.files = None;
-                if self.sliders.differ_from(&shaders) {
-                    self.keep_before();
-                }
-                self.read_shaders(shaders);
+                self.take_shaders(shaders);
             }
             Err(problem) => self.problems.files = Some(*problem),
         }
@@ -387,7 +387,6 @@ impl Painter {
             device: self.device.clone(),
             packed: self.packed(loaded),
             shaders: shaders.clone(),
-            layer: self.layer().cloned(),
             fallback,
             constants,
             noticed,
@@ -460,12 +459,11 @@ impl Painter {
         let Some(running) = &mut self.running else { return };
         // Only a complete first image is interrupted, so that a moving camera shows images at all.
         if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
-            let sliders = self.sliders.values(running.canvas.live().sliders());
+            running.slider_values = self.sliders.bits(&running.sliders);
             let restarted = guarded(|| {
-                running.canvas.set_sliders(&sliders)?;
+                running.canvas.set_sliders(&running.slider_values)?;
                 running.canvas.restart(camera, view)
             });
-            running.sliders = sliders;
             match restarted {
                 Ok(()) => self.begun((Instant::now(), false)),
                 Err(error) => self.fail(&error),

@@ -21,8 +21,6 @@ pub struct Problems {
     pub scene: Vec<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
-    /// Invalid annotations in shaders.
-    pub marks: Vec<Diagnostic>,
     /// The image cannot be rendered completely.
     pub cut: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
@@ -31,12 +29,7 @@ pub struct Problems {
 
 impl Problems {
     fn all(&self) -> impl Iterator<Item = &Diagnostic> {
-        let of_shaders = self
-            .files
-            .iter()
-            .chain(&self.shader)
-            .chain(&self.marks)
-            .chain(&self.cut);
+        let of_shaders = self.files.iter().chain(&self.shader).chain(&self.cut);
         of_shaders.chain(&self.scene).chain(&self.device).chain(&self.out)
     }
 }
@@ -214,10 +207,8 @@ impl Painter {
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
         (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);
-        let integrator = self.loaded.as_ref().map(|loaded| loaded.packed.integrator);
-        self.state.sliders = self.sliders.told(self.sources.shaders.as_deref(), integrator);
-        self.state.sliders_undo = self.sliders.can_take_back();
-        self.state.layers = self.layers();
+        let sliders = self.running.as_ref().map_or(&[][..], |running| &running.sliders);
+        self.state.sliders = self.sliders.states(sliders, self.sources.shaders.as_deref());
         self.state.missing_views = self.missing_views();
         if **self.state_sender.borrow() != self.state {
             self.state_sender.send_replace(Arc::new(self.state.clone()));

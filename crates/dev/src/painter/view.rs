@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::Painter;
 use crate::build::guarded;
-use crate::picture::{LayerName, View};
+use crate::picture::View;
 use crate::source::shown;
 
 impl Painter {
@@ -34,30 +34,16 @@ impl Painter {
         }
     }
 
-    /// Falls back to color if the scene or the shaders do not provide the selected view.
+    /// Falls back to color if the scene does not provide the selected view.
     pub(super) fn keep_view(&mut self) {
         if self.loaded.is_none() {
             return;
         }
-        let told = match self.view {
-            View::Layer(name) if self.layer().is_none() => {
-                let there = self.layers();
-                let there = match there.is_empty() {
-                    true => "no layer is defined".to_string(),
-                    false => {
-                        let names: Vec<&str> = there.iter().map(LayerName::as_str).collect();
-                        format!("the layers are {}", names.join(", "))
-                    }
-                };
-                format!("the shaders have no layer `{}`; {there}", name.as_str())
-            }
-            view => match (view.aov(), self.missing(view)) {
-                (Some(aov), Some(rule)) => format!("view `{}`: {rule}", aov.name()),
-                _ => return,
-            },
+        let (Some(aov), Some(rule)) = (self.view.aov(), self.missing(self.view)) else {
+            return;
         };
         self.view = View::Color;
-        self.notice(&Err(told), String::new());
+        self.notice(&Err(format!("view `{}`: {rule}", aov.name())), String::new());
     }
 
     /// Returns why the scene does not provide a view; `None` if it does.

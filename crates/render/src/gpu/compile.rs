@@ -53,12 +53,12 @@ fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>
 }
 
 impl Checked {
-    /// The kernel as naga has it.
+    /// Returns the module of naga.
     pub(super) fn module(&self) -> &Module {
         &self.module
     }
 
-    /// Whether an entry point writes a variable, itself or by what it calls.
+    /// Returns whether an entry point writes a variable, itself or in functions that it calls.
     pub(super) fn writes(&self, entry: &str, variable: Handle<GlobalVariable>) -> bool {
         let position = self.module.entry_points.iter().position(|known| known.name == entry);
         let usage = position.map(|i| self.info.get_entry_point(i)[variable]);

@@ -59,17 +59,6 @@ fn integrator_files(integrator: Integrator) -> &'static [File] {
 }
 
 impl Kernel {
-    /// Whether it is made of a file, as far as that is not another form of the scene.
-    pub fn has(&self, file: &str, integrator: Integrator) -> bool {
-        let own = self.files.iter().copied().flatten().chain(SHARED);
-        let more = if self.integrates {
-            integrator_files(integrator)
-        } else {
-            &[]
-        };
-        own.chain(more).chain(FROM_BUFFERS).any(|(name, _)| *name == file)
-    }
-
     /// The file that has the entry point.
     pub fn file(&self) -> &'static str {
         self.files.iter().copied().flatten().last().map_or("", |(name, _)| name)
@@ -83,7 +72,7 @@ pub struct Shaders {
 }
 
 /// A file's text with blanks in place of a byte-order mark, which WGSL does not have. What follows stays where it is.
-pub fn without_mark(text: String) -> String {
+fn without_mark(text: String) -> String {
     match text.strip_prefix('\u{feff}') {
         Some(rest) => format!("   {rest}"),
         None => text,
@@ -123,17 +112,9 @@ impl Shaders {
         self.files.iter().map(|(name, text)| (name.as_str(), text.as_str()))
     }
 
-    /// These shaders with other texts of files, where there are any.
-    pub fn changed(&self, text: impl Fn(&str, &str) -> Option<String>) -> Shaders {
-        let new = |(name, old): &(String, String)| (name.clone(), text(name, old).unwrap_or_else(|| old.clone()));
-        Shaders {
-            files: self.files.iter().map(new).collect(),
-        }
-    }
-
-    /// These shaders with another text of a file.
-    #[cfg(test)]
-    pub(super) fn with(mut self, name: &str, text: String) -> Shaders {
+    /// Returns these shaders with another text of a file.
+    #[must_use]
+    pub fn with(mut self, name: &str, text: String) -> Shaders {
         self.files.retain(|(file, _)| file != name);
         self.files.push((name.to_string(), text));
         self

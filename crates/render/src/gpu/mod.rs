@@ -10,8 +10,6 @@ mod failure;
 mod functions;
 mod interface;
 mod kernel_plan;
-mod live;
-pub mod marks;
 mod memory;
 mod pipeline;
 mod place;
@@ -20,6 +18,7 @@ mod renderer;
 mod rounding;
 mod rounds;
 mod scene;
+pub mod sliders;
 pub mod spirv;
 mod texels;
 mod timer;
@@ -33,7 +32,6 @@ pub use device::{
     Choice, Choice as AdapterChoice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose, choose_among, preferred,
 };
 pub use kernel_plan::{KernelPlan, plan_kernel};
-pub use live::{Live, with_edits, without_values};
 pub use renderer::{Call, Gpu, Options};
 pub use rounding::Rounding;
 pub use validate::{Forms, check_kernels};

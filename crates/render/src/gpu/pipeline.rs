@@ -25,12 +25,12 @@ pub const GROUPS: [&[BufferBindingType]; 3] = [
     &[READ, READ, READ, READ],
 ];
 
-/// The group of what changes with every call; where constants are read from a buffer it ends with that.
+/// The group of what changes with every call; it ends with the values of sliders, if a kernel has any.
 pub const CALL: usize = 0;
 /// The group of the scene, which ends with its texels.
 pub const SCENE: usize = 1;
 
-/// How many of them are storage buffers.
+/// The number of storage buffers.
 pub const STORAGE_BUFFERS: usize = {
     let (mut count, mut group) = (0, 0);
     while group < GROUPS.len() {
@@ -50,11 +50,11 @@ pub const STORAGE_BUFFERS: usize = {
 const _: () = assert!(STORAGE_BUFFERS <= 8);
 
 /// The groups of every kernel; that of the scene ends with so many further buffers of texels, that of a call with the values
-/// of constants where these are `live`.
-pub fn bind_group_layouts(device: &Device, more_texels: usize, live: bool) -> Vec<wgpu::BindGroupLayout> {
+/// of sliders, if it has `sliders`.
+pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) -> Vec<wgpu::BindGroupLayout> {
     let layout = |(group, types): (usize, &&[BufferBindingType])| {
         let more = match group {
-            CALL => std::iter::repeat_n(UNIFORM, usize::from(live)),
+            CALL => std::iter::repeat_n(UNIFORM, usize::from(sliders)),
             SCENE => std::iter::repeat_n(READ, more_texels),
             _ => std::iter::repeat_n(READ, 0),
         };

@@ -11,12 +11,12 @@ use wgpu::BufferUsages;
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
 use super::device::{Device, Mapping};
-use super::live::Live;
 use super::memory::{Asked, Held};
 use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
 use super::rounding::Rounding;
 use super::rounds::samples_per_call;
 use super::scene::SceneBuffers;
+use super::sliders::{Slider, with_buffer};
 use super::texels::TexelParts;
 use super::timer::{TIMES, Timer};
 use crate::backend::{Backend, Rules, Started};
@@ -63,8 +63,8 @@ pub struct Gpu {
     rules: Rules,
     /// The most samples of a dispatch that the driver is thought to run whole.
     samples_per_call: u32,
-    /// The values of constants that are read from a buffer.
-    sliders: Option<wgpu::Buffer>,
+    /// The values of the sliders, if there are any.
+    slider_values: Option<wgpu::Buffer>,
     /// Of calls, where these are timed.
     timer: Option<Timer>,
     calls: Vec<Call>,
@@ -105,7 +105,7 @@ struct Kernels {
     layouts: Vec<wgpu::BindGroupLayout>,
     exact: Option<Rounding>,
     texels: TexelParts,
-    live: Live,
+    sliders: Vec<Slider>,
 }
 
 /// A buffer with a record for each pixel of a region, and the group of bindings of the kernel that writes it.
@@ -155,16 +155,16 @@ impl Gpu {
     /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
     /// returns: drivers compile at the first dispatch.
     pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
-        Gpu::with_live(device, packed, shaders, options, Live::default())
+        Gpu::with_sliders(device, packed, shaders, options, Vec::new())
     }
 
-    /// As [`Gpu::new`], with constants that are read from a buffer. They are 0 until [`Gpu::set_sliders`].
-    pub fn with_live(
+    /// As [`Gpu::new`], with overrides that are read from a buffer. They are 0 until [`Gpu::set_sliders`].
+    pub fn with_sliders(
         device: &Device,
         packed: &Packed,
         shaders: &Shaders,
         options: Options,
-        live: Live,
+        sliders: Vec<Slider>,
     ) -> Result<Gpu, RenderError> {
         let texels = TexelParts::of(&device.info, packed)?;
         let kernels = Kernels {
@@ -172,16 +172,16 @@ impl Gpu {
             integrator: packed.integrator,
             baked: options.baked.then(|| bake_if_small(packed)).flatten(),
             constants: packed.specialization,
-            layouts: bind_group_layouts(device, texels.count - 1, !live.sliders().is_empty()),
+            layouts: bind_group_layouts(device, texels.count - 1, !sliders.is_empty()),
             exact: options.exact,
             texels,
-            live,
+            sliders,
         };
         let render = kernels.compile(device, kernel_of(packed.adaptive))?;
         let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
-        let values = kernels.live.sliders().len() as u64 * size_of::<[u32; 4]>() as u64;
-        let sliders = (values > 0).then(|| device.buffer(values, BufferUsages::UNIFORM | BufferUsages::COPY_DST));
+        let values = kernels.sliders.len().div_ceil(4) as u64 * size_of::<[u32; 4]>() as u64;
+        let slider_values = (values > 0).then(|| device.buffer(values, BufferUsages::UNIFORM | BufferUsages::COPY_DST));
         let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let receipt = [device.buffer(RECEIPT, written), receipt_to_read(device)];
         let mut gpu = Gpu {
@@ -197,7 +197,7 @@ impl Gpu {
             film: None,
             pending: None,
             rules: Rules::of(packed),
-            sliders,
+            slider_values,
             timer: None,
             calls: Vec::new(),
         };
@@ -214,20 +214,20 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// The constants that are read from a buffer, in its order, and what takes the place of light.
-    pub fn live(&self) -> &Live {
-        &self.kernels.live
+    /// Returns the overrides that are read from a buffer, in its order.
+    pub fn sliders(&self) -> &[Slider] {
+        &self.kernels.sliders
     }
 
-    /// Gives the constants that are read from a buffer their values. The film is lost.
+    /// Sets the values of the sliders, as bits. The film is lost.
     ///
     /// # Errors
     ///
     /// [`RenderError::Pending`] while a call is pending.
-    pub fn set_sliders(&mut self, values: &[[u32; 4]]) -> Result<(), RenderError> {
+    pub fn set_sliders(&mut self, values: &[u32]) -> Result<(), RenderError> {
         self.idle()?;
         self.film = None;
-        match &self.sliders {
+        match &self.slider_values {
             Some(buffer) => self
                 .device
                 .checked(|| self.device.queue.write_buffer(buffer, 0, cast_slice(values))),
@@ -289,7 +289,9 @@ impl Gpu {
         let target = self.device.checked(|| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             let buffer = self.device.buffer(size, usage);
-            let buffers = [&self.work, &buffer, &self.receipt[0]].into_iter().chain(&self.sliders);
+            let buffers = [&self.work, &buffer, &self.receipt[0]]
+                .into_iter()
+                .chain(&self.slider_values);
             let group = bind_group(&self.device, &self.kernels.layouts[0], &buffers.collect::<Vec<_>>());
             Target { region, buffer, group }
         });
@@ -655,7 +657,7 @@ impl Kernels {
         let texels = self.texels.wgsl();
         let (baked, texels) = (self.baked.as_deref(), texels.as_deref());
         let source = self.shaders.compose_with_texels(kernel, self.integrator, baked, texels);
-        let source = self.live.applied(kernel, source)?;
+        let source = with_buffer(source, kernel, &self.sliders)?;
         pipeline(device, &self.layouts, kernel, &source, &self.constants, self.exact)
     }
 }

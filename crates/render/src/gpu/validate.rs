@@ -192,9 +192,9 @@ mod tests {
             &[
                 "kernels/render.wgsl: expected",
                 "kernels/first_hits.wgsl:12: `pixels`",
-                "kernels/adaptive.wgsl: in `adaptive`: `moments.xyz` of type `vec3<f32>` cannot be stored in .. `vec4<f32>`",
+                "kernels/adaptive.wgsl: in `adaptive`: .. `moments.xyz` (`vec3<f32>`) .. vec4<f32>",
                 "phong.wgsl: `missing`",
-                "phong.wgsl: in `two`: `vec2f(1.0)` of type `vec2<f32>` is returned where `f32` is declared",
+                "phong.wgsl: in `two`: .. expression `vec2f(1.0)` (`vec2<f32>`) does not match the declared return type `f32`",
                 "light.wgsl: in `three`: Incompatible operands",
             ],
         );
@@ -349,35 +349,38 @@ mod tests {
             )])
         };
         for (body, wanted) in [
-            ("if n { }", "the condition `n` of type `u32` must be `bool`"),
+            ("if n { }", "condition `n` (`u32`) is not a boolean"),
             (
                 "let x = b + vec2f();",
-                "`b` of type `vec3<f32>` and `vec2f()` of type `vec2<f32>` are incompatible",
+                "Add can't work with `b` (`vec3<f32>`) and `vec2f()` (`vec2<f32>`)",
             ),
-            ("let x = !a;", "`a` of type `f32` cannot be the operand"),
+            ("let x = !a;", "LogicalNot can't work with `a` (`f32`)"),
             (
                 "let x = wronged(a, a, n); }\nfn wronged(a: f32, b: vec3f, n: u32) -> f32 { return a;",
-                "`wronged`: argument 2, `a` of type `f32`, must be `vec3<f32>`",
+                "Call to `wronged` is invalid: Argument 1 value `a` (`f32`) doesn't match the type `vec3<f32>`",
             ),
             (
                 "return a;",
-                "`a` of type `f32` is returned, but no return type is declared",
+                "expression `a` (`f32`) does not match the declared return type None",
             ),
             (
                 "var x = film;",
-                "`x`: type `array<vec4<f32>>` cannot be that of a variable",
+                "variable 'x' is invalid: Local variable has a type `array<vec4<f32>>` that can't",
             ),
             (
                 "let x = select(a, a, n);",
-                "the condition of `select` must be `bool`, not `u32`",
+                "Expected selection condition to be a boolean value, got Scalar(u32)",
             ),
-            ("let x = vec3f(1.0, 2u, 3.0);", "value 2 has a type that does not fit"),
-            ("let x = n << 40u;", "a shift by more bits than `u32` has"),
-            ("let x = records[a].x;", "Accessing with index `a`"),
+            (
+                "let x = vec3f(1.0, 2u, 3.0);",
+                "Composing 1's component type is not expected",
+            ),
+            ("let x = n << 40u;", "Shift amount exceeds the bit width of Scalar(u32)"),
+            ("let x = records[a].x;", "Accessing with index `a` (`f32`)"),
             ("primitives[0].level = a;", "`primitives[0].level`"),
             ("break;", "outside of a `loop`"),
-            ("let x = all(b);", "`b`"),
-            ("let x = b == camera;", "`camera` of type `Camera` are incompatible"),
+            ("let x = all(b);", "Relational argument `b` (`vec3<f32>`)"),
+            ("let x = b == camera;", "`camera` (`Camera`)"),
             ("let x = camera == camera;", "Incompatible operands"),
         ] {
             let said = with(body);
