@@ -20,7 +20,7 @@ use wgray_render::cpu::triangle::intersect_triangle;
 use wgray_render::gpu::{self, Choice, Gpu, Options, compose::Shaders};
 use wgray_render::job::{self, Cut};
 use wgray_render::pack::pack;
-use wgray_render::records::{ELLIPSOID, FAR, GRID, Packed, RECTANGLE, TRIANGLE};
+use wgray_render::records::{ELLIPSOID, GRID, INFINITE_T, Packed, RECTANGLE, TRIANGLE};
 
 fn scene(path: &str, size: u32) -> Packed {
     let overrides = Overrides {
@@ -83,7 +83,7 @@ fn twins(criterion: &mut Criterion) {
         origin: Vec3::new(0.0, -3.0, 1.3),
         direction: Vec3::new(0.1, 0.98, -0.2).normalize(),
     };
-    let light = &scene.lights[0];
+    let light = &scene.lighting.lights[0];
     let surface = surface_at(rectangle, 0, ray, 3.0, 1e-5);
     let block = Block {
         pattern: GRID,
@@ -98,13 +98,13 @@ fn twins(criterion: &mut Criterion) {
 
     let mut group = criterion.benchmark_group("twins");
     group.bench_function("intersect_rectangle", |b| {
-        b.iter(|| intersect_rectangle(rectangle, black_box(ray), FAR))
+        b.iter(|| intersect_rectangle(rectangle, black_box(ray), INFINITE_T))
     });
     group.bench_function("intersect_triangle", |b| {
-        b.iter(|| intersect_triangle(triangle, black_box(ray), FAR))
+        b.iter(|| intersect_triangle(triangle, black_box(ray), INFINITE_T))
     });
     group.bench_function("intersect_ellipsoid", |b| {
-        b.iter(|| intersect_ellipsoid(ellipsoid, false, black_box(ray), FAR))
+        b.iter(|| intersect_ellipsoid(ellipsoid, false, black_box(ray), INFINITE_T))
     });
     group.bench_function("may_block", |b| b.iter(|| may_block(&black_box(bound), &cone)));
     group.bench_function("shadow_bits of 16 samples, triangle", |b| {
@@ -131,7 +131,7 @@ fn pictures(criterion: &mut Criterion) {
     for path in ["scenes/cornell.toml", "benches/peers/ellipsoids20.toml"] {
         let scene = scene(path, 128);
         let mut group = criterion.benchmark_group(path);
-        let rays = 128 * 128 * u64::from(scene.pixel_samples) * (1 + scene.light_samples());
+        let rays = 128 * 128 * u64::from(scene.sampling.pixel_samples) * (1 + scene.light_samples());
         group.throughput(Throughput::Elements(rays)).sample_size(20);
         let new = |baked| {
             let options = Options {
@@ -149,7 +149,7 @@ fn pictures(criterion: &mut Criterion) {
             group.bench_function(name, |b| {
                 b.iter(|| {
                     let region = Region::whole(128, 128);
-                    let samples = scene.pixel_samples;
+                    let samples = scene.sampling.pixel_samples;
                     job::render(
                         backend.as_mut(),
                         region,

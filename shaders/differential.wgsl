@@ -20,14 +20,17 @@ fn transferred(derivative: Derivative, ray: Ray, t: f32, normal: vec3f) -> Deriv
 }
 
 // Of an outward unit normal where the position on the primitive has the derivative `dp`: section 3.2. The gradient of
-// |M (P - c)|^2 / 2 is g = M^T M (P - c), so that with N = g / |g|, dN = (dg - N (N . dg)) / |g|.
+// |M (P - c)|^2 / 2 is g = M^T M (P - c), on the side of a cylinder without the third row of M; with N = g / |g|,
+// dN = (dg - N (N . dg)) / |g|.
 fn normal_derivative(q: Primitive, local: vec3f, dp: vec3f) -> vec3f {
     let dl = vector_to_local(q, dp);
-    let g = q.x * local.x + q.y * local.y + q.z * local.z;
-    let dg = q.x * dl.x + q.y * dl.y + q.z * dl.z;
+    let s = solid_gradient(q.kind, local);
+    let ds = solid_gradient_derivative(q.kind, local, dl);
+    let g = q.x * s.x + q.y * s.y + q.z * s.z;
+    let dg = q.x * ds.x + q.y * ds.y + q.z * ds.z;
     let scale = 1.0 / sqrt(dot(g, g));
     let n = g * scale;
-    return select(vec3f(0.0), (dg - n * dot(n, dg)) * scale, q.kind == ELLIPSOID);
+    return select(vec3f(0.0), (dg - n * dot(n, dg)) * scale, is_solid(q.kind));
 }
 
 // By a mirror with the normal n: section 3.1, reflection.

@@ -16,6 +16,12 @@ fn ellipsoid_discriminant(o: vec3f, d: vec3f, start: f32) -> f32 {
     return select(a - dot(moment, moment), b * b - a * start, start < 1.0);
 }
 
+// The angle around the third axis from the first towards the second one, from 0 to 1.
+fn longitude(local: vec3f) -> f32 {
+    let turn = atan2(local.y, local.x) * 0.15915494309189535;
+    return select(turn, turn + 1.0, turn < 0.0);
+}
+
 // The distance of the nearest hit in (0, limit), else `limit`. `wall` says that the ray starts on the surface and goes
 // through the inside: then the other end of the chord is the hit. The nearer root avoids cancellation: Haines, Guenther
 // and Akenine-Moeller, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.

@@ -76,6 +76,14 @@ fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
             pdf = light.density * ellipsoid_area(q) * ellipsoid_pdf(q, p, normalize(to));
         }
     }
+    if (EMITTER_KINDS & (1u << CYLINDER)) != 0u {
+        if light.kind == CYLINDER {
+            let q = load_primitive(light.primitive);
+            let point = cylinder_sample(q, p, u);
+            to = point.to;
+            pdf = solid_angle_pdf(light.density * cylinder_share(q, p), to, point.normal);
+        }
+    }
     if EMISSION_TEXTURES != 0u {
         if !is_delta {
             let q = load_primitive(light.primitive);
@@ -151,5 +159,11 @@ fn emitter_pdf(spot: Spot, hit: Hit, density: f32, ray: Ray, normal: vec3f) -> f
             return density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
         }
     }
-    return solid_angle_pdf(density, ray.direction * hit.t, normal);
+    var per_area = density;
+    if (EMITTER_KINDS & (1u << CYLINDER)) != 0u {
+        if spot.primitive.kind == CYLINDER {
+            per_area = density * cylinder_share(spot.primitive, ray.origin);
+        }
+    }
+    return solid_angle_pdf(per_area, ray.direction * hit.t, normal);
 }

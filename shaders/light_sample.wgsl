@@ -43,6 +43,69 @@ fn ellipsoid_pdf(q: Primitive, p: vec3f, wi: vec3f) -> f32 {
     return 0.15915494309189535 / cap * abs(q.determinant) / (l2 * sqrt(l2));
 }
 
+// The part of a cylinder that light is sampled from at a point: what faces it. Of areas the unit is that of a cap.
+struct CylinderPart {
+    arc: f32,              // half the angle of the part of the side, 1 for the whole side
+    middle: vec2f,         // unit vector to its middle
+    side: f32,             // its area
+    end: f32,              // 1 where the cap at the end is seen, else 0
+    start: f32,            // the same for that at the start
+}
+
+// A point on the surface of a cylinder: the vector to it, and its outward normal.
+struct CylinderPoint {
+    to: vec3f,
+    normal: vec3f,
+}
+
+// The part of a cylinder that faces a point: of the side an arc, where the point is outside of the infinite cylinder; all from inside.
+fn cylinder_part(q: Primitive, o: vec3f, levels: vec2f) -> CylinderPart {
+    let inside = (levels.x <= 0.0) & (levels.y <= 0.0);
+    let r2 = o.x * o.x + o.y * o.y;
+    let away = vec2f(o.x, o.y) / sqrt(r2);
+    let seen = max(atan2(sqrt(max(levels.x, 0.0)), 1.0) * 0.3183098861837907, 1e-6);
+    let arc = select(select(0.0, seen, levels.x > 0.0), 1.0, inside);
+    let beyond = levels.y > 0.0;
+    let end = select(0.0, 1.0, inside | (beyond & (o.z > 0.0)));
+    let start = select(0.0, 1.0, inside | (beyond & !(o.z > 0.0)));
+    return CylinderPart(arc, select(vec2f(1.0, 0.0), away, r2 > 0.0), 4.0 * arc * cylinder_height_ratio(q), end, start);
+}
+
+// Half the height of a cylinder divided by its radius.
+fn cylinder_height_ratio(q: Primitive) -> f32 {
+    return sqrt(dot(q.x, q.x) / dot(q.z, q.z));
+}
+
+// A uniform point of the part of a cylinder that faces p.
+fn cylinder_sample(q: Primitive, p: vec3f, u: vec2f) -> CylinderPoint {
+    let from_anchor = vector_to_local(q, p - q.anchor);
+    let o = from_anchor - q.middle;
+    let part = cylinder_part(q, o, cylinder_levels(q, from_anchor));
+    let caps = part.end + part.start;
+    let at = u.x * (part.side + caps);
+    let on_side = (at < part.side) | (caps == 0.0);
+    let angle = (2.0 * min(at / part.side, 1.0) - 1.0) * part.arc;
+    let sn = sine(angle);
+    let cs = sine(angle + 0.5);
+    let m = part.middle;
+    let side = vec3f(m.x * cs - m.y * sn, m.y * cs + m.x * sn, 2.0 * u.y - 1.0);
+    let rest = at - part.side;
+    let at_end = rest < part.end;
+    let disk = disk_sample(vec2f(min(rest - select(part.end, 0.0, at_end), 1.0), u.y));
+    let up = select(-1.0, 1.0, at_end);
+    let local = select(vec3f(disk.x, disk.y, up), side, on_side);
+    let gradient = select(vec3f(0.0, 0.0, up), vec3f(side.x, side.y, 0.0), on_side);
+    let normal = normalize(q.x * gradient.x + q.y * gradient.y + q.z * gradient.z);
+    return CylinderPoint(vector_to_world(q, local - o), normal);
+}
+
+// The density of the points of `cylinder_sample` as a multiple of that of uniform points of the whole cylinder.
+fn cylinder_share(q: Primitive, p: vec3f) -> f32 {
+    let from_anchor = vector_to_local(q, p - q.anchor);
+    let part = cylinder_part(q, from_anchor - q.middle, cylinder_levels(q, from_anchor));
+    return (4.0 * cylinder_height_ratio(q) + 2.0) / (part.side + part.end + part.start);
+}
+
 // The weight of a sample whose direction has the density `own`, where another way to find it has the density `other`: the power
 // heuristic with the exponent 2, Veach's thesis, section 9.2.4. 0 for what has no density.
 fn power_heuristic(own: f32, other: f32) -> f32 {

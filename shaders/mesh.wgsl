@@ -47,7 +47,7 @@ fn triangle_crossing(v0: vec3f, v1: vec3f, v2: vec3f, origin: vec3f, shear: Shea
     let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
     let t = (u * a.z + v * b.z + w * c.z) / sum;
     let passage = box_passage(lowest(v0, v1, v2), highest(v0, v1, v2), s);
-    let met = inside & (abs(sum) > 0.0) & is_passed(passage, FAR);
+    let met = inside & (abs(sum) > 0.0) & is_passed(passage, INFINITE_T);
     return Crossing(met, min(passage.y, max(passage.x, t)), vec2f(v / sum, w / sum));
 }
 

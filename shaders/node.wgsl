@@ -80,7 +80,7 @@ fn four_in_fan(node: Node, low: vec3u, high: vec3u, f: Fan, limit: f32) -> u32 {
 // The latest that any ray of a fan leaves a box along an axis.
 fn far_side(low: vec4f, high: vec4f, far_low: f32, far_high: f32) -> vec4f {
     let none = (far_low == 0.0) & (far_high == 0.0);
-    return select(low * far_low + high * far_high, vec4f(FAR), none);
+    return select(low * far_low + high * far_high, vec4f(INFINITE_T), none);
 }
 
 // The eight bits of slots in the order in which a ray of this octant visits them: bit i is slot i ^ octant's. Bit k of an octant

@@ -16,12 +16,14 @@ fn intersect(kind: u32, q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
     if kind == DISK {
         return intersect_disk(q, ray, limit);
     }
+    if kind == CYLINDER {
+        return intersect_cylinder(q, wall, ray, limit);
+    }
     return intersect_plane(q, ray, limit);
 }
 
-// Whether it cuts the segment o + s d, s in (0, reach), of local space; `start` is how far o is outside of what has an
-// inside.
-fn blocks(kind: u32, o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
+// Whether it cuts the segment o + s d, s in (0, reach), of local space; `levels` are those of o.
+fn blocks(kind: u32, o: vec3f, d: vec3f, levels: vec2f, reach: f32) -> bool {
     if kind == RECTANGLE {
         return rectangle_blocks(o, d, reach);
     }
@@ -29,17 +31,20 @@ fn blocks(kind: u32, o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
         return triangle_blocks(o, d, reach);
     }
     if kind == ELLIPSOID {
-        return ellipsoid_blocks(o, d, start, reach);
+        return ellipsoid_blocks(o, d, levels.x, reach);
     }
     if kind == DISK {
         return disk_blocks(o, d, reach);
     }
+    if kind == CYLINDER {
+        return cylinder_blocks(o, d, levels, reach);
+    }
     return plane_blocks(o, d, reach);
 }
 
-// Whether it has an inside, and is met again by a ray that leaves it through that.
-fn is_round(kind: u32) -> bool {
-    return kind == ELLIPSOID;
+// Whether primitives of a kind are the surfaces of convex solids: a ray that leaves one through the inside hits it again.
+fn is_solid(kind: u32) -> bool {
+    return ((SOLID_KINDS >> kind) & 1u) == 1u;
 }
 
 // Whether its local space goes from -1 to 1 where its texture coordinates go from 0 to 1.
@@ -47,10 +52,38 @@ fn is_centered(kind: u32) -> bool {
     return (kind == RECTANGLE) | (kind == DISK);
 }
 
-// The gradient, at a point of local space, of what is 0 on a primitive: of z, or of (x^2 + y^2 + z^2 - 1) / 2.
+// How far outside of a solid a point of local space is, for `blocks`: y only of cylinders. `wall` says that it is on the surface and counts as
+// inside, by as little as can be: rays inwards are occluded if they end outside.
+fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, wall: bool) -> vec2f {
+    if kind == CYLINDER {
+        let levels = cylinder_levels(q, from_anchor);
+        return select(levels, levels_on_surface(levels, -1e-30), wall);
+    }
+    return vec2f(select(ellipsoid_level(q, from_anchor), -1e-30, wall), 0.0);
+}
+
+// The gradient, at a point of local space, of what is 0 on a primitive: of z, of (x^2 + y^2 + z^2 - 1) / 2, or that of a cylinder.
 fn primitive_gradient(q: Primitive, local: vec3f) -> vec3f {
-    let round = q.x * local.x + q.y * local.y + q.z * local.z;
-    return select(q.z, round, is_round(q.kind));
+    let solid = solid_gradient(q.kind, local);
+    let gradient = q.x * solid.x + q.y * solid.y + q.z * solid.z;
+    return select(q.z, gradient, is_solid(q.kind));
+}
+
+// That of a solid in local space.
+fn solid_gradient(kind: u32, local: vec3f) -> vec3f {
+    return select(local, cylinder_gradient(local), kind == CYLINDER);
+}
+
+// The change of `solid_gradient` where the local point changes by d.
+fn solid_gradient_derivative(kind: u32, local: vec3f, d: vec3f) -> vec3f {
+    return select(d, cylinder_gradient_derivative(local, d), kind == CYLINDER);
+}
+
+// What `primitive_gradient` is the gradient of.
+fn primitive_height(q: Primitive, from_anchor: vec3f) -> f32 {
+    let round = 0.5 * ellipsoid_level(q, from_anchor);
+    let solid = select(round, cylinder_height(q, from_anchor), q.kind == CYLINDER);
+    return select(from_anchor.z, solid, is_solid(q.kind));
 }
 
 fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
@@ -59,15 +92,17 @@ fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
 
 // Texture coordinates of a point of local space. Rectangle and disk: 0 to 1 along tangent and bitangent. Triangle: barycentric
 // coordinates of the second and third vertex. Plane: lengths along tangent and bitangent. Ellipsoid: longitude from
-// the first towards the second axis and latitude from the third axis' foot, each from 0 to 1.
+// the first towards the second axis and latitude from the third axis' foot, each from 0 to 1. Cylinder: `cylinder_uv`.
 fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
     if is_centered(q.kind) {
         return vec2f(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
     }
     if q.kind == ELLIPSOID {
-        let longitude = atan2(local.y, local.x) * 0.15915494309189535;
         let latitude = atan2(sqrt(local.x * local.x + local.y * local.y), -local.z) * 0.3183098861837907;
-        return vec2f(select(longitude, longitude + 1.0, longitude < 0.0), latitude);
+        return vec2f(longitude(local), latitude);
+    }
+    if q.kind == CYLINDER {
+        return cylinder_uv(local);
     }
     return local.xy;
 }
@@ -83,6 +118,9 @@ fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
         let r = sqrt(r2);
         let dv = r * d.z - local.z * ((local.x * d.x + local.y * d.y) / r);
         return vec2f(du * 0.15915494309189535, dv * 0.3183098861837907);
+    }
+    if q.kind == CYLINDER {
+        return cylinder_uv_derivative(local, d);
     }
     return d.xy;
 }
@@ -100,6 +138,9 @@ fn local_tangents(q: Primitive, local: vec3f) -> Tangents {
         let u = vec3f(-local.y, local.x, 0.0) * 6.283185307179586;
         let v = vec3f(-local.z * local.x / r, -local.z * local.y / r, r) * 3.141592653589793;
         return Tangents(u, v);
+    }
+    if q.kind == CYLINDER {
+        return Tangents(cylinder_tangent(local), cylinder_bitangent(local));
     }
     let scale = select(1.0, 2.0, is_centered(q.kind));
     return Tangents(vec3f(scale, 0.0, 0.0), vec3f(0.0, scale, 0.0));

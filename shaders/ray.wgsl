@@ -6,7 +6,7 @@ struct Ray {
     direction: vec3f,      // unit length
 }
 
-// The nearest intersection so far: FAR and NO_INDEX where there is none.
+// The nearest intersection so far: INFINITE_T and NO_INDEX where there is none.
 struct Hit {
     t: f32,
     instance: u32,         // 0 for a primitive by itself, else one more than the number of a mesh's instance
@@ -17,7 +17,7 @@ struct Hit {
 
 // No hit.
 fn no_hit() -> Hit {
-    return Hit(FAR, 0u, NO_INDEX, 0u, vec2f(0.0));
+    return Hit(INFINITE_T, 0u, NO_INDEX, 0u, vec2f(0.0));
 }
 
 // The number of a primitive by itself at a place, which is an instance and a primitive; NO_INDEX for a triangle of a mesh.
@@ -63,10 +63,10 @@ fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
     return Hit(select(hit.t, t, nearer), hit.instance, select(hit.primitive, i, nearer), hit.slot, hit.barycentric);
 }
 
-// Of two hits, the second of which may be none at FAR, the nearer one; of equally near ones that of the lower instance and primitive.
+// Of two hits, the second of which may be none at INFINITE_T, the nearer one; of equally near ones that of the lower instance and primitive.
 fn nearer_hit(a: Hit, b: Hit) -> Hit {
     let lower = (b.instance < a.instance) | ((b.instance == a.instance) & (b.primitive < a.primitive));
-    let nearer = (b.t < FAR) & ((b.t < a.t) | ((b.t == a.t) & lower));
+    let nearer = (b.t < INFINITE_T) & ((b.t < a.t) | ((b.t == a.t) & lower));
     return Hit(select(a.t, b.t, nearer), select(a.instance, b.instance, nearer), select(a.primitive, b.primitive, nearer),
                select(a.slot, b.slot, nearer), select(a.barycentric, b.barycentric, nearer));
 }

@@ -11,17 +11,16 @@ struct Block {
 }
 
 // Bit i is set where the primitive hides sample i of the block from p. `kind` is the primitive's, known when compiled;
-// `wall` says that p is on an ellipsoid seen from inside: as little inside of it as can be, so that rays inwards are hidden
-// if they end outside.
+// `wall` says that p is on a solid seen from inside (`solid_levels`).
 fn shadow_bits(kind: u32, q: Primitive, p: vec3f, wall: bool, light: Light, block: Block) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
-    let start = select(ellipsoid_level(q, from_anchor), -1e-30, wall);
+    let levels = solid_levels(kind, q, from_anchor, wall);
     let to = segments_to_local(q, segments_to_light(light, p));
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {
         let d = segment(to, block_sample(block, i));
-        bits |= select(0u, 1u << i, blocks(kind, o, d, start, light.reach));
+        bits |= select(0u, 1u << i, blocks(kind, o, d, levels, light.reach));
     }
     return bits;
 }
@@ -29,8 +28,8 @@ fn shadow_bits(kind: u32, q: Primitive, p: vec3f, wall: bool, light: Light, bloc
 // Whether the primitive cuts the segment p + s to, s in (0, reach).
 fn cuts(kind: u32, q: Primitive, p: vec3f, wall: bool, to: vec3f, reach: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
-    let start = select(ellipsoid_level(q, from_anchor), -1e-30, wall);
-    return blocks(kind, from_anchor - q.middle, vector_to_local(q, to), start, reach);
+    let levels = solid_levels(kind, q, from_anchor, wall);
+    return blocks(kind, from_anchor - q.middle, vector_to_local(q, to), levels, reach);
 }
 
 fn block_sample(block: Block, i: u32) -> vec2f {

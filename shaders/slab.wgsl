@@ -64,6 +64,6 @@ fn fan_passage(low: vec3f, high: vec3f, f: Fan) -> vec2f {
     let by_high = b * f.near_high;
     let near = max(max(max(by_low.x, by_high.x), max(by_low.y, by_high.y)), max(by_low.z, by_high.z));
     let none = (f.far_low == vec3f(0.0)) & (f.far_high == vec3f(0.0));
-    let far = select(a * f.far_low + b * f.far_high, vec3f(FAR), none);
+    let far = select(a * f.far_low + b * f.far_high, vec3f(INFINITE_T), none);
     return vec2f(near, min(min(far.x, far.y), far.z));
 }

@@ -30,16 +30,16 @@ fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let gradient = primitive_gradient(q, from_anchor - q.middle);
     let inverse_slope = 1.0 / sqrt(dot(gradient, gradient));
     let outward = gradient * inverse_slope;
-    let round = is_round(q.kind);
-    let height = select(from_anchor.z, 0.5 * ellipsoid_level(q, from_anchor), round);
+    let solid = is_solid(q.kind);
+    let height = primitive_height(q, from_anchor);
     let position = met - outward * (height * inverse_slope);
     let inside = dot(outward, ray.direction) > 0.0;
     let side = select(1.0, -1.0, inside);
     let normal = outward * side;
     let size = max(largest(position), largest(way));
     let start = position + normal * (epsilon * size);
-    let above = vec2u(0u, select(i, NO_INDEX, round & inside));
-    let below = vec2u(0u, select(i, NO_INDEX, round & !inside));
+    let above = vec2u(0u, select(i, NO_INDEX, solid & inside));
+    let below = vec2u(0u, select(i, NO_INDEX, solid & !inside));
     return Surface(position, normal, normal, normal, -ray.direction, start, vec3f(0.0), side, above, below, vec2f(0.0),
                    vec3f(0.0), vec3f(0.0));
 }

@@ -72,24 +72,11 @@ fn closest_of_item(before: Hit, item: Item, ray: Ray, s: Slabs, left: vec2u, wal
     if !is_passed(passage, hit.t) {
         return hit;
     }
-    // Loops where an `if` would do: software Vulkan skips them.
+    // A loop where an `if` would do: software Vulkan skips it.
     for (var once = has_kind(item, INSTANCE); once; once = false) {
         hit = closest_of_mesh(hit, item.index, ray, max(passage.x, 0.0), left);
     }
-    let i = item.index;
-    for (var once = has_kind(item, RECTANGLE); once; once = false) {
-        hit = nearer_hit(hit, hit_by_itself(RECTANGLE, i, ray, passage.x, left, wall));
-    }
-    for (var once = has_kind(item, TRIANGLE); once; once = false) {
-        hit = nearer_hit(hit, hit_by_itself(TRIANGLE, i, ray, passage.x, left, wall));
-    }
-    for (var once = has_kind(item, ELLIPSOID); once; once = false) {
-        hit = nearer_hit(hit, hit_by_itself(ELLIPSOID, i, ray, passage.x, left, wall));
-    }
-    for (var once = has_kind(item, DISK); once; once = false) {
-        hit = nearer_hit(hit, hit_by_itself(DISK, i, ray, passage.x, left, wall));
-    }
-    return hit;
+    return closest_of_primitive_item(hit, item, ray, passage.x, left, wall);
 }
 
 // Whether an item is of a kind; false without a look at it where no item of the scene is.
@@ -102,8 +89,8 @@ fn has_kind(item: Item, kind: u32) -> bool {
 
 // The hit on primitive i, no nearer than its box.
 fn hit_by_itself(kind: u32, i: u32, ray: Ray, near: f32, left: vec2u, wall: vec2u) -> Hit {
-    let t = max(intersect(kind, primitives[i], i == by_itself(wall), ray, FAR), near);
-    return Hit(select(FAR, t, i != by_itself(left)), 0u, i, 0u, vec2f(0.0));
+    let t = max(intersect(kind, primitives[i], i == by_itself(wall), ray, INFINITE_T), near);
+    return Hit(select(INFINITE_T, t, i != by_itself(left)), 0u, i, 0u, vec2f(0.0));
 }
 
 // How far beyond `start` what is nearer than t can be: more than t - start by what the sum of both may be rounded.
@@ -134,7 +121,7 @@ fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, left: vec2u) 
                 let t = start + max(found.t, 0.0);
                 let own = (left.x == number + 1u) & (left.y == corners.w);
                 let met = found.met & !own & (t > 0.0);
-                hit = nearer_hit(hit, Hit(select(FAR, t, met), number + 1u, corners.w, slot, found.barycentric));
+                hit = nearer_hit(hit, Hit(select(INFINITE_T, t, met), number + 1u, corners.w, slot, found.barycentric));
             }
         }
     }
@@ -228,19 +215,7 @@ fn hidden_by_item(item: Item, may: u32, surface: Surface, light: Light, block: B
     for (; other != 0u; other &= other - 1u) {
         let sample = select(samples.y, samples.x, (other & 1u) != 0u);
         let one = Block(block.pattern, block.side, block.first + sample, 1u, block.group, block.key);
-        var bit = 0u;
-        for (var once = has_kind(item, RECTANGLE); once; once = false) {
-            bit = shadow_bits(RECTANGLE, primitives[i], p, is_wall, light, one);
-        }
-        for (var once = has_kind(item, TRIANGLE); once; once = false) {
-            bit = shadow_bits(TRIANGLE, primitives[i], p, is_wall, light, one);
-        }
-        for (var once = has_kind(item, ELLIPSOID); once; once = false) {
-            bit = shadow_bits(ELLIPSOID, primitives[i], p, is_wall, light, one);
-        }
-        for (var once = has_kind(item, DISK); once; once = false) {
-            bit = shadow_bits(DISK, primitives[i], p, is_wall, light, one);
-        }
+        let bit = hidden_by_primitive_item(item, p, is_wall, light, one);
         bits |= select(0u, other & (~other + 1u), bit != 0u);
     }
     return bits;
@@ -311,19 +286,7 @@ fn is_cut_by_item(item: Item, surface: Surface, to: vec3f, reach: f32, goal: u32
     for (var once = has_kind(item, INSTANCE); once; once = false) {
         cut = is_cut_by_mesh(i, surface, to, reach);
     }
-    for (var once = has_kind(item, RECTANGLE); once; once = false) {
-        cut = is_cut(RECTANGLE, primitives[i], i, surface, to, reach, goal);
-    }
-    for (var once = has_kind(item, TRIANGLE); once; once = false) {
-        cut = is_cut(TRIANGLE, primitives[i], i, surface, to, reach, goal);
-    }
-    for (var once = has_kind(item, ELLIPSOID); once; once = false) {
-        cut = is_cut(ELLIPSOID, primitives[i], i, surface, to, reach, goal);
-    }
-    for (var once = has_kind(item, DISK); once; once = false) {
-        cut = is_cut(DISK, primitives[i], i, surface, to, reach, goal);
-    }
-    return cut;
+    return cut | is_cut_by_primitive_item(item, surface, to, reach, goal);
 }
 
 // Of the triangles of instance `number`; not the one that the surface is of.

@@ -38,7 +38,7 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let mut no_checkpoint = NoCheckpoint;
     let mut bands = Bands::new(
         region,
-        packed.pixel_samples,
+        packed.sampling.pixel_samples,
         &cut,
         Order::Rows,
         most,
@@ -76,7 +76,7 @@ pub fn render_growing(
     let mut no_checkpoint = NoCheckpoint;
     let mut bands = Bands::new(
         layout.region,
-        packed.pixel_samples,
+        packed.sampling.pixel_samples,
         &cut,
         order,
         most,
@@ -196,7 +196,7 @@ impl<'a> Prepared<'a> {
             aovs,
             alpha: packed.has_alpha(),
             middle_depth: renderer.work(|backend, _| middle_depth(packed, &options.aovs, backend))?,
-            max_samples: packed.pixel_samples,
+            max_samples: packed.sampling.pixel_samples,
             view: scene.view,
         };
         Ok(Prepared { renderer, hits, layout })

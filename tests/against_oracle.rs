@@ -41,6 +41,7 @@ const BEYOND: &[(&str, &str)] = &[
     ("textures.toml", "images and normal maps"),
     ("ground-grid.toml", "an image"),
     ("cornell-path.toml", "light from surface to surface"),
+    ("pillars.toml", "light from surface to surface"),
     ("lens.toml", "the same, and a lens"),
     ("panorama.toml", "the same, and another camera"),
     ("materials.toml", "the same, and all its materials"),
@@ -66,8 +67,58 @@ fn small(description: &Description) -> Description {
     d
 }
 
+/// Cylinders of each material that the oracle knows, one of them in a mirror, seen from outside and from inside.
+const CYLINDERS: &str = r#"
+image = { width = 96, height = 72 }
+camera = { position = [0.3, -6, 3], look_at = [0, 0, 0.7], fov = 40 }
+lights = [
+    { type = "rectangle", center = [-3, -4, 6], size = [2, 2], normal = [3, 4, -6], tangent = [1, 0, 0], color = [0.8, 0.8, 0.7] },
+    { type = "point", position = [4, -2, 3], color = [0.2, 0.3, 0.4] },
+]
+textures.checks = { type = "checker", even = [0.8, 0.7, 0.6], odd = [0.1, 0.2, 0.3], scale = [8, 5] }
+materials.floor = { type = "phong", color = [0.5, 0.5, 0.5] }
+materials.checks = { type = "phong", diffuse = { texture = "checks" }, specular = [0.3, 0.3, 0.3], ambient = [0, 0, 0], shininess = 20 }
+materials.mirror = { type = "mirror" }
+materials.glass = { type = "glass", ior = 1.5 }
+
+[[shapes]]
+type = "plane"
+material = "floor"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+[[shapes]]
+type = "cylinder"
+material = "checks"
+start = [-1.4, 0, 0]
+end = [-1.4, 0.2, 1.5]
+radius = 0.6
+tangent = [1, -2, 0]
+[[shapes]]
+type = "cylinder"
+material = "mirror"
+start = [-0.3, 1, 0.5]
+end = [0.9, 0.6, 0.5]
+radius = 0.5
+[[shapes]]
+type = "cylinder"
+material = "glass"
+start = [1.4, -0.6, 1.2]
+end = [1.4, -0.6, 0.001]
+radius = 0.5
+# Around the camera and all else.
+[[shapes]]
+type = "cylinder"
+material = "checks"
+start = [0, 0, -20]
+end = [0, 0, 20]
+radius = 30
+"#;
+
 fn known() -> impl Iterator<Item = (String, Description)> {
-    let scenes = scenes::descriptions().into_iter();
+    let cylinders = Description::parse(CYLINDERS, "cylinders").expect("a scene");
+    let scenes = scenes::descriptions()
+        .into_iter()
+        .chain([("cylinders".to_owned(), cylinders)]);
     scenes
         .filter(|(name, _)| !BEYOND.iter().any(|(beyond, _)| beyond == name))
         .map(|(name, d)| (name, small(&d)))

@@ -297,7 +297,7 @@ const SENTENCES: &[Sentence] = &[
     (
         "first samples of all pixels come before further ones",
         |packed, make| {
-            if !packed.adaptive {
+            if !packed.sampling.adaptive {
                 return Ok(());
             }
             let mut b = make();

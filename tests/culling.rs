@@ -26,7 +26,7 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
     let (mut left_out, mut wrong) = (0, 0);
     for scene in scenes
         .iter()
-        .filter(|scene| !scene.lights.is_empty() && !scene.primitives.is_empty())
+        .filter(|scene| !scene.lighting.lights.is_empty() && !scene.primitives.is_empty())
     {
         for _ in 0..200 {
             let near = scene.bounds[random.below(scene.bounds.len() as u32) as usize];
@@ -35,7 +35,7 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
                 continue; // around a plane
             }
             let p = near.center + Vec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0) as f32)) * reach;
-            let light = &scene.lights[random.below(scene.lights.len() as u32) as usize];
+            let light = &scene.lighting.lights[random.below(scene.lighting.lights.len() as u32) as usize];
             if light.kind == ENVIRONMENT {
                 continue; // all around
             }

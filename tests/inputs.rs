@@ -20,8 +20,8 @@ use wgray_render::cpu::slab::{fan, slabs};
 use wgray_render::cpu::surface::Surface;
 use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type};
 use wgray_render::records::{
-    Camera, ELLIPSOID, FAR, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material, NO_INDEX, NOWHERE, Node, PAD,
-    Primitive, SMALLEST_ALPHA, Sphere, Texture,
+    CYLINDER, Camera, ELLIPSOID, INFINITE_T, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material, NO_INDEX,
+    NOWHERE, Node, PAD, Primitive, SMALLEST_ALPHA, Sphere, Texture,
 };
 
 use crate::kernel::{Function, scalars};
@@ -271,6 +271,14 @@ impl Face {
     }
 }
 
+/// Perpendicular axes, two of one length.
+fn cylinder_columns(random: &Random, scale: f64) -> DMat3 {
+    let axis = vector(random).normalize();
+    let across = axis.cross(vector(random)).normalize_or(axis.any_orthonormal_vector());
+    let height = scale * random.pick(&[1.0, random.magnitude(-3.0, 3.0)]);
+    DMat3::from_cols(across * scale, axis.cross(across) * scale, axis * height)
+}
+
 fn point_of(corners: &[DVec3; 3], barycentric: DVec2) -> DVec3 {
     let [a, b, c] = *corners;
     a + (b - a) * barycentric.x + (c - a) * barycentric.y
@@ -302,14 +310,22 @@ impl Situation {
         if random.once_in(4) {
             columns = DMat3::from_diagonal(DVec3::splat(scale)); // parallel to the axes, as scenes often are
         }
-        let rows = columns.inverse().transpose();
         let kind = random.below(KINDS);
-        // an ellipsoid's anchor is on it, or near
+        // a solid's anchor is on it, or near
         let (mut middle, mut level) = (DVec3::ZERO, -1.0);
         if kind == ELLIPSOID && random.once_in(2) {
             middle = -local_point(random).normalize_or(DVec3::Z) * random.pick(&[1.0, 1.0, 1.1]);
             level = middle.length_squared() - 1.0;
         }
+        if kind == CYLINDER {
+            columns = cylinder_columns(random, scale);
+            if random.once_in(2) {
+                let at = local_point(random);
+                middle = -at.truncate().normalize_or(DVec2::X).extend(at.z.clamp(-1.0, 1.0));
+                level = middle.truncate().length_squared() - 1.0;
+            }
+        }
+        let rows = columns.inverse().transpose();
         let local = local_point(random);
         let away = vector(random) * random.pick(&[0.3, 1.0, 3.0, 300.0]);
         let local_start = if random.once_in(8) {
@@ -382,7 +398,7 @@ impl Situation {
             "Ray" => self.ray(random).write(words),
             "Hit" => {
                 Hit {
-                    t: random.pick(&[FAR, self.t() as f32]),
+                    t: random.pick(&[INFINITE_T, self.t() as f32]),
                     instance: random.pick(&[0, 0, 1, 2]),
                     primitive: random.pick(&[NO_INDEX, 0, 7]),
                     slot: random.below(9),
@@ -450,6 +466,11 @@ impl Situation {
             "vec2<f32>" if ["long", "short", "a", "b", "tail", "head"].contains(&name) => {
                 let edge = vector(random).truncate() * random.magnitude(-3.0, 2.5);
                 edge.as_vec2().write(words);
+            }
+            "vec2<f32>" if name == "levels" => {
+                let o = self.local_start;
+                let levels = DVec2::new(o.truncate().length_squared() - 1.0, o.z.abs() - 1.0);
+                levels.as_vec2().write(words);
             }
             "vec2<f32>" if name == "alpha" => alpha(random).write(words),
             "vec2<f32>" => {
@@ -595,8 +616,8 @@ impl Situation {
             "pad" => self.face.pad(),
             "side" => random.pick(&[1.0, -1.0]),
             "far_low" | "far_high" => random.pick(&[0.0, random.between(-2.0, 2.0) as f32]),
-            "limit" => random.pick(&[FAR, FAR, self.t() as f32, (2.0 * self.t()) as f32]),
-            "t" => random.pick(&[self.t() as f32, FAR]),
+            "limit" => random.pick(&[INFINITE_T, INFINITE_T, self.t() as f32, (2.0 * self.t()) as f32]),
+            "t" => random.pick(&[self.t() as f32, INFINITE_T]),
             "start" => (self.local_start.length_squared() - 1.0) as f32,
             "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
             "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" | "on" => random.unit() as f32,

@@ -58,7 +58,7 @@ fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     };
     let next = closest_hit(scene, up, surface.above, surface.below);
     let mut sum = Vec3::splat(if next.primitive == NO_INDEX { 0.5 } else { 0.0 });
-    for light in &scene.lights {
+    for light in &scene.lighting.lights {
         let key = sample_key(pixel, scene.camera.seed, 1 + light.number);
         let block = Block {
             pattern: RANDOM,

@@ -73,7 +73,14 @@ fn some_calls(
     calls: usize,
 ) -> Option<Film> {
     let (region, order) = (whole(packed), if at_once { Order::Pixels } else { Order::Rows });
-    let mut bands = Bands::new(region, packed.pixel_samples, cut, order, backend.largest_film(), store);
+    let mut bands = Bands::new(
+        region,
+        packed.sampling.pixel_samples,
+        cut,
+        order,
+        backend.largest_film(),
+        store,
+    );
     if at_once {
         bands = bands.as_a_whole(packed.form()).expect("memory");
     }
@@ -184,7 +191,14 @@ fn when_the_time_is_up_every_pixel_has_a_sample() {
         let (mut cpu, mut shelf) = (Cpu::new(&packed), Shelf::default());
         let region = whole(&packed);
         let most = cpu.largest_film();
-        let bands = Bands::new(region, packed.pixel_samples, &cut, Order::Pixels, most, &mut shelf);
+        let bands = Bands::new(
+            region,
+            packed.sampling.pixel_samples,
+            &cut,
+            Order::Pixels,
+            most,
+            &mut shelf,
+        );
         let mut bands = bands.as_a_whole(packed.form()).expect("memory");
         let mut watch = |_: &mut dyn Backend, _: Region, _: f64| Ok(Flow::TimeIsUp);
         let mut pixels = 0;
@@ -240,7 +254,14 @@ fn the_last_pass_is_a_whole_image_of_its_samples() {
                 let (region, most) = (whole(&packed), backend.largest_film());
                 let mut no_checkpoint = NoCheckpoint;
                 let order = Order::Pixels;
-                let bands = Bands::new(region, packed.pixel_samples, &cut, order, most, &mut no_checkpoint);
+                let bands = Bands::new(
+                    region,
+                    packed.sampling.pixel_samples,
+                    &cut,
+                    order,
+                    most,
+                    &mut no_checkpoint,
+                );
                 let mut bands = bands.in_passes(packed.form()).expect("memory");
                 let (mut calls, mut passes, mut interrupted) = (0, vec![0], 0);
                 let mut watch = |_: &mut dyn Backend, _: Region, _: f64| {
@@ -264,7 +285,7 @@ fn the_last_pass_is_a_whole_image_of_its_samples() {
                     }
                 }
                 assert!(interrupted > 0 && passes.is_sorted(), "{interrupted}, {passes:?}");
-                for samples in [1, 2, 4, 8, 16, 32, packed.pixel_samples] {
+                for samples in [1, 2, 4, 8, 16, 32, packed.sampling.pixel_samples] {
                     assert!(passes.contains(&samples), "{passes:?}");
                 }
             }

@@ -103,7 +103,7 @@ fn constants_have_their_values() {
             ref other => panic!("a shared constant is a number, not {other:?}"),
         }
     };
-    assert_eq!(value("FAR"), f32::MAX.to_bits());
+    assert_eq!(value("INFINITE_T"), f32::MAX.to_bits());
     assert_eq!(value("EVIDENCE"), wgray_render::records::EVIDENCE.to_bits());
     assert_eq!(value("NO_INDEX"), u32::MAX);
     assert_eq!(value("PLANE"), wgray_render::records::PLANE);

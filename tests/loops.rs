@@ -67,7 +67,7 @@ fn attempt(packed: &Packed, way: Way, shaders: &Shaders) -> Result<Film, RenderE
     job::render(
         &mut *backend,
         whole(packed),
-        packed.pixel_samples,
+        packed.sampling.pixel_samples,
         &Cut::default(),
         &mut |_| true,
         &mut take,

@@ -39,7 +39,11 @@ impl Nearly {
 
     /// On any other device.
     pub fn of(packed: &Packed, gpu: &Film, cpu: &Film) -> Nearly {
-        let relative = if packed.textures.is_empty() { RELATIVE } else { TEXTURED };
+        let relative = if packed.textures.records.is_empty() {
+            RELATIVE
+        } else {
+            TEXTURED
+        };
         Nearly::within(relative, SIDE, gpu, cpu)
     }
 

@@ -63,6 +63,13 @@ enum Form {
         from_local: DMat4,
     },
     Triangle([DVec3; 3]),
+    /// The side of a cylinder: the center of its start, the vector to its end, its radius, and the unit vector to u = 0.
+    Side {
+        start: DVec3,
+        axis: DVec3,
+        radius: f64,
+        tangent: DVec3,
+    },
     /// Facets by 32 that follow one another, with a box around each 32.
     Mesh(Vec<(DVec3, DVec3, Vec<Facet>)>),
     /// Centre, unit tangent and bitangent, and half the sizes along them; endless if there are no sizes; `round` if only
@@ -513,6 +520,26 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
             let axes = [DVec3::X * s.radius, DVec3::Y * s.radius, DVec3::Z * s.radius];
             (s.material.clone(), vec![quadric(s.center, axes)])
         }
+        ShapeDescription::Cylinder(c) => {
+            let axis = c.end - c.start;
+            let (tangent, _) = frame(axis, tangent(axis, c.tangent));
+            let cap = |center: DVec3, normal: DVec3| {
+                disk(&DiskDescription {
+                    material: c.material.clone(),
+                    center,
+                    radius: c.radius,
+                    normal,
+                    tangent: Some(tangent),
+                })
+            };
+            let side = Form::Side {
+                start: c.start,
+                axis,
+                radius: c.radius,
+                tangent,
+            };
+            (c.material.clone(), vec![side, cap(c.start, -axis), cap(c.end, axis)])
+        }
         ShapeDescription::Triangle(t) => (t.material.clone(), vec![Form::Triangle(t.vertices)]),
         ShapeDescription::Tetrahedron(t) => {
             let [v0, mut v1, mut v2, v3] = t.vertices;
@@ -687,6 +714,21 @@ fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
             let root = discriminant.sqrt();
             vec![(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)]
         }
+        Form::Side {
+            start, axis, radius, ..
+        } => {
+            // Across the axis the distance from it is the radius: a quadratic equation.
+            let unit = axis.normalize();
+            let across = |v: DVec3| v - unit * v.dot(unit);
+            let (o, d) = (across(origin - *start), across(direction));
+            let (a, b, c) = (d.dot(d), 2.0 * d.dot(o), o.dot(o) - radius * radius);
+            let root = (b * b - 4.0 * a * c).sqrt();
+            let along = |t: f64| (origin + direction * t - *start).dot(unit);
+            let both = [(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)];
+            both.into_iter()
+                .filter(|t| (0.0..=axis.length()).contains(&along(*t)))
+                .collect()
+        }
         Form::Triangle(corners) => triangle_crossing(corners, origin, direction).into_iter().collect(),
         Form::Flat {
             center,
@@ -721,6 +763,15 @@ fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
                 gradient.truncate().normalize(),
                 DVec2::new(longitude - longitude.floor(), latitude),
             )
+        }
+        Form::Side {
+            start, axis, tangent, ..
+        } => {
+            let unit = axis.normalize();
+            let along = (point - *start).dot(unit);
+            let normal = (point - *start - unit * along).normalize();
+            let longitude = normal.dot(unit.cross(*tangent)).atan2(normal.dot(*tangent)) / std::f64::consts::TAU;
+            (normal, DVec2::new(longitude - longitude.floor(), along / axis.length()))
         }
         Form::Triangle([v0, v1, v2]) => {
             let normal = (*v1 - *v0).cross(*v2 - *v1);

@@ -84,7 +84,14 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cu
         }
         Ok(())
     };
-    let result = wgray_render::job::render(backend, region, packed.pixel_samples, cut, &mut |_| true, &mut output);
+    let result = wgray_render::job::render(
+        backend,
+        region,
+        packed.sampling.pixel_samples,
+        cut,
+        &mut |_| true,
+        &mut output,
+    );
     result.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(
         all.sums.len() as u64,

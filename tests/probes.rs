@@ -6,6 +6,11 @@ use wgray_render::cpu::adaptive::{
     variance_of_mean, whole_look,
 };
 use wgray_render::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
+use wgray_render::cpu::cylinder::{
+    cap_side, cylinder_bitangent, cylinder_blocks, cylinder_gradient, cylinder_gradient_derivative, cylinder_height,
+    cylinder_interval, cylinder_levels, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder,
+    is_on_cap, levels_on_surface,
+};
 use wgray_render::cpu::dielectric::{Passage, dielectric_sample, eta_of, refracts_inwards, transmittance};
 use wgray_render::cpu::differential::{
     Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
@@ -15,7 +20,9 @@ use wgray_render::cpu::diffuse::{
     Angles, angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval, rough_share,
 };
 use wgray_render::cpu::disk::{disk_blocks, intersect_disk};
-use wgray_render::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
+use wgray_render::cpu::ellipsoid::{
+    ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid, longitude,
+};
 use wgray_render::cpu::filter::{filter_bin, filter_offset};
 use wgray_render::cpu::footprint::{
     Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, wrap_u, wrap_v,
@@ -26,7 +33,8 @@ use wgray_render::cpu::ggx::{
 use wgray_render::cpu::lens::{circle_point, lens_ray, lens_sample, polygon_sample};
 use wgray_render::cpu::light::{Segments, segment, segments_to_light, segments_to_local, spot_falloff};
 use wgray_render::cpu::light_sample::{
-    ellipsoid_area, ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, whole_below,
+    CylinderPart, CylinderPoint, cylinder_height_ratio, cylinder_part, cylinder_sample, cylinder_share, ellipsoid_area,
+    ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, whole_below,
 };
 use wgray_render::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
 use wgray_render::cpu::lobe::{
@@ -59,8 +67,8 @@ use wgray_render::cpu::path::{
 use wgray_render::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_samples};
 use wgray_render::cpu::plane::{intersect_plane, plane_blocks};
 use wgray_render::cpu::primitive::{
-    Tangents, blocks, intersect, is_centered, is_round, local_tangents, primitive_gradient, primitive_normal,
-    primitive_uv, uv_derivative,
+    Tangents, blocks, intersect, is_centered, is_solid, local_tangents, primitive_gradient, primitive_height,
+    primitive_normal, primitive_uv, solid_gradient, solid_gradient_derivative, solid_levels, uv_derivative,
 };
 use wgray_render::cpu::principled::{
     Mixture, bounded_color, coat_eval, facets_eval, glass_chance, glass_eval, glass_fresnel, glass_pdf, half_between,
@@ -206,6 +214,21 @@ probes! {
     ellipsoid_discriminant(o: Vec3, d: Vec3, start: f32) -> f32;
     intersect_ellipsoid(q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32;
     ellipsoid_blocks(o: Vec3, d: Vec3, start: f32, reach: f32) -> bool;
+    longitude(local: Vec3) -> f32;
+    cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2;
+    levels_on_surface(levels: Vec2, on: f32) -> Vec2;
+    cylinder_interval(o: Vec3, d: Vec3, levels: Vec2) -> Vec2;
+    intersect_cylinder(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32;
+    cylinder_blocks(o: Vec3, d: Vec3, levels: Vec2, reach: f32) -> bool;
+    is_on_cap(local: Vec3) -> bool;
+    cap_side(local: Vec3) -> f32;
+    cylinder_gradient(local: Vec3) -> Vec3;
+    cylinder_gradient_derivative(local: Vec3, d: Vec3) -> Vec3;
+    cylinder_height(q: &Primitive, from_anchor: Vec3) -> f32;
+    cylinder_uv(local: Vec3) -> Vec2;
+    cylinder_uv_derivative(local: Vec3, d: Vec3) -> Vec2;
+    cylinder_tangent(local: Vec3) -> Vec3;
+    cylinder_bitangent(local: Vec3) -> Vec3;
     intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32;
     plane_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
     camera_ray(camera: &Camera, at: Vec2) -> Ray;
@@ -215,7 +238,7 @@ probes! {
     surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface;
     with_coordinates(surface: Surface, q: &Primitive) -> Surface;
     intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32;
-    is_round(kind: u32) -> bool;
+    is_solid(kind: u32) -> bool;
     is_centered(kind: u32) -> bool;
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
     first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
@@ -231,7 +254,11 @@ probes! {
     shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32;
     block_sample(block: Block, i: u32) -> Vec2;
     cuts(kind: u32, q: &Primitive, p: Vec3, wall: bool, to: Vec3, reach: f32) -> bool;
-    blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool;
+    blocks(kind: u32, o: Vec3, d: Vec3, levels: Vec2, reach: f32) -> bool;
+    solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, wall: bool) -> Vec2;
+    solid_gradient(kind: u32, local: Vec3) -> Vec3;
+    solid_gradient_derivative(kind: u32, local: Vec3, d: Vec3) -> Vec3;
+    primitive_height(q: &Primitive, from_anchor: Vec3) -> f32;
     cone_to_light(light: &Light, p: Vec3) -> Cone;
     may_block(sphere: &Sphere, cone: &Cone) -> bool;
     phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
@@ -353,6 +380,10 @@ probes! {
     ellipsoid_cap(level: f32) -> f32;
     ellipsoid_sample(q: &Primitive, p: Vec3, u: Vec2) -> Vec3;
     ellipsoid_pdf(q: &Primitive, p: Vec3, wi: Vec3) -> f32;
+    cylinder_part(q: &Primitive, o: Vec3, levels: Vec2) -> CylinderPart;
+    cylinder_height_ratio(q: &Primitive) -> f32;
+    cylinder_sample(q: &Primitive, p: Vec3, u: Vec2) -> CylinderPoint;
+    cylinder_share(q: &Primitive, p: Vec3) -> f32;
     power_heuristic(own: f32, other: f32) -> f32;
     whole_below(bits: u32, count: u32) -> u32;
     cell_towards(d: Vec3, width: u32, height: u32) -> MapCell;

@@ -256,6 +256,13 @@ material = "diffuse"
 center = [0, 0, 1]
 radius = 1
 [[shapes]]
+type = "cylinder"
+material = "diffuse"
+start = [0, 0, 0]
+end = [0, 0, 1]
+radius = 1
+tangent = [1, 0, 0]
+[[shapes]]
 type = "triangle"
 material = "gold"
 vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
@@ -391,6 +398,7 @@ const OF_SEVERAL: &[&str] = &[
     "square number",
     "cannot add samples",
     "and at least the count",
+    "from the start",
     "to cone_angle",
     "must not emit light",
     "must be greater than the frame of the previous key",

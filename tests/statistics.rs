@@ -23,13 +23,13 @@ fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
     let s = &packed.specialization;
     let keys = evaluate("sample_key", (0..sets).flat_map(|i| [i % 97, i / 97, 5, 0]).collect());
     let calls = keys.chunks_exact(2).flat_map(|key| {
-        (0..packed.pixel_samples).flat_map(|index| [s.pixel_pattern, s.pixel_side, index, 0, key[0], key[1]])
+        (0..packed.sampling.pixel_samples).flat_map(|index| [s.pixel_pattern, s.pixel_side, index, 0, key[0], key[1]])
     });
     let places = evaluate("sample_square", calls.collect());
     let place = |words: &[u32]| Vec2::new(f32::from_bits(words[0]), f32::from_bits(words[1]));
     let places: Vec<Vec2> = places.chunks_exact(2).map(place).collect();
     places
-        .chunks_exact(packed.pixel_samples as usize)
+        .chunks_exact(packed.sampling.pixel_samples as usize)
         .map(<[Vec2]>::to_vec)
         .collect()
 }

@@ -6,6 +6,7 @@ use wgray_render::cpu::differential::{Arrival, Derivative, Differential};
 use wgray_render::cpu::diffuse::Angles;
 use wgray_render::cpu::footprint::{Ellipse, Footprint};
 use wgray_render::cpu::light::Segments;
+use wgray_render::cpu::light_sample::{CylinderPart, CylinderPoint};
 use wgray_render::cpu::lobe::LobeSample;
 use wgray_render::cpu::mesh::{Crossing, Shear, Spot};
 use wgray_render::cpu::modified_phong::PhongFactors;
@@ -108,6 +109,8 @@ records! {
     Ellipse { m, major, minor }
     MapCell { column, row, x, y }
     Tangents { u, v }
+    CylinderPart { arc, middle, side, end, start }
+    CylinderPoint { to, normal }
     Path { ray, differential, throughput, depth, branch, left, wall }
     Scattered { onward, other, splits }
     Passage { path, passes, eta }

@@ -298,7 +298,7 @@ fn with_light(state: PathState, spot: Spot, surface: Surface, material: Material
     }
     found *= select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta);
     let most = largest(found);
-    let dark = !wanted | !(most > 0.0) | !(most < FAR);
+    let dark = !wanted | !(most > 0.0) | !(most < INFINITE_T);
     if SEES_THROUGH != 0u {
         let bounce = state.path.depth + 1u;
         let veiled = is_veiled(dark, from_side, to, light.reach, light.primitive, pixel, state.sample, bounce);

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use crate::scene::{CameraPath, Define, Integrator, Overrides, Projection, Scene, SceneError};
+use crate::scene::{CameraPath, Define, Overrides, Projection, Scene, SceneError};
 use clap::ValueHint;
 use wgray_image::visible::visible;
 #[cfg(feature = "gpu")]
@@ -113,10 +113,10 @@ fn image(scene: &Scene, packed: &Packed) -> String {
     let integrator = scene.render.integrator;
     let lights = match packed.light_samples() {
         0 => String::new(),
-        _ if integrator == Integrator::Path => String::new(),
+        _ if integrator.needs_emitters() => String::new(),
         lights => format!(", {}", count(lights as usize, "light sample")),
     };
-    let samples = count(packed.pixel_samples as usize, "sample");
+    let samples = count(packed.sampling.pixel_samples as usize, "sample");
     format!(
         "{} x {} pixels, {samples} per pixel{lights}, {}",
         scene.width,
@@ -128,15 +128,15 @@ fn image(scene: &Scene, packed: &Packed) -> String {
 /// Describes the shapes: their number, and the number and memory use of mesh instances.
 fn shapes(scene: &Scene, packed: &Packed) -> String {
     let all = count(scene.shapes.len(), "shape");
-    if packed.instances.is_empty() {
+    if packed.bvh.instances.is_empty() {
         return all;
     }
-    let triangles: usize = packed.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-    let bytes: u64 = packed.meshes.iter().map(|mesh| mesh.bytes()).sum();
+    let triangles: usize = packed.bvh.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+    let bytes: u64 = packed.bvh.meshes.iter().map(|mesh| mesh.bytes()).sum();
     format!(
         "{all}, including {} of {} ({}, {:.1} MiB)",
-        count(packed.instances.len(), "instance"),
-        count(packed.meshes.len(), "mesh"),
+        count(packed.bvh.instances.len(), "instance"),
+        count(packed.bvh.meshes.len(), "mesh"),
         count(triangles, "triangle"),
         bytes as f64 / f64::from(1 << 20),
     )

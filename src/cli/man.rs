@@ -10,6 +10,7 @@ use clap_mangen::Man;
 use clap_mangen::roff::{Roff, bold, roman};
 
 use super::{Cli, Usage};
+use crate::image::{Output, Pending};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -29,7 +30,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         std::fs::create_dir_all(folder).map_err(|error| not_written(folder, &error))?;
         for command in std::iter::once(&program).chain(program.get_subcommands()) {
             let path = folder.join(format!("{}.1", name_of(command)));
-            std::fs::write(&path, page(command, &program)?).map_err(|error| not_written(&path, &error))?;
+            write(&path, &page(command, &program)?).map_err(|error| not_written(&path, &error))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -42,6 +43,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let text = page(command, &program)?;
     Ok(super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS))
+}
+
+fn write(path: &Path, text: &[u8]) -> io::Result<()> {
+    let mut file = Pending::start(Output::find(path)?)?;
+    file.write_all(text)?;
+    file.finish()
 }
 
 fn not_written(path: &Path, error: &io::Error) -> RenderError {

@@ -166,7 +166,7 @@ impl Files {
         job::render(
             &mut gpu,
             whole,
-            packed.pixel_samples,
+            packed.sampling.pixel_samples,
             &Cut::default(),
             &mut |_| true,
             &mut |film| {

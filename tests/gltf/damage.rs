@@ -18,7 +18,7 @@ fn load(file: &Path, strict: bool) -> Result<Scene, String> {
 
 /// The triangles of all meshes.
 fn triangles(scene: &Scene) -> usize {
-    let meshes = wgray_render::pack::pack(scene).meshes;
+    let meshes = wgray_render::pack::pack(scene).bvh.meshes;
     meshes.iter().map(|mesh| mesh.triangles.len()).sum()
 }
 

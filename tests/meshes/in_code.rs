@@ -76,7 +76,7 @@ fn the_tree_of_a_mesh_is_kept() {
     let mesh = Arc::new(square());
     let pack = || wgray_render::pack::pack(&scene(Arc::clone(&mesh)).unwrap());
     let [a, b] = [pack(), pack()];
-    assert!(Arc::ptr_eq(&a.meshes[0], &b.meshes[0]));
+    assert!(Arc::ptr_eq(&a.bvh.meshes[0], &b.bvh.meshes[0]));
 }
 
 #[test]

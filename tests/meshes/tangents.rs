@@ -57,7 +57,7 @@ fn hit(packed: &Packed, slot: usize, barycentric: Vec2) -> Hit {
     Hit {
         t: 1.0,
         instance: 1,
-        primitive: packed.meshes[0].triangles[slot].w,
+        primitive: packed.bvh.meshes[0].triangles[slot].w,
         slot: slot as u32,
         barycentric,
     }
@@ -76,10 +76,10 @@ const PLACES: [Vec2; 7] = [
 
 /// The largest angle, in degrees, between the tangents of a mesh and those of its surface: as they are, and the triangles'.
 fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> [f64; 2] {
-    let i = &packed.instances[0];
+    let i = &packed.bvh.instances[0];
     let to_world = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
     let mut worst = [0.0; 2];
-    for slot in 0..packed.meshes[0].triangles.len() {
+    for slot in 0..packed.bvh.meshes[0].triangles.len() {
         for b in PLACES {
             let spot = spot_of(packed, hit(packed, slot, b));
             let uv = face_uv(&spot, b);
@@ -154,14 +154,14 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
         dv: v,
         ..surface
     };
-    let texture = &packed.textures[packed.lookups[material.lookups.x as usize].texture as usize];
+    let texture = &packed.textures.records[packed.textures.lookups[material.lookups.x as usize].texture as usize];
     [found, mapped_normal(by_triangle, texture, LEAN)]
 }
 
 /// The largest angle, in degrees, between the normals on the two sides of an edge, seams among them; and by the triangles'
 /// own tangents.
 fn jumps(packed: &Packed, is_looked_at: impl Fn(Vec3) -> bool) -> ([f32; 2], usize) {
-    let mesh = &packed.meshes[0];
+    let mesh = &packed.bvh.meshes[0];
     let mut sides: HashMap<_, Vec<[Vec3; 2]>> = HashMap::new();
     for (slot, triangle) in mesh.triangles.iter().enumerate() {
         let corners = [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].truncate());
@@ -233,7 +233,7 @@ fn a_picture_shows_no_triangles() {
     let mut packed = leaning(&Sheet::sphere(16, 8).obj(), "", &shape);
     let found = largest_step(&packed);
     // The control: the triangles' own tangents.
-    packed.instances[0].tangents = NO_INDEX;
+    packed.bvh.instances[0].tangents = NO_INDEX;
     let by_triangle = largest_step(&packed);
     println!("steps of {found}, {by_triangle} without tangents");
     assert!(found < 0.005 && by_triangle > 0.015, "{found} {by_triangle}");
@@ -248,12 +248,12 @@ fn mirrored_texture_coordinates_are_not_averaged_with_others() {
         [normal + DVec3::Y * (v - 0.5), normal]
     });
     let plain = leaning(&sheet.obj(), "", "");
-    assert_eq!(plain.meshes[0].vertices.len(), 9 * 5);
+    assert_eq!(plain.bvh.meshes[0].vertices.len(), 9 * 5);
     for uv in &mut sheet.uvs {
         uv[0] = (uv[0] - 0.5).abs();
     }
     let packed = leaning(&sheet.obj(), "", "");
-    let mesh = &packed.meshes[0];
+    let mesh = &packed.bvh.meshes[0];
     // The middle's vertices are there twice.
     assert_eq!(mesh.vertices.len(), 9 * 5 + 5);
     assert_eq!(mesh.attributes.len(), mesh.vertices.len());
@@ -296,7 +296,7 @@ fn pieces_of_a_texture_keep_their_directions() {
         let triangles = right.form.triangles.into_iter();
         whole.form.triangles.extend(triangles.map(|t| t.map(|i| first + i)));
         let packed = leaning(&whole.obj(), "", "");
-        let mesh = &packed.meshes[0];
+        let mesh = &packed.bvh.meshes[0];
         let mut directions: Vec<f32> = mesh
             .vertices
             .iter()
@@ -316,15 +316,15 @@ fn pieces_of_a_texture_keep_their_directions() {
 fn only_smooth_meshes_with_normal_maps_have_tangents() {
     let sphere = Sheet::sphere(16, 8);
     let (with, count) = (leaning(&sphere.obj(), "", ""), 17 * 9);
-    assert_eq!(with.meshes[0].tangents.len(), count - 2); // a pole's vertices are of a triangle each, but for one
-    assert!(with.instances[0].tangents != NO_INDEX);
+    assert_eq!(with.bvh.meshes[0].tangents.len(), count - 2); // a pole's vertices are of a triangle each, but for one
+    assert!(with.bvh.instances[0].tangents != NO_INDEX);
     let flat = leaning(&sphere.obj(), "", "normals = 'flat'");
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("mesh.obj"), sphere.obj()).unwrap();
     let text = format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'mesh.obj'\nmaterial = 'm'");
     for packed in [flat, scene(&text, folder.path())] {
-        assert!(packed.meshes[0].tangents.is_empty());
-        assert_eq!(packed.instances[0].tangents, NO_INDEX);
+        assert!(packed.bvh.meshes[0].tangents.is_empty());
+        assert_eq!(packed.bvh.instances[0].tangents, NO_INDEX);
         let spot: Spot = spot_of(&packed, hit(&packed, 0, Vec2::ZERO));
         assert_eq!(spot.tangents_0, Tangents::default());
         assert_eq!(face_frame(&spot, Vec2::ZERO), face_tangents(&spot));
@@ -349,7 +349,7 @@ fn odd_texture_coordinates_give_usable_tangents() {
         let mut sheet = Sheet::torus(16, 12);
         sheet.uvs.iter_mut().for_each(|uv| *uv = map(*uv));
         let packed = leaning(&sheet.obj(), "rotate = 30", "scale = 1e-6");
-        for slot in 0..packed.meshes[0].triangles.len() {
+        for slot in 0..packed.bvh.meshes[0].triangles.len() {
             for b in PLACES {
                 let normal = normals(&packed, slot, b)[0];
                 assert!(

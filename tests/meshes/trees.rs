@@ -17,7 +17,7 @@ use wgray_render::cpu::slab::{box_passage, is_passed, slabs};
 use wgray_render::cpu::surface::{Surface, largest};
 use wgray_render::cpu::traverse::{closest_primitive, hidden_by_primitives};
 use wgray_render::records::{
-    BLOCK, CASTS_SHADOW, FAR, INSTANCE, Instance, Item, Light, NO_INDEX, NO_SHADOW, NOWHERE, Packed, RANDOM,
+    BLOCK, CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Item, Light, NO_INDEX, NO_SHADOW, NOWHERE, Packed, RANDOM,
 };
 
 use super::forms::{Form, HEAD, scene};
@@ -27,7 +27,7 @@ use crate::scenes;
 
 /// The corners of a mesh's triangle in a slot, in the mesh's space.
 fn corners(scene: &Packed, i: &Instance, slot: usize) -> [Vec3; 3] {
-    let mesh = &scene.meshes[i.mesh as usize];
+    let mesh = &scene.bvh.meshes[i.mesh as usize];
     let triangle = mesh.triangles[slot];
     [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].xyz())
 }
@@ -40,16 +40,16 @@ fn room(scene: &Packed, origin: Vec3) -> f32 {
 fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
     let mut hit = closest_primitive(scene, ray, by_itself(left), by_itself(wall));
     let world = slabs(ray.origin, ray.direction, room(scene, ray.origin));
-    for item in &scene.items {
+    for item in &scene.bvh.items {
         let passage = box_passage(item.low, item.high, world);
-        if !is_passed(passage, FAR) {
+        if !is_passed(passage, INFINITE_T) {
             continue;
         }
         let kind = item.kind & 0xff;
         if kind != INSTANCE {
             let wall = item.index == by_itself(wall);
-            let met = intersect(kind, &scene.primitives[item.index as usize], wall, ray, FAR);
-            if met < FAR && item.index != by_itself(left) {
+            let met = intersect(kind, &scene.primitives[item.index as usize], wall, ray, INFINITE_T);
+            if met < INFINITE_T && item.index != by_itself(left) {
                 let found = Hit {
                     t: met.max(passage.x),
                     primitive: item.index,
@@ -59,12 +59,12 @@ fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
             }
             continue;
         }
-        let i = &scene.instances[item.index as usize];
+        let i = &scene.bvh.instances[item.index as usize];
         let start = passage.x.max(0.0);
         let direction = vector_to_mesh(i, ray.direction);
         let origin = point_to_mesh(i, ray.origin) + direction * start;
         let s = slabs(origin, direction, mesh_pad(i, origin));
-        for (slot, triangle) in scene.meshes[i.mesh as usize].triangles.iter().enumerate() {
+        for (slot, triangle) in scene.bvh.meshes[i.mesh as usize].triangles.iter().enumerate() {
             let [v0, v1, v2] = corners(scene, i, slot);
             let crossing = triangle_crossing(v0, v1, v2, origin, shear_of(direction), s);
             let found = Hit {
@@ -88,7 +88,7 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32
     let mut bits = hidden_by_primitives(scene, surface, light, block);
     let origin = surface.start;
     let to = segments_to_light(light, origin);
-    for item in scene.items.iter().filter(|item| item.kind & CASTS_SHADOW != 0) {
+    for item in scene.bvh.items.iter().filter(|item| item.kind & CASTS_SHADOW != 0) {
         for sample in 0..block.count {
             let at = block_sample(block, sample);
             let world = slabs(origin, segment(to, at), room(scene, origin));
@@ -96,15 +96,15 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32
                 continue;
             }
             let is_hidden = if item.kind & 0xff == INSTANCE {
-                let i = &scene.instances[item.index as usize];
+                let i = &scene.bvh.instances[item.index as usize];
                 let start = point_to_mesh(i, origin);
                 let [towards, u, v] = [to.towards, to.u, to.v].map(|v| vector_to_mesh(i, v));
                 let direction = segment(wgray_render::cpu::light::Segments { towards, u, v }, at);
                 let s = slabs(start, direction, mesh_pad(i, start));
-                let mesh = &scene.meshes[i.mesh as usize];
+                let mesh = &scene.bvh.meshes[i.mesh as usize];
                 mesh.triangles.iter().enumerate().any(|(slot, triangle)| {
                     let group = mesh.groups.get(slot).copied().unwrap_or(0);
-                    let casts = scene.group_words[(i.materials + group) as usize] & NO_SHADOW == 0;
+                    let casts = scene.bvh.group_words[(i.materials + group) as usize] & NO_SHADOW == 0;
                     let [v0, v1, v2] = corners(scene, i, slot);
                     let crossing = triangle_crossing(v0, v1, v2, start, shear_of(direction), s);
                     let own = surface.above == UVec2::new(item.index + 1, triangle.w);
@@ -132,7 +132,7 @@ struct Aims<'a> {
 
 impl<'a> Aims<'a> {
     fn new(scene: &'a Packed, random: &'a Random) -> Aims<'a> {
-        let boxes = scene.items.iter().map(|item| (item.low, item.high));
+        let boxes = scene.bvh.items.iter().map(|item| (item.low, item.high));
         let (low, high) = boxes.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), (l, h)| {
             (low.min(l), high.max(h))
         });
@@ -157,7 +157,7 @@ impl<'a> Aims<'a> {
     /// A point of a mesh, and the triangle that it is on.
     fn target(&self) -> (Vec3, UVec2) {
         let (scene, random) = (self.scene, self.random);
-        let item: &Item = &scene.items[random.below(scene.items.len() as u32) as usize];
+        let item: &Item = &scene.bvh.items[random.below(scene.bvh.items.len() as u32) as usize];
         if item.kind & 0xff != INSTANCE || random.once_in(8) {
             let corner = Vec3::select(
                 glam::BVec3::new(random.once_in(2), random.once_in(2), random.once_in(2)),
@@ -171,8 +171,8 @@ impl<'a> Aims<'a> {
             };
             return (at, NOWHERE);
         }
-        let i = &scene.instances[item.index as usize];
-        let slot = random.below(scene.meshes[i.mesh as usize].triangles.len() as u32) as usize;
+        let i = &scene.bvh.instances[item.index as usize];
+        let slot = random.below(scene.bvh.meshes[i.mesh as usize].triangles.len() as u32) as usize;
         let [a, b, c] = corners(scene, i, slot);
         let p = match random.below(4) {
             0 => a,
@@ -185,7 +185,7 @@ impl<'a> Aims<'a> {
         let at = i.anchor + i.u * p.x + i.v * p.y + i.w * p.z;
         (
             at,
-            UVec2::new(item.index + 1, scene.meshes[i.mesh as usize].triangles[slot].w),
+            UVec2::new(item.index + 1, scene.bvh.meshes[i.mesh as usize].triangles[slot].w),
         )
     }
 
@@ -301,6 +301,7 @@ type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<bvh::Node>, Vec<u32>);
 fn with_trees(scene: &Packed, tree: Builder) -> Packed {
     let mut scene = scene.clone();
     let boxes: Vec<Aabb> = scene
+        .bvh
         .items
         .iter()
         .map(|item| Aabb {
@@ -309,9 +310,9 @@ fn with_trees(scene: &Packed, tree: Builder) -> Packed {
         })
         .collect();
     let (nodes, order) = tree(&boxes);
-    scene.nodes = bytemuck::cast_vec(nodes);
-    scene.items = order.iter().map(|i| scene.items[*i as usize]).collect();
-    for mesh in &mut scene.meshes {
+    scene.bvh.nodes = bytemuck::cast_vec(nodes);
+    scene.bvh.items = order.iter().map(|i| scene.bvh.items[*i as usize]).collect();
+    for mesh in &mut scene.bvh.meshes {
         let mesh = Arc::make_mut(mesh);
         let position = |vertex: u32| mesh.vertices[vertex as usize].xyz();
         let around = |t: &glam::UVec4| {
@@ -463,7 +464,7 @@ fn trees_leave_out_no_hit_and_no_shadow() {
         ("soups", soups(), 6000),
         ("knots", scenes::packed(&scenes::scene("twisted-tube.toml")), 600),
     ] {
-        assert!(!scene.items.is_empty());
+        assert!(!scene.bvh.items.is_empty());
         let [hits, shadows, met, dark] = differing(&scene, rays, 1);
         println!("{name}: {met} of {rays} rays meet something, {dark} are in some shadow");
         assert!(met > rays / 4 && dark > rays / 10, "{name}: {met} {dark}");
@@ -503,7 +504,7 @@ fn any_other_tree_gives_the_same_bits() {
             );
         }
         let other = with_trees(&scene, &|boxes| random_tree(boxes, &random));
-        assert_ne!(other.nodes, scene.nodes);
+        assert_ne!(other.bvh.nodes, scene.bvh.nodes);
         assert_eq!(differing_between(&scene, &other, 250), [0, 0], "{name}, a random tree");
     }
 }
@@ -524,7 +525,7 @@ fn trees_of_random_scenes_leave_out_nothing() {
     let mut with_tree = 0;
     for case in 0..60 {
         let scene = any_scene::packed(&strategy.new_tree(&mut runner).expect("a scene").current());
-        if scene.items.is_empty() {
+        if scene.bvh.items.is_empty() {
             continue;
         }
         with_tree += 1;

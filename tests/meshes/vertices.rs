@@ -622,7 +622,7 @@ fn directions_of_facets_are_those_of_an_image() {
             "anisotropy = {{ texture = 'd', channel = 'b' }}\nanisotropy_rotation = {more}\nanisotropy_direction = {{ texture = 'd' }}"
         );
         let packed = scene(folder.path(), 4, &text(&keys), |_| ());
-        assert_eq!(packed.lookups.len(), 1);
+        assert_eq!(packed.textures.lookups.len(), 1);
         let found = means(&reference(&packed));
         let expected = plain(if degrees + more < -360.0 {
             degrees

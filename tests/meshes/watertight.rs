@@ -7,7 +7,7 @@ use wgray_render::cpu::geometry::{closest_hit, hidden_samples};
 use wgray_render::cpu::ray::Ray;
 use wgray_render::cpu::shadow::Block;
 use wgray_render::cpu::surface::Surface;
-use wgray_render::records::{CASTS_SHADOW, FAR, GRID, Instance, Light, NO_INDEX, NOWHERE, Packed};
+use wgray_render::records::{CASTS_SHADOW, GRID, INFINITE_T, Instance, Light, NO_INDEX, NOWHERE, Packed};
 
 use super::forms::{Form, HEAD, scene};
 use crate::random::Random;
@@ -49,7 +49,7 @@ struct Solid {
 
 impl Solid {
     fn new(scene: &Packed) -> Solid {
-        let (i, mesh): (&Instance, _) = (&scene.instances[0], &scene.meshes[0]);
+        let (i, mesh): (&Instance, _) = (&scene.bvh.instances[0], &scene.bvh.meshes[0]);
         let columns = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
         let corner = |vertex: u32| {
             let p = mesh.vertices[vertex as usize].xyz().as_dvec3();
@@ -128,7 +128,7 @@ fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -
     let slack = 30.0 * solid.rounding / d.length();
     let limit = if inside { to_target * 1.05 + slack } else { to_center };
     let hit = closest_hit(scene, ray, NOWHERE, NOWHERE);
-    let casts = scene.items.iter().any(|item| item.kind & CASTS_SHADOW != 0);
+    let casts = scene.bvh.items.iter().any(|item| item.kind & CASTS_SHADOW != 0);
     let times = if inside { 2.0 } else { 1.0 + to_center / to_target };
     !(f64::from(hit.t) <= limit) || casts && !is_hidden(scene, origin, direction, times)
 }
@@ -188,7 +188,7 @@ fn no_ray_passes_a_closed_mesh() {
         for place in PLACES {
             let scene = placed(&obj, place);
             assert_eq!(
-                scene.meshes[0].triangles.len(),
+                scene.bvh.meshes[0].triangles.len(),
                 form.triangles.len(),
                 "{name}: all triangles are there"
             );
@@ -231,7 +231,7 @@ fn triangles_that_do_not_share_their_edges_are_found() {
         text += &format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [{a:?}, {b:?}, {c:?}]\n");
     }
     let mut apart = scene(&text, sources::path("scenes").as_path());
-    (apart.instances, apart.meshes) = (mesh.instances.clone(), mesh.meshes.clone()); // for what they are aimed at
+    (apart.bvh.instances, apart.bvh.meshes) = (mesh.bvh.instances.clone(), mesh.bvh.meshes.clone()); // for what they are aimed at
     let count = [false, true].map(|inside| passing(&apart, 64_000, inside));
     println!("{count:?} of 64000 rays from outside and inside pass triangles by themselves");
     assert!(count[0] + count[1] > 0, "{count:?}");
@@ -268,7 +268,7 @@ fn no_ray_passes_the_knot() {
 
 /// How many rays were aimed from outside and from inside, and how many of them pass.
 fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
-    let side = f64::from(scene.instances[0].side);
+    let side = f64::from(scene.bvh.instances[0].side);
     let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize() * side;
     let size = solid
         .corners
@@ -317,14 +317,14 @@ fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
             NOWHERE,
             NOWHERE,
         );
-        if across.t == FAR || f64::from(across.t) < 0.01 * size {
+        if across.t == INFINITE_T || f64::from(across.t) < 0.01 * size {
             continue;
         }
         let origin = (middle + inwards * 0.25 * f64::from(across.t)).as_vec3();
         let direction = (solid.target(&random) - origin.as_dvec3()).as_vec3();
         let hit = closest_hit(scene, Ray { origin, direction }, NOWHERE, NOWHERE);
         inside.0 += 1;
-        inside.1 += u32::from(hit.t == FAR || !is_hidden(scene, origin, direction, 1e3));
+        inside.1 += u32::from(hit.t == INFINITE_T || !is_hidden(scene, origin, direction, 1e3));
     }
     [outside, inside]
 }

@@ -413,6 +413,7 @@ fn every_way_gives_the_same_bits() {
 /// Samples of a scene's image at a surface of this normal.
 fn samples(packed: &Packed, normal: Vec3, count: u32) -> impl Iterator<Item = Vec3> {
     let light = packed
+        .lighting
         .lights
         .iter()
         .find(|light| light.kind == ENVIRONMENT)

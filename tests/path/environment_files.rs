@@ -47,7 +47,7 @@ fn images_of_every_kind_are_read() {
         assert!(scene.files.iter().any(|file| file.ends_with(name)), "{:?}", scene.files);
         let packed = wgray_render::pack::pack(&scene);
         let at = packed.environment.texels as usize;
-        let value = f32::from_bits(packed.texels[at]);
+        let value = f32::from_bits(packed.textures.texels[at]);
         // 188 of 255 by the sRGB curve is 0.5029.
         assert!((value - 0.5).abs() < 6e-3, "{name}: {value}");
     }
@@ -178,6 +178,9 @@ fn named_surroundings_are_made_quickly() {
         println!("{name}: {took:.3} s");
         let packed = wgray_render::pack::pack(&scene);
         println!("{name}, packed: {:.3} s", start.elapsed().as_secs_f64() - took);
-        assert!(packed.emitters.len() == 1 && packed.environment.width > 0, "{name}");
+        assert!(
+            packed.lighting.emitters.len() == 1 && packed.environment.width > 0,
+            "{name}"
+        );
     }
 }

@@ -201,6 +201,71 @@ fn spheres_and_disks_light_the_floor_by_their_form_factors() {
     }
 }
 
+/// The irradiance, divided by pi times the radiance, that a horizontal emissive cylinder sends straight down, by the integral of the cosines over its
+/// surface: a midpoint rule in f64.
+fn cylinder_factor(height: f64, radius: f64, length: f64) -> f64 {
+    let (arcs, slices) = (400, 400);
+    let mut sum = 0.0;
+    for i in 0..arcs {
+        let angle = 2.0 * PI * (f64::from(i) + 0.5) / f64::from(arcs);
+        let normal = [0.0, angle.cos(), angle.sin()];
+        for j in 0..slices {
+            let x = length * ((f64::from(j) + 0.5) / f64::from(slices) - 0.5);
+            let p = [x, radius * normal[1], height + radius * normal[2]];
+            let d2 = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+            let cosine = -(p[1] * normal[1] + p[2] * normal[2]) / d2.sqrt();
+            if cosine > 0.0 {
+                let area = radius * (2.0 * PI / f64::from(arcs)) * (length / f64::from(slices));
+                sum += cosine * (p[2] / d2.sqrt()) / d2 * area;
+            }
+        }
+    }
+    sum / PI
+}
+
+#[test]
+fn cylinders_light_the_floor_by_their_form_factors() {
+    // At a great length it is radius / height (Siegel and Howell, "Thermal Radiation Heat Transfer").
+    assert!(near(cylinder_factor(1.0, 0.3, 60.0), 0.3, 2e-3));
+    for scale in [1e-3, 1.0, 1e3] {
+        let shapes = [
+            // Upright: the cap.
+            ([0.0, 0.0, 1.0], [0.0, 0.0, 4.0], 0.5, 0.25 / 1.25),
+            ([-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], 0.3, cylinder_factor(1.0, 0.3, 2.0)),
+            ([-0.05, 0.0, 1.0], [0.05, 0.0, 1.0], 0.7, cylinder_factor(1.0, 0.7, 0.1)),
+            (
+                [-9.0, 0.0, 1.0],
+                [9.0, 0.0, 1.0],
+                0.01,
+                cylinder_factor(1.0, 0.01, 18.0),
+            ),
+            // All around.
+            ([0.0, 0.0, -1.0], [0.0, 0.0, 2.0], 0.8, 1.0),
+        ];
+        for (start, end, radius, factor) in shapes {
+            let [start, end] = [start, end].map(|p| p.map(|x: f64| x * scale));
+            let radius = radius * scale;
+            let camera = above(0.0, 0.0, 1e-4 * scale, 1e-6 * scale);
+            let packed = scene(
+                4096,
+                1,
+                &format!(
+                    "{camera}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\nmaterials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [10, 10, 10] }}\n[[shapes]]\nmaterial = 's'\ntype = 'cylinder'\nstart = {start:?}\nend = {end:?}\nradius = {radius}\n{FLOOR}"
+                ),
+            );
+            for way in both() {
+                let found = mean(&render(&packed, way))[1];
+                let expected = 5.0 * factor;
+                assert!(
+                    near(found, expected, 5e-3),
+                    "{way:?}, {start:?} {end:?} {radius}: {found} for {expected}"
+                );
+                assert!(!near(found, expected * 1.02, 5e-3), "the control");
+            }
+        }
+    }
+}
+
 #[test]
 fn points_fall_off_with_the_square_of_the_distance_and_suns_do_not() {
     for (light, expected) in [

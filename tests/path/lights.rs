@@ -25,8 +25,8 @@ fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
         );
     }
     let packed = scene(1, 1, &text);
-    assert_eq!(packed.emitters.len(), 16, "the dark one is none");
-    let mut counts = vec![0.0; packed.lights.len()];
+    assert_eq!(packed.lighting.emitters.len(), 16, "the dark one is none");
+    let mut counts = vec![0.0; packed.lighting.lights.len()];
     let calls = 400_000;
     for i in 0..calls {
         let bits = hash4(glam::UVec4::new(i, 1, 2, 3));
@@ -34,7 +34,7 @@ fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
         counts[emitter.index as usize] += 1.0;
     }
     let total = f64::from(16 * 17 / 2);
-    let chi_square: f64 = (packed.lights.iter().zip(&counts))
+    let chi_square: f64 = (packed.lighting.lights.iter().zip(&counts))
         .map(|(light, count)| {
             let share = 0.75 * f64::from(light.color.x) / total + 0.25 / 16.0;
             assert!(

@@ -56,7 +56,7 @@ struct Leaf {
 
 fn leaves(packed: &Packed) -> Vec<Leaf> {
     let mut found = Vec::new();
-    for node in &packed.light_nodes {
+    for node in &packed.lighting.nodes {
         for i in (0..4).filter(|i| node.intensity[*i] > 0.0 && node.children[*i] == NO_INDEX) {
             found.push(Leaf {
                 density: node.density[i],
@@ -75,9 +75,9 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
         let packed = scene(1, 1, &format!("{CAMERA}{FLOOR}{far}{}", lamps(60).concat()));
         let leaves = leaves(&packed);
         assert_eq!(leaves.len(), 60);
-        let of_tree = packed.emitters[0];
+        let of_tree = packed.lighting.emitters[0];
         assert_eq!(
-            (packed.emitters.len(), of_tree.index),
+            (packed.lighting.emitters.len(), of_tree.index),
             (1 + usize::from(!far.is_empty()), NO_INDEX)
         );
         for (p, n) in [
@@ -103,7 +103,7 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
                     continue;
                 }
                 // With a sun beside it, the tree is chosen by its share, which all leaves' densities have.
-                let primitive = packed.lights[leaf.index as usize].primitive;
+                let primitive = packed.lighting.lights[leaf.index as usize].primitive;
                 if primitive != NO_INDEX {
                     let hit = Hit {
                         t: 1.0,
@@ -200,7 +200,7 @@ fn the_ends_of_ranges_give_numbers() {
     }
     let packed = scene(64, 6, &text);
     assert_eq!(packed.specialization.light_tree, 1);
-    for node in &packed.light_nodes {
+    for node in &packed.lighting.nodes {
         let middles = [
             node.x,
             node.y,
@@ -275,7 +275,7 @@ fn meshes_that_shine_are_in_the_tree() {
     };
     let packed = load(&text(&[mesh("s", -0.7), mesh("m", 9.0), mesh("s", 0.7)].concat(), 16));
     assert_eq!(leaves(&packed).len(), 160);
-    let first: Vec<u32> = packed.instances.iter().map(|instance| instance.leaves).collect();
+    let first: Vec<u32> = packed.bvh.instances.iter().map(|instance| instance.leaves).collect();
     assert_eq!(first[1], NO_INDEX);
     assert!(first[0] != NO_INDEX && first[2] != NO_INDEX);
     let expected = reference(&packed);

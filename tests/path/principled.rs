@@ -427,7 +427,7 @@ fn numbers_come_from_the_channels_of_a_texture() {
     for kind in ["constant", "checker"] {
         let packed = picture_of(textured, texture(kind));
         // Looked up once for all four, or not at all.
-        assert_eq!(packed.lookups.len(), usize::from(kind == "checker"));
+        assert_eq!(packed.textures.lookups.len(), usize::from(kind == "checker"));
         for way in crate::pictures::exact_ways() {
             assert_eq!(
                 crate::pictures::differing(&crate::pictures::render(&packed, way), &expected),

@@ -26,7 +26,11 @@ fn many_lamps() -> String {
             f64::from(i / 6) * 0.45 - 0.7,
             0.7 + f64::from(i % 4) * 0.05,
         ];
-        match i % 4 {
+        match i % 5 {
+            4 => format!(
+                "[[shapes]]\ntype = 'cylinder'\nmaterial = 'dim'\nstart = [{x}, {y}, {z}]\nend = [{}, {y}, {z}]\nradius = 0.1\n",
+                x + 0.2
+            ),
             0 => format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [{x}, {y}, {z}]\nradius = 0.15\n"),
             1 => format!(
                 "[[shapes]]\ntype = 'disk'\nmaterial = 'dim'\ncenter = [{x}, {y}, {z}]\nradius = 0.2\nnormal = [{x}, 0.3, -1]\n"
@@ -68,6 +72,7 @@ fn light_alone_and_materials_alone_find_the_same() {
         "[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [0.2, 0, 0.9]\nradius = 0.5\n",
         "[[shapes]]\ntype = 'ellipsoid'\nmaterial = 'shine'\ncenter = [0, 0, 0.6]\na = [0.8, 0.1, 0]\nb = [0, 0.3, 0.1]\nc = [0, 0.1, 0.3]\n",
         "[[shapes]]\ntype = 'disk'\nmaterial = 'shine'\ncenter = [0, 0.4, 0.8]\nradius = 0.6\nnormal = [0.3, -0.5, 0.4]\ntangent = [0.5, 0.3, 0]\n",
+        "[[shapes]]\ntype = 'cylinder'\nmaterial = 'shine'\nstart = [-0.6, 0.3, 0.5]\nend = [0.5, -0.1, 0.8]\nradius = 0.3\n",
         "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'shine'\nvertices = [[-0.5, 0, 0.3], [0.5, 0, 0.3], [0, 0.6, 0.3], [0, 0.2, 0.9]]\n",
         "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.1]\nsize = [1, 0.5]\nnormal = [0.1, -0.3, -1]\ntangent = [10, 0, 1]\ncolor = [5, 3, 1]\n",
         // several, of several powers, one behind the other
@@ -89,14 +94,14 @@ fn light_alone_and_materials_alone_find_the_same() {
         // Each with one of them, the last with all.
         for material in materials
             .iter()
-            .skip(if i < 5 { i } else { 0 })
-            .take(if i < 5 { 1 } else { 5 })
+            .skip(if i < 6 { i % 5 } else { 0 })
+            .take(if i < 6 { 1 } else { 5 })
         {
             let text = format!("materials.m = {{ {material} }}\n{camera}{shape}");
             let packed = scene(4096, 2, &text);
             assert_eq!(
                 packed.specialization.light_tree != 0,
-                i == 6,
+                i == 7,
                 "a tree is over many lamps"
             );
             // What is seen to shine is left out.

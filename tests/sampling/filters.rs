@@ -137,11 +137,12 @@ fn positions_and_weights_have_the_moments_of_their_filters() {
 #[test]
 fn the_pixel_as_a_filter_costs_nothing_and_a_table_of_it_is_the_same() {
     let plain = filtered_scene(PixelFilterKind::Box, 0.5);
-    assert_eq!((plain.specialization.filter_bins, plain.filter_table.len()), (0, 0));
-    let by_table = Packed {
-        filter_table: table(checked(PixelFilterKind::Box, 0.5)),
-        ..filtered_scene(PixelFilterKind::Box, 0.51)
-    };
+    assert_eq!(
+        (plain.specialization.filter_bins, plain.sampling.filter_table.len()),
+        (0, 0)
+    );
+    let mut by_table = filtered_scene(PixelFilterKind::Box, 0.51);
+    by_table.sampling.filter_table = table(checked(PixelFilterKind::Box, 0.5));
     assert_eq!(by_table.specialization.filter_bins, BINS);
     for i in 0..1000 {
         let u = sobol_sample(i, [5, 6].into());

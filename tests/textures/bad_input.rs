@@ -198,12 +198,12 @@ fn a_file_is_kept_once_however_it_is_named() {
         image("b", "inner/../a.png", "wrap = 'clamp'"),
         image("c", "./a.png", "filter = 'trilinear'\nencoding = 'srgb'"),
     ));
-    assert_eq!(three.texels, alone.texels);
-    let levels: Vec<u32> = three.textures.iter().map(|texture| texture.levels).collect();
-    assert_eq!((three.textures.len(), levels), (3, vec![1, 7, 7]));
+    assert_eq!(three.textures.texels, alone.textures.texels);
+    let levels: Vec<u32> = three.textures.records.iter().map(|texture| texture.levels).collect();
+    assert_eq!((three.textures.records.len(), levels), (3, vec![1, 7, 7]));
     // Another encoding has other levels.
     let two = packed(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
-    assert_eq!(two.texels.len(), 2 * alone.texels.len());
+    assert_eq!(two.textures.texels.len(), 2 * alone.textures.texels.len());
 }
 
 #[test]
@@ -238,7 +238,9 @@ fn gray_palettes_and_opacity_are_read_as_their_colours() {
     let texels = |name: &str| {
         let material = "[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }\n";
         let text = format!("[textures.t]\ntype = 'image'\nfile = '{name}.png'\n{material}");
-        wgray_render::pack::pack(&load(folder.path(), &text).unwrap()).texels
+        wgray_render::pack::pack(&load(folder.path(), &text).unwrap())
+            .textures
+            .texels
     };
     for name in ["gray", "gray_alpha", "rgba", "palette"] {
         assert_eq!(texels(name), texels("rgb"), "{name}");

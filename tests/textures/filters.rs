@@ -27,7 +27,7 @@ pub fn textured(folder: &Path, keys: &str) -> Packed {
 }
 
 fn color(scene: &Packed, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec3 {
-    texture_color(scene, &scene.textures[0], Footprint { uv, dx, dy })
+    texture_color(scene, &scene.textures.records[0], Footprint { uv, dx, dy })
 }
 
 /// Footprints of all sizes and shapes, and what grazing rays make.
@@ -110,7 +110,7 @@ fn weights_kept_for_the_next_texture_are_those_of_the_reference() {
     for (uv, dx, dy) in footprints() {
         let here = scenes.each_ref().map(|scene| color(scene, uv, dx, dy));
         for (scene, found) in scenes.iter().zip(here) {
-            let t = &scene.textures[0];
+            let t = &scene.textures.records[0];
             let expected = ewa_color(scene, t, texture_footprint(t, Footprint { uv, dx, dy }));
             assert_eq!(
                 bits(found),

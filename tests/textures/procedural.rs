@@ -282,7 +282,7 @@ fn textures_are_scaled_then_turned_then_moved() {
         let uv = Vec2::new(u as f32, v as f32);
         let found = texture_color(
             &scene,
-            &scene.textures[0],
+            &scene.textures.records[0],
             Footprint {
                 uv,
                 dx: Vec2::ZERO,

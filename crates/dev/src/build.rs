@@ -127,7 +127,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> Built {
                 ..Options::best(&device)
             };
             let gpu = times.of("compile", || {
-                let sliders = sliders(&shaders, packed.integrator, packed.adaptive);
+                let sliders = sliders(&shaders, packed.integrator, packed.sampling.adaptive);
                 let mut gpu = Gpu::with_sliders(&device, &packed, &shaders, options, sliders)?;
                 gpu.time_calls()?;
                 Ok::<_, RenderError>(gpu)

@@ -212,7 +212,7 @@ impl Canvas {
         let samples = if scale > self.finest {
             1
         } else {
-            self.scene.pixel_samples
+            self.scene.sampling.pixel_samples
         };
         self.steps.start(&self.gpu, region, samples);
         self.steps.stop_at(self.limits.samples);
@@ -309,13 +309,13 @@ impl Canvas {
         let size = [self.stage.width, self.stage.height];
         if view == View::Samples {
             let film = self.gpu.film()?;
-            let counts = match self.scene.adaptive {
+            let counts = match self.scene.sampling.adaptive {
                 true => film.sample_counts().collect(),
                 false => (0..self.stage.height)
                     .flat_map(|y| std::iter::repeat_n(self.steps.samples_of_row(y), self.stage.width as usize))
                     .collect(),
             };
-            return Ok((Content::Samples(counts, self.scene.pixel_samples), size));
+            return Ok((Content::Samples(counts, self.scene.sampling.pixel_samples), size));
         }
         let film;
         let under = self.under.as_ref();
@@ -371,7 +371,7 @@ impl Canvas {
         } else {
             0
         };
-        (so_far, self.scene.pixel_samples.min(self.limits.samples))
+        (so_far, self.scene.sampling.pixel_samples.min(self.limits.samples))
     }
 
     /// Returns the samples per second.

@@ -442,20 +442,12 @@ fn place_of(loaded: &Loaded, number: usize) -> (String, Option<String>) {
     }
 }
 
-/// Returns the type and the material of a shape.
+/// Returns the type of a shape, and its file or material.
 fn about(shape: &ShapeDescription) -> String {
-    let (kind, name) = match shape {
-        ShapeDescription::Rectangle(shape) => ("rectangle", &shape.material),
-        ShapeDescription::Disk(shape) => ("disk", &shape.material),
-        ShapeDescription::Ellipsoid(shape) => ("ellipsoid", &shape.material),
-        ShapeDescription::Sphere(shape) => ("sphere", &shape.material),
-        ShapeDescription::Triangle(shape) => ("triangle", &shape.material),
-        ShapeDescription::Tetrahedron(shape) => ("tetrahedron", &shape.material),
-        ShapeDescription::Plane(shape) => ("plane", &shape.material),
-        ShapeDescription::Mesh(shape) => ("mesh", &shape.file),
-        ShapeDescription::Gltf(shape) => ("gltf", &shape.file),
-    };
-    format!("{kind}, {name}")
+    let table = serde_json::to_value(shape).unwrap_or_default();
+    let text = |key: &str| table[key].as_str();
+    let name = text("file").or(text("material")).unwrap_or_default();
+    format!("{}, {name}", text("type").unwrap_or_default())
 }
 
 #[cfg(test)]

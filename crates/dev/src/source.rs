@@ -82,10 +82,10 @@ pub fn constants(packed: &Packed, view: View) -> Constants {
         .aov()
         .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
     let specialization = Specialization {
-        layers: (of_samples && integrator == Integrator::Path).into(),
+        layers: (of_samples && integrator.has_layers()).into(),
         ..packed.specialization
     };
-    (specialization, integrator, packed.adaptive)
+    (specialization, integrator, packed.sampling.adaptive)
 }
 
 /// Returns what a kernel shows when a view is selected: color, if the view needs another kernel.

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::problem::{At, Problem};
 use super::validate::{color, view};
-use super::{Description, EnvironmentDescription, EnvironmentName, Integrator};
+use super::{Description, EnvironmentDescription, EnvironmentName};
 use wgray_image::color::srgb_to_linear;
 
 /// The background that the camera sees in place of the environment.
@@ -46,9 +46,9 @@ impl Background {
             },
         };
         let seen = color(seen)?;
-        let is_path = description.integrator() == Integrator::Path;
+        let has_environment = description.integrator().needs_emitters();
         let render = &mut description.render;
-        if !is_path {
+        if !has_environment {
             render.background = seen;
             return Ok(());
         }
@@ -63,7 +63,11 @@ impl Background {
 }
 
 fn transparent(description: &mut Description) -> Result<(), Problem> {
-    if description.render.integrator == Some(Integrator::Phong) {
+    if description
+        .render
+        .integrator
+        .is_some_and(|integrator| !integrator.follows_paths())
+    {
         return Err(Problem::new("none needs integrator = \"path\""));
     }
     description.render.alpha = Some(true);

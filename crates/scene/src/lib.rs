@@ -4,7 +4,6 @@
 //! name resolved and every value in range. Nothing behind a `Scene` checks again.
 
 mod around;
-mod bounds;
 mod camera_at;
 mod camera_path;
 mod course;
@@ -14,6 +13,7 @@ mod description;
 mod error;
 mod expand;
 pub mod framing;
+mod geometry;
 pub mod gltf;
 mod gltf_shape;
 pub mod halves;
@@ -43,13 +43,13 @@ mod visibility;
 mod write;
 
 pub use around::Background;
-pub use bounds::Bounds;
 pub use camera_path::CameraPath;
 
 pub use define::Define;
 pub use description::*;
 pub use error::SceneError;
 pub use framing::{Framing, Orbit, View, framed};
+pub use geometry::{Bounds, Geometry, Parallelogram, Shape};
 pub use gltf::ModelContents;
 pub use image_file::Assets;
 pub use key_path::KeyPath;

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DMat3, DVec3};
 
 use crate::camera_path::CameraPath;
 use crate::description::{AlphaMode, Integrator, Pattern, PixelFilterKind, Shadows, VertexColors};
+use crate::geometry::{Parallelogram, Shape};
 use crate::gltf::Imported;
-use crate::mesh::Mesh;
 use crate::metals::MetalIndex;
 use crate::note::Note;
 use crate::texture::{Color, Image, NormalMap, Texture, Value};
@@ -466,64 +466,5 @@ pub enum Light {
         cone: f64,
         /// The angle up to which it is as bright as in the middle, 0 to `cone`.
         inner: f64,
-    },
-}
-
-/// The points `center + x u + y v` for x, y in -1..=1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Parallelogram {
-    /// The middle.
-    pub center: DVec3,
-    /// Half the first edge: half the width along the tangent.
-    pub u: DVec3,
-    /// Half the second edge: half the height along the bitangent, normal x tangent.
-    pub v: DVec3,
-}
-
-/// A shape with its material.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Shape {
-    /// Its form and place.
-    pub geometry: Geometry,
-    /// Index into [`Scene::materials`].
-    pub material: usize,
-}
-
-/// The form and place of a shape.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Geometry {
-    /// A rectangle; its normal is u x v.
-    Rectangle(Parallelogram),
-    /// A disk: of the points of a parallelogram those with x² + y² <= 1; its normal is u x v.
-    Disk(Parallelogram),
-    /// An ellipsoid (a sphere among them): the points `center + x a + y b + z c` with x² + y² + z² = 1.
-    Ellipsoid {
-        /// The middle.
-        center: DVec3,
-        /// The half axes, linearly independent.
-        axes: [DVec3; 3],
-    },
-    /// Triangles that share one shape number (a triangle, the faces of a tetrahedron), each with its vertices
-    /// counter-clockwise as seen from outside: normal (v1 - v0) x (v2 - v1).
-    Triangles(Vec<[DVec3; 3]>),
-    /// A mesh of triangles.
-    Mesh {
-        /// Its triangles.
-        mesh: Arc<Mesh>,
-        /// The map from the mesh file's coordinates to the scene's; invertible.
-        to_world: DAffine3,
-        /// For each group of the mesh an index into [`Scene::materials`].
-        materials: Vec<usize>,
-    },
-    /// An infinite plane.
-    Plane {
-        /// A point of it, the origin of its texture coordinates.
-        point: DVec3,
-        /// Unit tangent: the direction of u.
-        tangent: DVec3,
-        /// Unit normal x tangent: the direction of v.
-        bitangent: DVec3,
     },
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Bounds, Camera, Color, Geometry, Integrator, Light, Projection, Reflection, Scene, Shape};
+use super::{Bounds, Camera, Color, Geometry, Light, Projection, Reflection, Scene, Shape};
 
 impl Scene {
     /// Returns warnings if the scene certainly has no light, or no geometry in view of its camera. A scene without warnings may
@@ -20,7 +20,7 @@ impl Scene {
         if !self.shapes.is_empty() && !self.has_light() {
             warnings.push("the scene has no light, emission or environment; every surface renders black".to_owned());
         }
-        let is_dark = self.render.integrator == Integrator::Path && self.render.max_depth == 0;
+        let is_dark = self.render.integrator.follows_paths() && self.render.max_depth == 0;
         if is_dark && !self.shapes.is_empty() && self.has_light() && !self.has_emission() {
             warnings.push(
                 "render.max_depth is 0, so only emission is shown, and no surface has any; 1 adds direct light"
@@ -46,7 +46,7 @@ impl Scene {
         if self.lights.iter().any(|light| color(light) != DVec3::ZERO) || self.render.background != DVec3::ZERO {
             return true;
         }
-        if self.render.integrator == Integrator::Phong {
+        if !self.render.integrator.follows_paths() {
             let is_ambient = |reflection: &Reflection| match reflection {
                 Reflection::Phong { ambient, .. } => !is_black(ambient),
                 _ => false,

@@ -8,7 +8,6 @@ use crate::device_plan::DevicePlan;
 use crate::scene::{
     Camera, CameraPath, Geometry, Light, ModelContents, Projection, Reflection, Scene, Texels, TextureKind,
 };
-use glam::DVec3;
 use serde::Serialize;
 use wgray_image::Region;
 use wgray_render::job::{Cut, bands};
@@ -194,8 +193,8 @@ impl Info {
                 integrator: scene.render.integrator.name(),
                 pixel_pattern: scene.render.pixel_samples.pattern.name(),
                 pixel_samples: scene.render.pixel_samples.count,
-                max_samples: packed.pixel_samples,
-                old_max_samples: packed.pixel_samples,
+                max_samples: packed.sampling.pixel_samples,
+                old_max_samples: packed.sampling.pixel_samples,
                 light_samples: packed.light_samples(),
                 max_depth: scene.render.max_depth,
                 seed: scene.render.seed,
@@ -270,7 +269,7 @@ fn shapes(scene: &Scene, packed: &Packed) -> Shapes {
         }
     }
     Shapes {
-        kinds: Kinds::of(scene.shapes.iter().map(|shape| form(&shape.geometry))),
+        kinds: Kinds::of(scene.shapes.iter().map(|shape| shape.geometry.name())),
         meshes: known.len() as u64,
         mesh_triangles,
         instanced_triangles,
@@ -278,24 +277,6 @@ fn shapes(scene: &Scene, packed: &Packed) -> Shapes {
         triangles: instanced_triangles + others,
         primitives: packed.primitives.len() as u64,
     }
-}
-
-fn form(geometry: &Geometry) -> &'static str {
-    match geometry {
-        Geometry::Rectangle(_) => "rectangle",
-        Geometry::Disk(_) => "disk",
-        Geometry::Ellipsoid { axes, .. } if is_sphere(axes) => "sphere",
-        Geometry::Ellipsoid { .. } => "ellipsoid",
-        Geometry::Triangles(all) if all.len() == 1 => "triangle",
-        Geometry::Triangles(_) => "tetrahedron",
-        Geometry::Mesh { .. } => "mesh",
-        Geometry::Plane { .. } => "plane",
-    }
-}
-
-/// Returns true if the half axes describe an axis-aligned sphere.
-fn is_sphere(axes: &[DVec3; 3]) -> bool {
-    *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }
 
 fn reflection(reflection: &Reflection) -> &'static str {

@@ -1,9 +1,6 @@
 //! Names of the optional features of a kernel.
 
-use crate::scene::Integrator;
-use wgray_render::records::{
-    BACKGROUND, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Packed, Specialization,
-};
+use wgray_render::records::{BACKGROUND, LOBE_ANISOTROPY, LOBES, Packed, Specialization};
 
 /// Returns all kernel features, each with a flag that is true if the scene uses it.
 pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
@@ -33,14 +30,14 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
         alpha,
         ..
     } = packed.specialization;
-    let is_path = packed.integrator == Integrator::Path;
+    let is_path = packed.integrator.follows_paths();
     let mut all = vec![
         ("BVH", in_tree != 0),
         ("lens", lens != 0),
         ("panorama", panoramic != 0),
         ("camera-invisible materials", hidden != 0),
         ("pixel filter", filter_bins != 0),
-        ("adaptive sampling", packed.adaptive),
+        ("adaptive sampling", packed.sampling.adaptive),
         ("textures", lookups + specular_lookups != 0),
         ("ray differentials", differentials != 0),
         ("normal maps", normal_maps != 0),
@@ -51,14 +48,12 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
         all.push(("mirrors and glass", bounces != 0));
         return all;
     }
-    let lobe = |lobe: u32| lobes & lobe != 0;
+    all.push(("roughness", rough != 0));
+    all.extend(LOBES.iter().map(|lobe| {
+        let is_in_metal = lobe.bit == LOBE_ANISOTROPY && anisotropic != 0;
+        (lobe.name, lobes & lobe.bit != 0 || is_in_metal)
+    }));
     all.extend([
-        ("roughness", rough != 0),
-        ("anisotropy", anisotropic != 0 || lobe(LOBE_ANISOTROPY)),
-        ("specular lobe", lobe(LOBE_SPECULAR)),
-        ("transmission", lobe(LOBE_TRANSMISSION)),
-        ("clearcoat", lobe(LOBE_COAT)),
-        ("sheen", lobe(LOBE_SHEEN)),
         ("alpha", sees_through != 0),
         ("absorption", absorption != 0),
         ("emissive surfaces", shines != 0),

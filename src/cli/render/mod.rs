@@ -218,7 +218,7 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     let totals = totals?;
     let total = start.elapsed().as_secs_f64();
     let stats = stats(plan, renderer.info(), &totals, setup, total);
-    let (requested, all) = (totals.requested_samples, plan.scene.pixel_samples);
+    let (requested, all) = (totals.requested_samples, plan.scene.sampling.pixel_samples);
     let (images, files, done) = match totals.partial.is_empty() {
         true => (images, files, "render done"),
         false => (totals.partial.clone(), totals.partial.clone(), "render interrupted"),
@@ -279,7 +279,7 @@ fn stats(plan: &Plan, device: &DeviceInfo, totals: &RenderTotals, setup: f64, to
         backend: device.interface.clone(),
         width: region.width(),
         height: region.height(),
-        pixel_samples: scene.pixel_samples,
+        pixel_samples: scene.sampling.pixel_samples,
         min_samples: totals.min_samples,
         former_min_samples: totals.min_samples,
         partial: !totals.partial.is_empty(),

@@ -97,7 +97,7 @@ impl<'a> Plan<'a> {
             aovs: self.options.aovs.clone(),
             alpha: self.scene.has_alpha(),
             middle_depth,
-            max_samples: self.scene.pixel_samples,
+            max_samples: self.scene.sampling.pixel_samples,
             view: self.view,
         }
     }

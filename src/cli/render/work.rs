@@ -56,7 +56,7 @@ pub fn write(
 ) -> Result<RenderTotals, RenderError> {
     let middle_depth = renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?;
     let layout = plan.layout(middle_depth);
-    let mut totals = RenderTotals::new(plan.scene.pixel_samples);
+    let mut totals = RenderTotals::new(plan.scene.sampling.pixel_samples);
     let name = files.name().unwrap_or_default().to_owned();
     let metadata = plan.metadata.on(renderer.info(), plan.pictures.reproducible);
     let mut fill = |sink: &mut Sink| {
@@ -107,7 +107,7 @@ fn render(
     sink: &mut Sink,
 ) -> Result<(), RenderError> {
     let mut progress = Progress::new(plan.progress, plan.frame.label(), plan.frame.number);
-    let (scene, samples) = (&plan.scene, plan.scene.pixel_samples);
+    let (scene, samples) = (&plan.scene, plan.scene.sampling.pixel_samples);
     let (cut, most) = (Cut::of(scene.form()), renderer.largest_film());
     let order = match plan.deadline.is_some() || previews.is_some() {
         true => Order::Pixels,
@@ -208,7 +208,7 @@ fn save_pass(
     previews: &mut Previews,
     layout: &Layout,
 ) -> Result<Option<RenderTotals>, RenderError> {
-    let (samples, all) = (bands.passed_samples(), plan.scene.pixel_samples);
+    let (samples, all) = (bands.passed_samples(), plan.scene.sampling.pixel_samples);
     let metadata = (plan.metadata).partial(renderer.info(), plan.pictures.reproducible, (samples, all));
     let options = plan.pictures.save_options(metadata);
     let mut totals = RenderTotals {

@@ -50,6 +50,10 @@ pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
                     .into_iter()
                     .for_each(|axis| *axis *= scale);
             }
+            ShapeDescription::Cylinder(s) => {
+                [&mut s.start, &mut s.end].into_iter().for_each(point);
+                s.radius *= scale;
+            }
             ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(point),
             ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(point),
             ShapeDescription::Plane(s) => point(&mut s.point),

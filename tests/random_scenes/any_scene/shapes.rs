@@ -60,6 +60,17 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
                 c,
             })
         });
+    let cylinder = (material.clone(), point(), frame(), [length(), length()], any::<bool>()).prop_map(
+        |(material, start, [axis, tangent], [radius, height], turned)| {
+            ShapeDescription::Cylinder(CylinderDescription {
+                material,
+                start,
+                end: start + axis.normalize() * height,
+                radius,
+                tangent: turned.then_some(tangent),
+            })
+        },
+    );
     let triangle = (material.clone(), [point(), point(), point()])
         .prop_map(|(material, vertices)| ShapeDescription::Triangle(TriangleDescription { material, vertices }));
     let tetrahedron = (material.clone(), [point(), point(), point(), point()])
@@ -77,6 +88,7 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
         1 => disk,
         2 => sphere,
         2 => ellipsoid,
+        2 => cylinder,
         1 => triangle,
         1 => tetrahedron,
         1 => plane,

@@ -89,7 +89,10 @@ impl Painter {
             instances: loaded.scene.instances as u32,
             materials: loaded.scene.material_names.clone(),
         });
-        let bins = self.loaded.iter().flat_map(|loaded| &loaded.packed.filter_table);
+        let bins = self
+            .loaded
+            .iter()
+            .flat_map(|loaded| &loaded.packed.sampling.filter_table);
         let look = DisplaySettings {
             gain: self.gain,
             marks: self.marks,
@@ -191,7 +194,10 @@ impl Painter {
         self.state.scene_look = (settings.exposure, settings.transform);
         self.state.paused = self.paused;
         let most = NonZeroU32::new(self.limits.samples).filter(|most| most.get() != u32::MAX);
-        let of_scene = self.loaded.as_ref().map_or(0, |loaded| loaded.packed.pixel_samples);
+        let of_scene = self
+            .loaded
+            .as_ref()
+            .map_or(0, |loaded| loaded.packed.sampling.pixel_samples);
         self.state.samples = (most, of_scene);
         self.state.preview = Preview::try_from(self.limits.scale).unwrap_or_default();
         self.state.comparable = self.comparison.comparable();

@@ -49,7 +49,7 @@ impl Painter {
     /// Returns why the scene does not provide a view; `None` if it does.
     fn missing(&self, view: View) -> Option<&'static str> {
         let packed = &self.loaded.as_ref()?.packed;
-        view.aov()?.missing(packed.integrator, packed.adaptive)
+        view.aov()?.missing(packed.integrator, packed.sampling.adaptive)
     }
 
     /// Returns the views that the scene does not provide, and why.

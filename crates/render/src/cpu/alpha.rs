@@ -44,14 +44,14 @@ pub fn is_there(
 pub fn with_opacity_at(scene: &Packed, before: &Material, spot: &Spot, hit: Hit, uv: Vec2) -> Material {
     let mut material = *before;
     for i in 0..material.lookups.y {
-        let lookup = &scene.lookups[(material.lookups.x + i) as usize];
+        let lookup = &scene.textures.lookups[(material.lookups.x + i) as usize];
         if lookup.purposes & FOR_OPACITY != 0 {
             let footprint = Footprint {
                 uv: uv_in_set(scene, uv, spot, hit, lookup.uv_set),
                 dx: Vec2::ZERO,
                 dy: Vec2::ZERO,
             };
-            let color = texture_color(scene, &scene.textures[lookup.texture as usize], footprint);
+            let color = texture_color(scene, &scene.textures.records[lookup.texture as usize], footprint);
             material.opacity = channel_of(color, lookup, OPACITY_CHANNEL);
         }
     }

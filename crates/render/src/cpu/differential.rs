@@ -3,9 +3,10 @@
 use glam::Vec3;
 
 use super::math::dot;
+use super::primitive::{is_solid, solid_gradient, solid_gradient_derivative};
 use super::ray::{Ray, point_to_local, vector_to_local};
 use super::surface::Surface;
-use crate::records::{ELLIPSOID, Primitive};
+use crate::records::Primitive;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Derivative {
@@ -30,11 +31,13 @@ pub fn transferred(derivative: Derivative, ray: Ray, t: f32, normal: Vec3) -> De
 
 pub fn normal_derivative(q: &Primitive, local: Vec3, dp: Vec3) -> Vec3 {
     let dl = vector_to_local(q, dp);
-    let g = q.x * local.x + q.y * local.y + q.z * local.z;
-    let dg = q.x * dl.x + q.y * dl.y + q.z * dl.z;
+    let s = solid_gradient(q.kind, local);
+    let ds = solid_gradient_derivative(q.kind, local, dl);
+    let g = q.x * s.x + q.y * s.y + q.z * s.z;
+    let dg = q.x * ds.x + q.y * ds.y + q.z * ds.z;
     let scale = 1.0 / dot(g, g).sqrt();
     let n = g * scale;
-    if q.kind == ELLIPSOID {
+    if is_solid(q.kind) {
         (dg - n * dot(n, dg)) * scale
     } else {
         Vec3::ZERO

@@ -29,7 +29,7 @@ mod tests {
 
     use super::*;
     use crate::pack::primitive;
-    use crate::records::{DISK, FAR};
+    use crate::records::{DISK, INFINITE_T};
 
     /// Of radius 2 around (1, 1, 3), seen from above.
     fn from_above(x: f32, y: f32) -> f32 {
@@ -39,7 +39,7 @@ mod tests {
             origin: Vec3::new(x, y, 5.0),
             direction: Vec3::NEG_Z,
         };
-        intersect_disk(&disk, ray, FAR)
+        intersect_disk(&disk, ray, INFINITE_T)
     }
 
     #[test]
@@ -48,7 +48,7 @@ mod tests {
             assert_eq!(from_above(x, y), 2.0, "{x} {y}");
         }
         for (x, y) in [(3.01, 1.0), (1.0, -1.01), (2.42, 2.42), (-0.9, -0.9)] {
-            assert_eq!(from_above(x, y), FAR, "{x} {y}");
+            assert_eq!(from_above(x, y), INFINITE_T, "{x} {y}");
         }
     }
 

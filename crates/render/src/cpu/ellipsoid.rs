@@ -1,8 +1,10 @@
 //! Twin of `shaders/ellipsoid.wgsl`: the unit sphere of local space.
 
+use std::f32::consts::FRAC_1_PI;
+
 use glam::Vec3;
 
-use super::math::{cross, dot, max, min};
+use super::math::{atan2, cross, dot, max, min};
 use super::ray::{Ray, vector_to_local};
 use crate::records::Primitive;
 
@@ -19,6 +21,11 @@ pub fn ellipsoid_discriminant(o: Vec3, d: Vec3, start: f32) -> f32 {
     } else {
         a - dot(moment, moment)
     }
+}
+
+pub fn longitude(local: Vec3) -> f32 {
+    let turn = atan2(local.y, local.x) * (0.5 * FRAC_1_PI);
+    if turn < 0.0 { turn + 1.0 } else { turn }
 }
 
 pub fn intersect_ellipsoid(q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
@@ -61,7 +68,7 @@ mod tests {
     use crate::cpu::primitive::primitive_normal;
     use crate::cpu::ray::point_to_local;
     use crate::pack::primitive;
-    use crate::records::{ELLIPSOID, FAR};
+    use crate::records::{ELLIPSOID, INFINITE_T};
 
     fn ellipsoid(center: DVec3, axes: DMat3) -> Primitive {
         primitive(ELLIPSOID, center, axes, 0, 0)
@@ -82,7 +89,7 @@ mod tests {
     fn the_unit_sphere_is_hit_at_45_degrees() {
         let q = unit_sphere();
         let ray = ray([-3.0, 0.0, FRAC_1_SQRT_2], [1.0, 0.0, 0.0]);
-        let t = intersect_ellipsoid(&q, false, ray, FAR);
+        let t = intersect_ellipsoid(&q, false, ray, INFINITE_T);
         assert!((t - (3.0 - FRAC_1_SQRT_2)).abs() < 1e-6, "{t}");
         let normal = primitive_normal(&q, point_to_local(&q, ray.origin + ray.direction * t));
         assert!(
@@ -101,8 +108,8 @@ mod tests {
         for target in [[0.5, 0.4, 0.4], [0.6, 0.3, 0.55], [0.3, 0.5, 0.2], [0.65, 0.5, 0.6]] {
             let origin = Vec3::new(0.0, -3.0, 1.3);
             let ray = ray(origin.into(), (Vec3::from(target) - origin).into());
-            let t = intersect_ellipsoid(&q, false, ray, FAR);
-            assert!(t < FAR, "{target:?} is inside, and missed");
+            let t = intersect_ellipsoid(&q, false, ray, INFINITE_T);
+            assert!(t < INFINITE_T, "{target:?} is inside, and missed");
             let p = ray.origin + ray.direction * t;
             assert!(quadric(p.as_dvec3()).abs() < 1e-5, "{}", quadric(p.as_dvec3()));
             let step = 1e-4;
@@ -115,25 +122,42 @@ mod tests {
 
     #[test]
     fn from_inside_the_far_side_is_hit() {
-        let t = intersect_ellipsoid(&unit_sphere(), false, ray([0.25, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR);
+        let t = intersect_ellipsoid(
+            &unit_sphere(),
+            false,
+            ray([0.25, 0.0, 0.0], [1.0, 0.0, 0.0]),
+            INFINITE_T,
+        );
         assert_eq!(t, 0.75);
-        let t = intersect_ellipsoid(&unit_sphere(), false, ray([0.25, 0.0, 0.0], [-1.0, 0.0, 0.0]), FAR);
+        let t = intersect_ellipsoid(
+            &unit_sphere(),
+            false,
+            ray([0.25, 0.0, 0.0], [-1.0, 0.0, 0.0]),
+            INFINITE_T,
+        );
         assert_eq!(t, 1.25);
     }
 
     #[test]
     fn a_grazing_ray_decides_by_the_last_digits() {
-        let at = |z: f32| intersect_ellipsoid(&unit_sphere(), false, ray([-1000.0, 0.0, z], [1.0, 0.0, 0.0]), FAR);
+        let at = |z: f32| {
+            intersect_ellipsoid(
+                &unit_sphere(),
+                false,
+                ray([-1000.0, 0.0, z], [1.0, 0.0, 0.0]),
+                INFINITE_T,
+            )
+        };
         assert!((at(0.999_999) - 1000.0).abs() < 0.01, "{}", at(0.999_999));
-        assert_eq!(at(1.000_001), FAR);
+        assert_eq!(at(1.000_001), INFINITE_T);
     }
 
     #[test]
     fn what_is_behind_or_beyond_the_limit_is_no_hit() {
         let q = unit_sphere();
         assert_eq!(
-            intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR),
-            FAR
+            intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), INFINITE_T),
+            INFINITE_T
         );
         assert_eq!(
             intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 1.5),

@@ -8,7 +8,9 @@ use super::footprint::Footprint;
 use super::geometry::{material_of, spot_of};
 use super::light::spot_falloff;
 use super::light_choice::Chosen;
-use super::light_sample::{ellipsoid_area, ellipsoid_pdf, ellipsoid_sample, solid_angle_pdf, whole_below};
+use super::light_sample::{
+    cylinder_sample, cylinder_share, ellipsoid_area, ellipsoid_pdf, ellipsoid_sample, solid_angle_pdf, whole_below,
+};
 use super::math::{dot, normalize};
 use super::mesh::{Spot, face_uv, spot_by_itself};
 use super::primitive::primitive_uv;
@@ -18,8 +20,8 @@ use super::texture::texture_color;
 use super::vertices::{uv_in_set, vertex_color};
 use super::warp::{disk_sample, triangle_sample};
 use crate::records::{
-    COLORS_OF_EMISSION, DISK, ELLIPSOID, ENVIRONMENT, Emitter, FOR_EMISSION, Light, Material, NO_INDEX, POINT, Packed,
-    RECTANGLE, SPOT, TRIANGLE,
+    COLORS_OF_EMISSION, CYLINDER, DISK, ELLIPSOID, ENVIRONMENT, Emitter, FOR_EMISSION, Light, Material, NO_INDEX,
+    POINT, Packed, RECTANGLE, SPOT, TRIANGLE,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,15 +35,15 @@ pub struct LightSample {
 }
 
 pub fn chosen_emitter(scene: &Packed, bits: UVec2) -> Emitter {
-    if scene.emitters.len() == 1 {
-        return scene.emitters[0];
+    if scene.lighting.emitters.len() == 1 {
+        return scene.lighting.emitters[0];
     }
-    let first = whole_below(bits.x, scene.emitters.len() as u32);
-    let emitter = scene.emitters[first as usize];
+    let first = whole_below(bits.x, scene.lighting.emitters.len() as u32);
+    let emitter = scene.lighting.emitters[first as usize];
     if unit_float(bits.y) < emitter.threshold {
         emitter
     } else {
-        scene.emitters[emitter.other as usize]
+        scene.lighting.emitters[emitter.other as usize]
     }
 }
 
@@ -50,7 +52,7 @@ pub fn sample_emitter(scene: &Packed, chosen: Chosen, p: Vec3, normal: Vec3, u: 
     if emitter.instance != 0 {
         return sample_face(scene, chosen, p, u);
     }
-    let light = &scene.lights[emitter.index as usize];
+    let light = &scene.lighting.lights[emitter.index as usize];
     if light.kind == ENVIRONMENT {
         return sample_environment(scene, light, normal, u);
     }
@@ -83,6 +85,11 @@ pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSam
         let q = &scene.primitives[light.primitive as usize];
         to = ellipsoid_sample(q, p, u);
         pdf = light.density * ellipsoid_area(q) * ellipsoid_pdf(q, p, normalize(to));
+    } else if light.kind == CYLINDER {
+        let q = &scene.primitives[light.primitive as usize];
+        let point = cylinder_sample(q, p, u);
+        to = point.to;
+        pdf = solid_angle_pdf(light.density * cylinder_share(q, p), to, point.normal);
     } else if !is_delta {
         pdf = solid_angle_pdf(pdf, to, light.normal);
         behind = (light.sides == 1) & (dot(light.normal, to) >= 0.0);
@@ -161,9 +168,9 @@ pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSam
 pub fn emission_at(scene: &Packed, material: &Material, spot: &Spot, hit: Hit, uv: Vec2) -> Vec3 {
     let mut emission = material.emission;
     for i in 0..material.lookups.y {
-        let lookup = &scene.lookups[(material.lookups.x + i) as usize];
+        let lookup = &scene.textures.lookups[(material.lookups.x + i) as usize];
         if lookup.purposes & FOR_EMISSION != 0 {
-            let texture = &scene.textures[lookup.texture as usize];
+            let texture = &scene.textures.records[lookup.texture as usize];
             let footprint = Footprint {
                 uv: uv_in_set(scene, uv, spot, hit, lookup.uv_set),
                 dx: Vec2::ZERO,
@@ -180,5 +187,10 @@ pub fn emitter_pdf(spot: &Spot, hit: Hit, density: f32, ray: Ray, normal: Vec3) 
     if q.kind == ELLIPSOID {
         return density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
     }
+    let density = if q.kind == CYLINDER {
+        density * cylinder_share(q, ray.origin)
+    } else {
+        density
+    };
     solid_angle_pdf(density, ray.direction * hit.t, normal)
 }

@@ -15,7 +15,7 @@ pub fn energy_kept(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32
     let j = min(floor(column), last - 1.0);
     let table = if side > 0.0 { 0 } else { ENERGY_SIZE * ENERGY_SIZE };
     let start = energy + table + i as u32 * ENERGY_SIZE + j as u32;
-    let word = |i: u32| f32::from_bits(scene.texels[i as usize]);
+    let word = |i: u32| f32::from_bits(scene.textures.texels[i as usize]);
     let finer = Vec2::new(word(start), word(start + 1));
     let rougher = Vec2::new(word(start + ENERGY_SIZE), word(start + ENERGY_SIZE + 1));
     let both = finer + (rougher - finer) * (row - i);
@@ -23,7 +23,7 @@ pub fn energy_kept(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32
 }
 
 pub fn streak_energy(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, part: u32) -> f32 {
-    let word = |i: u32| scene.texels[i as usize];
+    let word = |i: u32| scene.textures.texels[i as usize];
     let start = material.streaks - 1;
     let rows = [word(start), word(start + 1)];
     let rough = min(max(material.roughness, 0.0), 1.0) * (rows[0] - 1) as f32;

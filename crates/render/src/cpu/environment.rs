@@ -25,14 +25,14 @@ pub struct Interval {
 pub fn environment_texel(scene: &Packed, row: u32, column: u32) -> Vec3 {
     let at = (scene.environment.texels + 3 * (row * scene.environment.width + column)) as usize;
     Vec3::new(
-        f32::from_bits(scene.texels[at]),
-        f32::from_bits(scene.texels[at + 1]),
-        f32::from_bits(scene.texels[at + 2]),
+        f32::from_bits(scene.textures.texels[at]),
+        f32::from_bits(scene.textures.texels[at + 1]),
+        f32::from_bits(scene.textures.texels[at + 2]),
     )
 }
 
 pub fn environment_float(scene: &Packed, at: u32) -> f32 {
-    f32::from_bits(scene.texels[at as usize])
+    f32::from_bits(scene.textures.texels[at as usize])
 }
 
 pub fn block_distributions(scene: &Packed, normal: Vec3) -> u32 {
@@ -42,7 +42,7 @@ pub fn block_distributions(scene: &Packed, normal: Vec3) -> u32 {
 }
 
 pub fn interval_at(scene: &Packed, distribution: u32, u: f32, digits: f32) -> Interval {
-    let bounds = &scene.texels[distribution as usize..][..ENVIRONMENT_BLOCKS as usize + 1];
+    let bounds = &scene.textures.texels[distribution as usize..][..ENVIRONMENT_BLOCKS as usize + 1];
     let bound = |at: u32| f32::from_bits(bounds[at as usize]);
     let mut at = 0;
     at += if u >= bound(at + 16) { 16 } else { 0 };
@@ -120,10 +120,10 @@ pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) 
     let first = (row.index << down) * width + size.y * (column.index << along) + cell.y * size.x + cell.x;
     let at = (around.cells + 2 * first) as usize;
     let own = ((row.index << down) + cell.y) * 65_536 + (column.index << along) + cell.x;
-    let chosen = if more.z < scene.texels[at] {
+    let chosen = if more.z < scene.textures.texels[at] {
         own
     } else {
-        scene.texels[at + 1]
+        scene.textures.texels[at + 1]
     };
     let inside = Vec2::new(x - cell.x as f32, y - cell.y as f32);
     let d = direction_in_cell(chosen & 65_535, chosen >> 16, inside, width, height);

@@ -104,8 +104,8 @@ impl Kernel {
 
     fn color(&self, scene: &Packed, t: &Texture) -> Vec3 {
         let level = |i: u32| {
-            let start = scene.texels[(t.texels + self.finer + i) as usize] as usize;
-            self.levels[i as usize].mean(&scene.texels[start..], t.format)
+            let start = scene.textures.texels[(t.texels + self.finer + i) as usize] as usize;
+            self.levels[i as usize].mean(&scene.textures.texels[start..], t.format)
         };
         let color = level(0);
         match self.between > 0.0 {

@@ -54,13 +54,13 @@ pub fn is_on_mesh(hit: Hit) -> bool {
 
 /// The instance that a hit on a mesh is of.
 pub fn instance_of(scene: &Packed, hit: Hit) -> &Instance {
-    &scene.instances[hit.instance as usize - 1]
+    &scene.bvh.instances[hit.instance as usize - 1]
 }
 
 pub fn group_word(scene: &Packed, i: &Instance, slot: u32) -> u32 {
-    let groups = &scene.meshes[i.mesh as usize].groups;
+    let groups = &scene.bvh.meshes[i.mesh as usize].groups;
     let group = groups.get(slot as usize).copied().unwrap_or(0);
-    scene.group_words[(i.materials + group) as usize]
+    scene.bvh.group_words[(i.materials + group) as usize]
 }
 
 pub fn triangle_casts(scene: &Packed, i: &Instance, slot: u32) -> bool {
@@ -68,7 +68,7 @@ pub fn triangle_casts(scene: &Packed, i: &Instance, slot: u32) -> bool {
 }
 
 fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
-    let mesh = &scene.meshes[i.mesh as usize];
+    let mesh = &scene.bvh.meshes[i.mesh as usize];
     let UVec4 { x, y, z, .. } = mesh.triangles[hit.slot as usize];
     let corners = [x, y, z].map(|vertex| vertex as usize);
     let [p0, p1, p2] = corners.map(|vertex| mesh.vertices[vertex]);

@@ -21,12 +21,12 @@ pub fn chosen_light(scene: &Packed, emitter: Emitter, p: Vec3, n: Vec3, key: UVe
     }
     let mut probability = 1.0;
     let mut at = 0;
-    let mut node = &scene.light_nodes[0];
+    let mut node = &scene.lighting.nodes[0];
     let mut child = 0;
     let mut level = 0;
     let mut bits = UVec2::ZERO;
     while at != NO_INDEX {
-        node = &scene.light_nodes[at as usize];
+        node = &scene.lighting.nodes[at as usize];
         let shares = light_shares(light_importances(node, p, n));
         if level & 1 == 0 {
             let level_key = hash4(UVec4::new(key.x, key.y, level, 1));
@@ -51,7 +51,7 @@ pub fn met_density(scene: &Packed, hit: Hit, wanted: bool, p: Vec3, n: Vec3) -> 
     if at == NO_INDEX {
         return 0.0;
     }
-    let nodes = &scene.light_nodes;
+    let nodes = &scene.lighting.nodes;
     let mut density = nodes[at as usize / 4].density[at as usize % 4];
     while at != NO_INDEX {
         let node = &nodes[at as usize / 4];
@@ -64,11 +64,11 @@ pub fn met_density(scene: &Packed, hit: Hit, wanted: bool, p: Vec3, n: Vec3) -> 
 pub fn light_leaf(scene: &Packed, hit: Hit) -> u32 {
     let mut place = hit.primitive;
     if hit.instance != 0 {
-        let leaves = scene.instances[hit.instance as usize - 1].leaves;
+        let leaves = scene.bvh.instances[hit.instance as usize - 1].leaves;
         if leaves == NO_INDEX {
             return NO_INDEX;
         }
         place = leaves + hit.slot;
     }
-    scene.light_leaves[place as usize]
+    scene.lighting.leaves[place as usize]
 }

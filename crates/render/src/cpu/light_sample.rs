@@ -1,9 +1,12 @@
 //! Twin of `shaders/light_sample.wgsl`: points of what shines, and how densely they lie.
 
+use std::f32::consts::FRAC_1_PI;
+
 use glam::{Vec2, Vec3};
 
+use super::cylinder::cylinder_levels;
 use super::ellipsoid::{ellipsoid_discriminant, ellipsoid_level};
-use super::math::{dot, max, normalize};
+use super::math::{atan2, dot, max, min, normalize, sine};
 use super::ray::{vector_to_local, vector_to_world};
 use super::warp::{cap_sample, disk_sample, vector_around};
 use crate::records::Primitive;
@@ -49,6 +52,79 @@ pub fn ellipsoid_pdf(q: &Primitive, p: Vec3, wi: Vec3) -> f32 {
     let l = vector_to_local(q, wi);
     let l2 = dot(l, l);
     0.159_154_94 / cap * q.determinant.abs() / (l2 * l2.sqrt())
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CylinderPart {
+    pub arc: f32,
+    pub middle: Vec2,
+    pub side: f32,
+    pub end: f32,
+    pub start: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CylinderPoint {
+    pub to: Vec3,
+    pub normal: Vec3,
+}
+
+pub fn cylinder_part(q: &Primitive, o: Vec3, levels: Vec2) -> CylinderPart {
+    let inside = (levels.x <= 0.0) & (levels.y <= 0.0);
+    let r2 = o.x * o.x + o.y * o.y;
+    let away = Vec2::new(o.x, o.y) / r2.sqrt();
+    let arc = if inside {
+        1.0
+    } else if levels.x > 0.0 {
+        max(atan2(max(levels.x, 0.0).sqrt(), 1.0) * FRAC_1_PI, 1e-6)
+    } else {
+        0.0
+    };
+    let beyond = levels.y > 0.0;
+    let end = inside | (beyond & (o.z > 0.0));
+    let start = inside | (beyond & !(o.z > 0.0));
+    CylinderPart {
+        arc,
+        middle: if r2 > 0.0 { away } else { Vec2::X },
+        side: 4.0 * arc * cylinder_height_ratio(q),
+        end: f32::from(u8::from(end)),
+        start: f32::from(u8::from(start)),
+    }
+}
+
+pub fn cylinder_height_ratio(q: &Primitive) -> f32 {
+    (dot(q.x, q.x) / dot(q.z, q.z)).sqrt()
+}
+
+pub fn cylinder_sample(q: &Primitive, p: Vec3, u: Vec2) -> CylinderPoint {
+    let from_anchor = vector_to_local(q, p - q.anchor);
+    let o = from_anchor - q.middle;
+    let part = cylinder_part(q, o, cylinder_levels(q, from_anchor));
+    let caps = part.end + part.start;
+    let at = u.x * (part.side + caps);
+    let (local, gradient) = if (at < part.side) | (caps == 0.0) {
+        let angle = (2.0 * min(at / part.side, 1.0) - 1.0) * part.arc;
+        let (sn, cs) = (sine(angle), sine(angle + 0.5));
+        let m = part.middle;
+        let (x, y) = (m.x * cs - m.y * sn, m.y * cs + m.x * sn);
+        (Vec3::new(x, y, 2.0 * u.y - 1.0), Vec3::new(x, y, 0.0))
+    } else {
+        let rest = at - part.side;
+        let at_end = rest < part.end;
+        let disk = disk_sample(Vec2::new(min(rest - if at_end { 0.0 } else { part.end }, 1.0), u.y));
+        let up = if at_end { 1.0 } else { -1.0 };
+        (Vec3::new(disk.x, disk.y, up), Vec3::new(0.0, 0.0, up))
+    };
+    CylinderPoint {
+        to: vector_to_world(q, local - o),
+        normal: normalize(q.x * gradient.x + q.y * gradient.y + q.z * gradient.z),
+    }
+}
+
+pub fn cylinder_share(q: &Primitive, p: Vec3) -> f32 {
+    let from_anchor = vector_to_local(q, p - q.anchor);
+    let part = cylinder_part(q, from_anchor - q.middle, cylinder_levels(q, from_anchor));
+    (4.0 * cylinder_height_ratio(q) + 2.0) / (part.side + part.end + part.start)
 }
 
 pub fn power_heuristic(own: f32, other: f32) -> f32 {

@@ -9,7 +9,7 @@ use super::primitive::Tangents;
 use super::ray::{Hit, Ray, point_to_local, vector_to_local};
 use super::slab::{Slabs, box_passage, is_passed};
 use super::surface::{Surface, largest, with_positive_zeros};
-use crate::records::{FAR, FirstHit, Instance, PAD, Primitive, TRIANGLE};
+use crate::records::{FirstHit, INFINITE_T, Instance, PAD, Primitive, TRIANGLE};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shear {
@@ -64,7 +64,7 @@ pub fn triangle_crossing(v0: Vec3, v1: Vec3, v2: Vec3, origin: Vec3, shear: Shea
     let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
     let t = (u * a.z + v * b.z + w * c.z) / sum;
     let passage = box_passage(lowest(v0, v1, v2), highest(v0, v1, v2), s);
-    let met = inside & (sum.abs() > 0.0) & is_passed(passage, FAR);
+    let met = inside & (sum.abs() > 0.0) & is_passed(passage, INFINITE_T);
     Crossing {
         met,
         t: min(passage.y, max(passage.x, t)),

@@ -7,6 +7,7 @@
 pub mod adaptive;
 pub mod alpha;
 pub mod camera;
+pub mod cylinder;
 pub mod dielectric;
 pub mod differential;
 pub mod diffuse;

@@ -3,7 +3,7 @@
 use glam::{UVec2, UVec3, Vec3, Vec4};
 
 use super::slab::{Fan, Slabs};
-use crate::records::{FAR, Node};
+use crate::records::{INFINITE_T, Node};
 
 pub fn steps(word: u32) -> Vec4 {
     Vec4::from(word.to_le_bytes().map(f32::from))
@@ -107,7 +107,7 @@ pub fn four_in_fan(node: &Node, low: UVec3, high: UVec3, f: Fan, limit: f32) -> 
 
 pub fn far_side(low: Vec4, high: Vec4, far_low: f32, far_high: f32) -> Vec4 {
     if far_low == 0.0 && far_high == 0.0 {
-        return Vec4::splat(FAR);
+        return Vec4::splat(INFINITE_T);
     }
     low * far_low + high * far_high
 }

@@ -90,7 +90,7 @@ pub fn differential_at(scene: &Packed, place: Vec2) -> Differential {
 }
 
 pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {
-    let (bins, table) = (scene.specialization.filter_bins, &scene.filter_table);
+    let (bins, table) = (scene.specialization.filter_bins, &scene.sampling.filter_table);
     if bins == 0 {
         return u.extend(1.0);
     }

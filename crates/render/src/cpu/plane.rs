@@ -20,7 +20,7 @@ mod tests {
 
     use super::*;
     use crate::pack::primitive;
-    use crate::records::{FAR, PLANE};
+    use crate::records::{INFINITE_T, PLANE};
 
     /// z = 1.
     fn hit(origin: [f32; 3], direction: [f32; 3]) -> f32 {
@@ -29,7 +29,7 @@ mod tests {
             origin: origin.into(),
             direction: Vec3::from(direction).normalize(),
         };
-        intersect_plane(&plane, ray, FAR)
+        intersect_plane(&plane, ray, INFINITE_T)
     }
 
     #[test]
@@ -41,9 +41,9 @@ mod tests {
 
     #[test]
     fn it_is_not_hit_along_it_nor_behind() {
-        assert_eq!(hit([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]), FAR);
-        assert_eq!(hit([0.0, 0.0, 3.0], [1.0, 0.0, 0.0]), FAR);
-        assert_eq!(hit([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]), FAR);
+        assert_eq!(hit([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]), INFINITE_T);
+        assert_eq!(hit([0.0, 0.0, 3.0], [1.0, 0.0, 0.0]), INFINITE_T);
+        assert_eq!(hit([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]), INFINITE_T);
     }
 
     #[test]

@@ -4,14 +4,18 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
+use super::cylinder::{
+    cylinder_bitangent, cylinder_blocks, cylinder_gradient, cylinder_gradient_derivative, cylinder_height,
+    cylinder_levels, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder, levels_on_surface,
+};
 use super::disk::{disk_blocks, intersect_disk};
-use super::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
+use super::ellipsoid::{ellipsoid_blocks, ellipsoid_level, intersect_ellipsoid, longitude};
 use super::math::{atan2, max, normalize};
 use super::plane::{intersect_plane, plane_blocks};
 use super::ray::Ray;
 use super::rectangle::{intersect_rectangle, rectangle_blocks};
 use super::triangle::{intersect_triangle, triangle_blocks};
-use crate::records::{DISK, ELLIPSOID, Primitive, RECTANGLE, TRIANGLE};
+use crate::records::{CYLINDER, DISK, ELLIPSOID, Primitive, RECTANGLE, SOLID_KINDS, TRIANGLE};
 
 #[inline(always)] // compiled for each kind
 pub fn intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
@@ -27,11 +31,14 @@ pub fn intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> 
     if kind == DISK {
         return intersect_disk(q, ray, limit);
     }
+    if kind == CYLINDER {
+        return intersect_cylinder(q, wall, ray, limit);
+    }
     intersect_plane(q, ray, limit)
 }
 
 #[inline(always)] // compiled for each kind
-pub fn blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
+pub fn blocks(kind: u32, o: Vec3, d: Vec3, levels: Vec2, reach: f32) -> bool {
     if kind == RECTANGLE {
         return rectangle_blocks(o, d, reach);
     }
@@ -39,25 +46,71 @@ pub fn blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
         return triangle_blocks(o, d, reach);
     }
     if kind == ELLIPSOID {
-        return ellipsoid_blocks(o, d, start, reach);
+        return ellipsoid_blocks(o, d, levels.x, reach);
     }
     if kind == DISK {
         return disk_blocks(o, d, reach);
     }
+    if kind == CYLINDER {
+        return cylinder_blocks(o, d, levels, reach);
+    }
     plane_blocks(o, d, reach)
 }
 
-pub fn is_round(kind: u32) -> bool {
-    kind == ELLIPSOID
+pub fn is_solid(kind: u32) -> bool {
+    ((SOLID_KINDS >> kind) & 1) == 1
 }
 
 pub fn is_centered(kind: u32) -> bool {
     (kind == RECTANGLE) | (kind == DISK)
 }
 
+#[inline(always)] // compiled for each kind
+pub fn solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, wall: bool) -> Vec2 {
+    if kind == CYLINDER {
+        let levels = cylinder_levels(q, from_anchor);
+        return if wall {
+            levels_on_surface(levels, -1e-30)
+        } else {
+            levels
+        };
+    }
+    Vec2::new(if wall { -1e-30 } else { ellipsoid_level(q, from_anchor) }, 0.0)
+}
+
 pub fn primitive_gradient(q: &Primitive, local: Vec3) -> Vec3 {
-    let round = q.x * local.x + q.y * local.y + q.z * local.z;
-    if is_round(q.kind) { round } else { q.z }
+    if !is_solid(q.kind) {
+        return q.z;
+    }
+    let solid = solid_gradient(q.kind, local);
+    q.x * solid.x + q.y * solid.y + q.z * solid.z
+}
+
+pub fn solid_gradient(kind: u32, local: Vec3) -> Vec3 {
+    if kind == CYLINDER {
+        cylinder_gradient(local)
+    } else {
+        local
+    }
+}
+
+pub fn solid_gradient_derivative(kind: u32, local: Vec3, d: Vec3) -> Vec3 {
+    if kind == CYLINDER {
+        cylinder_gradient_derivative(local, d)
+    } else {
+        d
+    }
+}
+
+pub fn primitive_height(q: &Primitive, from_anchor: Vec3) -> f32 {
+    if !is_solid(q.kind) {
+        return from_anchor.z;
+    }
+    if q.kind == CYLINDER {
+        cylinder_height(q, from_anchor)
+    } else {
+        0.5 * ellipsoid_level(q, from_anchor)
+    }
 }
 
 pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
@@ -69,9 +122,11 @@ pub fn primitive_uv(q: &Primitive, local: Vec3) -> Vec2 {
         return Vec2::new(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
     }
     if q.kind == ELLIPSOID {
-        let longitude = atan2(local.y, local.x) * (0.5 * FRAC_1_PI);
         let latitude = atan2((local.x * local.x + local.y * local.y).sqrt(), -local.z) * FRAC_1_PI;
-        return Vec2::new(if longitude < 0.0 { longitude + 1.0 } else { longitude }, latitude);
+        return Vec2::new(longitude(local), latitude);
+    }
+    if q.kind == CYLINDER {
+        return cylinder_uv(local);
     }
     Vec2::new(local.x, local.y)
 }
@@ -86,6 +141,9 @@ pub fn uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2 {
         let r = r2.sqrt();
         let dv = r * d.z - local.z * ((local.x * d.x + local.y * d.y) / r);
         return Vec2::new(du * (0.5 * FRAC_1_PI), dv * FRAC_1_PI);
+    }
+    if q.kind == CYLINDER {
+        return cylinder_uv_derivative(local, d);
     }
     Vec2::new(d.x, d.y)
 }
@@ -102,6 +160,12 @@ pub fn local_tangents(q: &Primitive, local: Vec3) -> Tangents {
         let u = Vec3::new(-local.y, local.x, 0.0) * TAU;
         let v = Vec3::new(-local.z * local.x / r, -local.z * local.y / r, r) * PI;
         return Tangents { u, v };
+    }
+    if q.kind == CYLINDER {
+        return Tangents {
+            u: cylinder_tangent(local),
+            v: cylinder_bitangent(local),
+        };
     }
     let scale = if is_centered(q.kind) { 2.0 } else { 1.0 };
     Tangents {

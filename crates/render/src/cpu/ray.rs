@@ -3,7 +3,7 @@
 use glam::{UVec2, Vec2, Vec3};
 
 use super::math::{cross, dot};
-use crate::records::{FAR, NO_INDEX, Primitive};
+use crate::records::{INFINITE_T, NO_INDEX, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
@@ -22,7 +22,7 @@ pub struct Hit {
 
 pub fn no_hit() -> Hit {
     Hit {
-        t: FAR,
+        t: INFINITE_T,
         instance: 0,
         primitive: NO_INDEX,
         slot: 0,
@@ -72,6 +72,6 @@ pub fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
 
 pub fn nearer_hit(a: Hit, b: Hit) -> Hit {
     let lower = (b.instance < a.instance) | ((b.instance == a.instance) & (b.primitive < a.primitive));
-    let nearer = (b.t < FAR) & ((b.t < a.t) | ((b.t == a.t) & lower));
+    let nearer = (b.t < INFINITE_T) & ((b.t < a.t) | ((b.t == a.t) & lower));
     if nearer { b } else { a }
 }

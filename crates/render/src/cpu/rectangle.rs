@@ -24,7 +24,7 @@ mod tests {
 
     use super::*;
     use crate::pack::primitive;
-    use crate::records::{FAR, RECTANGLE};
+    use crate::records::{INFINITE_T, RECTANGLE};
 
     /// Half edges (2, 0, 0) and (0, 0, 1), in the plane y = 1.
     fn rectangle() -> Primitive {
@@ -37,25 +37,33 @@ mod tests {
             origin: origin.into(),
             direction: Vec3::from(direction).normalize(),
         };
-        intersect_rectangle(&rectangle(), ray, FAR)
+        intersect_rectangle(&rectangle(), ray, INFINITE_T)
     }
 
     #[test]
     fn hits_are_inside_the_edges() {
         assert_eq!(hit([1.9, -2.0, 0.9], [0.0, 1.0, 0.0]), 3.0);
-        assert_eq!(hit([2.1, -2.0, 0.9], [0.0, 1.0, 0.0]), FAR, "beside the first edge");
-        assert_eq!(hit([1.9, -2.0, 1.1], [0.0, 1.0, 0.0]), FAR, "beside the second edge");
+        assert_eq!(
+            hit([2.1, -2.0, 0.9], [0.0, 1.0, 0.0]),
+            INFINITE_T,
+            "beside the first edge"
+        );
+        assert_eq!(
+            hit([1.9, -2.0, 1.1], [0.0, 1.0, 0.0]),
+            INFINITE_T,
+            "beside the second edge"
+        );
         assert_eq!(hit([1.9, 4.0, 0.9], [0.0, -1.0, 0.0]), 3.0, "from the other side");
-        assert_eq!(hit([1.9, 4.0, 0.9], [0.0, 1.0, 0.0]), FAR, "behind");
+        assert_eq!(hit([1.9, 4.0, 0.9], [0.0, 1.0, 0.0]), INFINITE_T, "behind");
         let slanted = hit([-1.0, 0.0, 0.0], [1.0, 1.0, 0.0]);
         assert!((slanted - 2.0f32.sqrt()).abs() < 1e-6, "{slanted}");
     }
 
     #[test]
     fn a_ray_in_its_plane_hits_nothing() {
-        assert_eq!(hit([-5.0, 1.0, 0.0], [1.0, 0.0, 0.0]), FAR);
-        assert_eq!(hit([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), FAR, "from within");
-        assert_eq!(hit([-5.0, 1.5, 0.0], [1.0, 0.0, 0.0]), FAR, "beside the plane");
+        assert_eq!(hit([-5.0, 1.0, 0.0], [1.0, 0.0, 0.0]), INFINITE_T);
+        assert_eq!(hit([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), INFINITE_T, "from within");
+        assert_eq!(hit([-5.0, 1.5, 0.0], [1.0, 0.0, 0.0]), INFINITE_T, "beside the plane");
     }
 
     #[test]
@@ -64,7 +72,7 @@ mod tests {
         assert!((f64::from(found) - 1_000_001f64.sqrt()).abs() < 0.01, "{found}");
         assert_eq!(
             hit([-1000.0, 0.0, 0.0], [1000.0, 0.99, 0.0]),
-            FAR,
+            INFINITE_T,
             "10 units behind the far edge"
         );
     }

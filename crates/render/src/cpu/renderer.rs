@@ -126,7 +126,7 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
         layers,
     } = film;
     let region = *region;
-    let first_looks = scene.adaptive && samples.start < scene.specialization.first_look;
+    let first_looks = scene.sampling.adaptive && samples.start < scene.specialization.first_look;
     let (looks_to_read, looks_to_write) = match first_looks {
         true => (&[][..], &mut looks[..]),
         false => (&looks[..], &mut [][..]),
@@ -156,7 +156,7 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
     parts.into_par_iter().for_each(|mut run| {
         for x in 0..run.sums.len() {
             let pixel = UVec2::new(run.first.x + x as u32, run.first.y);
-            if !scene.adaptive {
+            if !scene.sampling.adaptive {
                 for sample in samples.clone() {
                     let (value, layers) = pixel_radiance(scene, pixel, sample);
                     run.sums[x] += value;

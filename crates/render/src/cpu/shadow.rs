@@ -2,10 +2,9 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
-use super::ellipsoid::ellipsoid_level;
 use super::light::{Segments, segments_to_light, segments_to_local};
 use super::math::dot;
-use super::primitive::blocks;
+use super::primitive::{blocks, solid_levels};
 use super::ray::vector_to_local;
 use super::samples::{LEVEL, Samples};
 use super::sampling::sample_square;
@@ -25,11 +24,11 @@ pub struct Block {
 pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
-    let start = if wall { -1e-30 } else { ellipsoid_level(q, from_anchor) };
+    let levels = solid_levels(kind, q, from_anchor, wall);
     let to = Samples::of(block).segments(*LEVEL, segments_to_local(q, segments_to_light(light, p)));
     let mut bits = 0;
     for i in 0..to.count {
-        bits |= if blocks(kind, o, to.get(i), start, light.reach) {
+        bits |= if blocks(kind, o, to.get(i), levels, light.reach) {
             1 << i
         } else {
             0
@@ -41,8 +40,8 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light,
 #[inline(always)] // compiled for each kind
 pub fn cuts(kind: u32, q: &Primitive, p: Vec3, wall: bool, to: Vec3, reach: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
-    let start = if wall { -1e-30 } else { ellipsoid_level(q, from_anchor) };
-    blocks(kind, from_anchor - q.middle, vector_to_local(q, to), start, reach)
+    let levels = solid_levels(kind, q, from_anchor, wall);
+    blocks(kind, from_anchor - q.middle, vector_to_local(q, to), levels, reach)
 }
 
 pub fn block_sample(block: Block, i: u32) -> Vec2 {

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::math::{max, min};
-use crate::records::FAR;
+use crate::records::INFINITE_T;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slabs {
@@ -78,6 +78,6 @@ pub fn fan_passage(low: Vec3, high: Vec3, f: Fan) -> Vec2 {
         max(by_low.z, by_high.z),
     );
     let none = f.far_low.cmpeq(Vec3::ZERO) & f.far_high.cmpeq(Vec3::ZERO);
-    let far = Vec3::select(none, Vec3::splat(FAR), a * f.far_low + b * f.far_high);
+    let far = Vec3::select(none, Vec3::splat(INFINITE_T), a * f.far_low + b * f.far_high);
     Vec2::new(near, min(min(far.x, far.y), far.z))
 }

@@ -2,9 +2,10 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
-use super::ellipsoid::ellipsoid_level;
 use super::math::{dot, max, positive_zero};
-use super::primitive::{is_round, local_tangents, primitive_gradient, primitive_normal, primitive_uv};
+use super::primitive::{
+    is_solid, local_tangents, primitive_gradient, primitive_height, primitive_normal, primitive_uv,
+};
 use super::ray::{Ray, point_to_local, vector_to_local, vector_to_world};
 use crate::records::{FirstHit, NO_INDEX, Primitive};
 
@@ -36,12 +37,8 @@ pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surf
     let gradient = primitive_gradient(q, from_anchor - q.middle);
     let inverse_slope = 1.0 / dot(gradient, gradient).sqrt();
     let outward = gradient * inverse_slope;
-    let round = is_round(q.kind);
-    let height = if round {
-        0.5 * ellipsoid_level(q, from_anchor)
-    } else {
-        from_anchor.z
-    };
+    let solid = is_solid(q.kind);
+    let height = primitive_height(q, from_anchor);
     let position = met - outward * (height * inverse_slope);
     let inside = dot(outward, ray.direction) > 0.0;
     let side = if inside { -1.0 } else { 1.0 };
@@ -56,8 +53,8 @@ pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surf
         start: position + normal * (epsilon * size),
         side,
         bulge: Vec3::ZERO,
-        above: UVec2::new(0, if round & inside { NO_INDEX } else { i }),
-        below: UVec2::new(0, if round & !inside { NO_INDEX } else { i }),
+        above: UVec2::new(0, if solid & inside { NO_INDEX } else { i }),
+        below: UVec2::new(0, if solid & !inside { NO_INDEX } else { i }),
         uv: Vec2::ZERO,
         du: Vec3::ZERO,
         dv: Vec3::ZERO,

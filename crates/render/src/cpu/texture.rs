@@ -47,7 +47,7 @@ pub struct Level {
 
 pub fn level_of(scene: &Packed, t: &Texture, i: u32) -> Level {
     Level {
-        start: scene.texels[(t.texels + i) as usize],
+        start: scene.textures.texels[(t.texels + i) as usize],
         width: level_size(t.width, i),
         height: level_size(t.height, i),
     }
@@ -57,9 +57,9 @@ pub fn load_texel(scene: &Packed, t: &Texture, level: Level, x: i32, y: i32) -> 
     let i = wrapped_index(y, level.height, wrap_v(t)) * level.width + wrapped_index(x, level.width, wrap_u(t));
     if t.format == FLOAT {
         let at = (level.start + 3 * i) as usize;
-        return Vec3::from_slice(bytemuck::cast_slice(&scene.texels[at..at + 3]));
+        return Vec3::from_slice(bytemuck::cast_slice(&scene.textures.texels[at..at + 3]));
     }
-    unpacked_color(scene.texels[(level.start + i) as usize], t.format)
+    unpacked_color(scene.textures.texels[(level.start + i) as usize], t.format)
 }
 
 pub fn nearest_color(scene: &Packed, t: &Texture, uv: Vec2) -> Vec3 {
@@ -238,8 +238,8 @@ pub fn appearance(
     let footprint = footprint_of(spot, hit, surface, at);
     for i in 0..lookups {
         if i < material.lookups.y {
-            let lookup = &scene.lookups[(material.lookups.x + i) as usize];
-            let t = &scene.textures[lookup.texture as usize];
+            let lookup = &scene.textures.lookups[(material.lookups.x + i) as usize];
+            let t = &scene.textures.records[lookup.texture as usize];
             let place = footprint_in_set(scene, footprint, spot, hit, at, lookup.uv_set);
             let color = texture_color(scene, t, place);
             let purposes = lookup.purposes;

@@ -17,8 +17,8 @@ use super::traverse::is_cut;
 use super::walk::{self, Line, Nearest};
 use crate::bvh::{Aabb, Node};
 use crate::records::{
-    CASTS_SHADOW, DISK, ELLIPSOID, FAR, INSTANCE, Instance, Item, Light, NO_INDEX, Packed, PackedMesh, RECTANGLE,
-    SOME_SHADOWS, TRIANGLE,
+    CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Item, Light, NO_INDEX, Packed, PackedMesh, SOME_SHADOWS,
+    with_primitive_kind,
 };
 
 /// So few items are looked at one by one: a ray passes most of a small tree's nodes.
@@ -33,16 +33,16 @@ pub fn closest_in_tree(scene: &Packed, before: Hit, ray: Ray, left: UVec2, wall:
     let mut hit = before;
     let pad = item_pad(scene, ray.origin);
     let s = slabs(ray.origin, ray.direction, pad);
-    if scene.items.len() <= FEW_ITEMS {
-        for item in &scene.items {
+    if scene.bvh.items.len() <= FEW_ITEMS {
+        for item in &scene.bvh.items {
             hit = closest_of_item(scene, hit, item, ray, s, left, wall);
         }
         return hit;
     }
     let line = Line::new(ray.origin, ray.direction, pad);
-    let nodes: &[Node] = cast_slice(&scene.nodes);
+    let nodes: &[Node] = cast_slice(&scene.bvh.nodes);
     walk::leaves(*LEVEL, nodes, &line, hit.t, |items, _| {
-        for item in &scene.items[items] {
+        for item in &scene.bvh.items[items] {
             hit = closest_of_item(scene, hit, item, ray, s, left, wall);
         }
         hit.t
@@ -59,13 +59,20 @@ fn closest_of_item(scene: &Packed, before: Hit, item: &Item, ray: Ray, s: Slabs,
     let is_wall = i == by_itself(wall);
     let t = match item.kind & 0xff {
         INSTANCE => return closest_of_mesh(scene, before, i, ray, max(passage.x, 0.0), left),
-        RECTANGLE => intersect(RECTANGLE, &scene.primitives[i as usize], is_wall, ray, FAR),
-        TRIANGLE => intersect(TRIANGLE, &scene.primitives[i as usize], is_wall, ray, FAR),
-        ELLIPSOID => intersect(ELLIPSOID, &scene.primitives[i as usize], is_wall, ray, FAR),
-        _ => intersect(DISK, &scene.primitives[i as usize], is_wall, ray, FAR),
+        kind => with_primitive_kind!(kind, |kind| intersect(
+            kind,
+            &scene.primitives[i as usize],
+            is_wall,
+            ray,
+            INFINITE_T
+        )),
     };
     let found = Hit {
-        t: if i == by_itself(left) { FAR } else { max(t, passage.x) },
+        t: if i == by_itself(left) {
+            INFINITE_T
+        } else {
+            max(t, passage.x)
+        },
         primitive: i,
         ..no_hit()
     };
@@ -73,8 +80,8 @@ fn closest_of_item(scene: &Packed, before: Hit, item: &Item, ray: Ray, s: Slabs,
 }
 
 fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f32, left: UVec2) -> Hit {
-    let i = &scene.instances[number as usize];
-    let packed = &*scene.meshes[i.mesh as usize];
+    let i = &scene.bvh.instances[number as usize];
+    let packed = &*scene.bvh.meshes[i.mesh as usize];
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
     let pad = mesh_pad(i, origin);
@@ -157,11 +164,11 @@ pub fn hidden_by_tree(scene: &Packed, before: u32, surface: &Surface, light: &Li
         skip: NO_INDEX,
     };
     let bounds = |i: usize| {
-        let Item { low, high, kind, .. } = scene.items[i];
+        let Item { low, high, kind, .. } = scene.bvh.items[i];
         (kind & CASTS_SHADOW != 0).then_some(Aabb { low, high })
     };
-    let visit = |i: usize, passing| hidden_by_item(scene, &scene.items[i], passing, &rays);
-    (before & all) | walk::hidden_items(*LEVEL, cast_slice(&scene.nodes), &segments, wanted, bounds, visit)
+    let visit = |i: usize, passing| hidden_by_item(scene, &scene.bvh.items[i], passing, &rays);
+    (before & all) | walk::hidden_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, wanted, bounds, visit)
 }
 
 /// Of the samples in `wanted`, those that an item hides.
@@ -173,23 +180,19 @@ fn hidden_by_item(scene: &Packed, item: &Item, wanted: u32, rays: &Rays) -> u32 
     }
     let is_wall = i == by_itself(rays.surface.below);
     let q = scene.primitives.get(i as usize);
-    let bits = |kind: u32| {
-        let start = rays.surface.start;
-        q.map_or(0, |q| shadow_bits(kind, q, start, is_wall, rays.light, rays.block))
-    };
     wanted
         & match kind {
             INSTANCE => hidden_by_mesh(scene, i, wanted, rays),
-            RECTANGLE => bits(RECTANGLE),
-            TRIANGLE => bits(TRIANGLE),
-            ELLIPSOID => bits(ELLIPSOID),
-            _ => bits(DISK),
+            kind => with_primitive_kind!(kind, |kind| {
+                let start = rays.surface.start;
+                q.map_or(0, |q| shadow_bits(kind, q, start, is_wall, rays.light, rays.block))
+            }),
         }
 }
 
 fn hidden_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u32 {
-    let i = &scene.instances[number as usize];
-    let mesh = &*scene.meshes[i.mesh as usize];
+    let i = &scene.bvh.instances[number as usize];
+    let mesh = &*scene.bvh.meshes[i.mesh as usize];
     let origin = point_to_mesh(i, rays.surface.start);
     let to = Segments {
         towards: vector_to_mesh(i, rays.to.towards),
@@ -248,13 +251,13 @@ pub fn is_hidden_by_tree(scene: &Packed, surface: &Surface, to: Vec3, reach: f32
             && is_passed(box_passage(item.low, item.high, s), reach)
             && is_cut_by_item(scene, item, surface, to, reach, goal)
     };
-    if scene.items.len() <= FEW_ITEMS {
-        return scene.items.iter().any(cuts);
+    if scene.bvh.items.len() <= FEW_ITEMS {
+        return scene.bvh.items.iter().any(cuts);
     }
     let line = Line::new(surface.start, to, pad);
     let mut hidden = false;
-    walk::leaves(*LEVEL, cast_slice(&scene.nodes), &line, reach, |items, limit| {
-        hidden |= scene.items[items].iter().any(cuts);
+    walk::leaves(*LEVEL, cast_slice(&scene.bvh.nodes), &line, reach, |items, limit| {
+        hidden |= scene.bvh.items[items].iter().any(cuts);
         if hidden { f32::NEG_INFINITY } else { limit }
     });
     hidden
@@ -262,21 +265,19 @@ pub fn is_hidden_by_tree(scene: &Packed, surface: &Surface, to: Vec3, reach: f32
 
 fn is_cut_by_item(scene: &Packed, item: &Item, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
     let i = item.index;
-    let cut = |kind| is_cut(kind, &scene.primitives[i as usize], i, surface, to, reach, goal);
     match item.kind & 0xff {
         INSTANCE => is_cut_by_mesh(scene, i, surface, to, reach),
-        RECTANGLE => cut(RECTANGLE),
-        TRIANGLE => cut(TRIANGLE),
-        ELLIPSOID => cut(ELLIPSOID),
-        _ => cut(DISK),
+        kind => with_primitive_kind!(kind, |kind| {
+            is_cut(kind, &scene.primitives[i as usize], i, surface, to, reach, goal)
+        }),
     }
 }
 
 fn is_cut_by_mesh(scene: &Packed, number: u32, surface: &Surface, to: Vec3, reach: f32) -> bool {
-    let i = &scene.instances[number as usize];
+    let i = &scene.bvh.instances[number as usize];
     let origin = point_to_mesh(i, surface.start);
     let line = Line::new(origin, vector_to_mesh(i, to), mesh_pad(i, origin));
     let own = surface.above;
     let skip = if own.x == number + 1 { own.y } else { NO_INDEX };
-    walk::any(*LEVEL, &walked(&scene.meshes[i.mesh as usize]), &line, skip, reach)
+    walk::any(*LEVEL, &walked(&scene.bvh.meshes[i.mesh as usize]), &line, skip, reach)
 }

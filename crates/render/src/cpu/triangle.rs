@@ -27,7 +27,7 @@ mod tests {
     use super::*;
     use crate::cpu::primitive::primitive_normal;
     use crate::pack::primitive;
-    use crate::records::{FAR, TRIANGLE};
+    use crate::records::{INFINITE_T, TRIANGLE};
 
     const CORNERS: [DVec3; 3] = [
         DVec3::new(1.0, 1.0, 2.0),
@@ -46,7 +46,7 @@ mod tests {
             origin: Vec3::new(x, y, 5.0),
             direction: Vec3::NEG_Z,
         };
-        intersect_triangle(&triangle(), ray, FAR)
+        intersect_triangle(&triangle(), ray, INFINITE_T)
     }
 
     #[test]
@@ -56,7 +56,7 @@ mod tests {
             assert!((found - 3.0).abs() < 1e-6, "{inside:?}: {found}");
         }
         for outside in [(0.99, 2.0), (2.0, 0.99), (2.1, 2.6), (3.0, 4.0)] {
-            assert_eq!(from_above(outside.0, outside.1), FAR, "{outside:?}");
+            assert_eq!(from_above(outside.0, outside.1), INFINITE_T, "{outside:?}");
         }
     }
 

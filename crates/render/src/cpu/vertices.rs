@@ -13,7 +13,7 @@ pub fn vertex_color(scene: &Packed, hit: Hit) -> Vec4 {
     if is_on_mesh(hit) {
         let i = instance_of(scene, hit);
         if i.colors != NO_INDEX {
-            let mesh = &scene.meshes[i.mesh as usize];
+            let mesh = &scene.bvh.meshes[i.mesh as usize];
             let UVec4 { x, y, z, .. } = mesh.triangles[hit.slot as usize];
             let [c0, c1, c2] = [x, y, z].map(|vertex| mesh.colors[vertex as usize]);
             return color_between(c0, c1, c2, hit.barycentric);
@@ -40,7 +40,7 @@ pub fn with_vertex_colors(scene: &Packed, before: &Material, hit: Hit) -> Materi
 
 pub fn load_further_uv(scene: &Packed, i: &Instance, vertex: u32, uv_set: u32) -> Vec2 {
     let rows = i.uv_sets.div_ceil(2);
-    let row = scene.meshes[i.mesh as usize].more_uvs[(rows * vertex + (uv_set - 1) / 2) as usize];
+    let row = scene.bvh.meshes[i.mesh as usize].more_uvs[(rows * vertex + (uv_set - 1) / 2) as usize];
     if uv_set & 1 == 1 {
         Vec2::new(row.x, row.y)
     } else {
@@ -53,7 +53,7 @@ pub fn spot_in_set(scene: &Packed, spot: &Spot, hit: Hit, uv_set: u32) -> Spot {
     if is_on_mesh(hit) {
         let i = instance_of(scene, hit);
         let has_set = uv_set <= i.uv_sets;
-        let UVec4 { x, y, z, .. } = scene.meshes[i.mesh as usize].triangles[hit.slot as usize];
+        let UVec4 { x, y, z, .. } = scene.bvh.meshes[i.mesh as usize].triangles[hit.slot as usize];
         let uv = |vertex: u32| {
             if has_set {
                 load_further_uv(scene, i, vertex, uv_set)

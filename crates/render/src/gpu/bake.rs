@@ -18,13 +18,13 @@ pub const MOST_RECORDS: usize = 512;
 /// [`bake`], if the scene is small enough.
 pub fn bake_if_small(packed: &Packed) -> Option<String> {
     // Lights that a tree chooses of are read from buffers.
-    let lights = if packed.light_nodes.is_empty() {
-        packed.lights.len()
+    let lights = if packed.lighting.nodes.is_empty() {
+        packed.lighting.lights.len()
     } else {
         0
     };
-    let of_looks = packed.materials.len() + packed.lookups.len() + packed.textures.len();
-    let records = of_looks + lights + packed.emitters.len();
+    let of_looks = packed.materials.len() + packed.textures.lookups.len() + packed.textures.records.len();
+    let records = of_looks + lights + packed.lighting.emitters.len();
     (packed.primitives.len() <= MAX_LINEAR_PRIMITIVES && records <= MOST_RECORDS).then(|| bake(packed))
 }
 
@@ -114,19 +114,19 @@ pub fn bake(packed: &Packed) -> String {
             }
         },
     );
-    let emitters = packed.emitters.len();
+    let emitters = packed.lighting.emitters.len();
     let _ = writeln!(out, "fn emitter_count() -> u32 {{\n    return {emitters}u;\n}}");
     let lights = packed.counts.lights.constant();
     let _ = writeln!(out, "fn light_counts() -> vec2u {{\n    return {lights};\n}}");
     write_table(&mut out, "load_primitive", &packed.primitives);
     write_table(&mut out, "load_material", &packed.materials);
-    match packed.light_nodes.is_empty() {
-        true => write_table(&mut out, "load_light", &packed.lights),
+    match packed.lighting.nodes.is_empty() {
+        true => write_table(&mut out, "load_light", &packed.lighting.lights),
         false => from_rows::<Light>(&mut out, "load_light", "records", "counts.tables.x"),
     }
-    write_table(&mut out, "load_texture", &packed.textures);
-    write_table(&mut out, "load_emitter", &packed.emitters);
-    write_table(&mut out, "load_lookup", &packed.lookups);
+    write_table(&mut out, "load_texture", &packed.textures.records);
+    write_table(&mut out, "load_emitter", &packed.lighting.emitters);
+    write_table(&mut out, "load_lookup", &packed.textures.lookups);
     out
 }
 
@@ -156,24 +156,24 @@ pub fn tree_tables() -> String {
 pub fn rows(packed: &Packed) -> Vec<UVec4> {
     let bytes = [
         cast_slice(&packed.materials),
-        cast_slice(&packed.lights),
-        cast_slice::<_, u8>(&packed.textures),
-        cast_slice(&packed.emitters),
-        cast_slice(&packed.lookups),
-        cast_slice(&packed.light_nodes),
+        cast_slice(&packed.lighting.lights),
+        cast_slice::<_, u8>(&packed.textures.records),
+        cast_slice(&packed.lighting.emitters),
+        cast_slice(&packed.textures.lookups),
+        cast_slice(&packed.lighting.nodes),
     ];
     let mut rows: Vec<UVec4> = bytemuck::pod_collect_to_vec(&bytes.concat());
-    rows.extend(in_rows(&packed.light_leaves));
+    rows.extend(in_rows(&packed.lighting.leaves));
     rows
 }
 
 /// The rows of a scene's trees, of their items and of instances.
 pub fn node_rows(packed: &Packed) -> Vec<UVec4> {
-    let mut out: Vec<UVec4> = cast_slice(&packed.nodes).to_vec();
-    out.extend(cast_slice::<_, UVec4>(&packed.items));
-    out.extend(cast_slice::<_, UVec4>(&packed.instances));
-    out.extend(in_rows(&packed.group_words));
-    for mesh in &packed.meshes {
+    let mut out: Vec<UVec4> = cast_slice(&packed.bvh.nodes).to_vec();
+    out.extend(cast_slice::<_, UVec4>(&packed.bvh.items));
+    out.extend(cast_slice::<_, UVec4>(&packed.bvh.instances));
+    out.extend(in_rows(&packed.bvh.group_words));
+    for mesh in &packed.bvh.meshes {
         out.extend(cast_slice::<_, UVec4>(&mesh.nodes));
     }
     out
@@ -183,7 +183,7 @@ pub fn node_rows(packed: &Packed) -> Vec<UVec4> {
 /// the vertices' colours and further texture coordinates.
 pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
     let mut out = Vec::new();
-    for mesh in &packed.meshes {
+    for mesh in &packed.bvh.meshes {
         out.extend(&mesh.triangles);
         out.extend(cast_slice::<_, UVec4>(&mesh.vertices));
         out.extend(cast_slice::<_, UVec4>(&mesh.attributes));
@@ -198,14 +198,14 @@ pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
 /// How many rows [`node_rows`] has.
 pub fn node_rows_count(packed: &Packed) -> usize {
     let rows_of = |nodes: &[Node]| size_of_val(nodes) / size_of::<UVec4>();
-    let of_meshes: usize = packed.meshes.iter().map(|mesh| rows_of(&mesh.nodes)).sum();
-    let records = size_of_val(packed.items.as_slice()) + size_of_val(packed.instances.as_slice());
-    rows_of(&packed.nodes) + records / size_of::<UVec4>() + packed.group_words.len().div_ceil(4) + of_meshes
+    let of_meshes: usize = packed.bvh.meshes.iter().map(|mesh| rows_of(&mesh.nodes)).sum();
+    let records = size_of_val(packed.bvh.items.as_slice()) + size_of_val(packed.bvh.instances.as_slice());
+    rows_of(&packed.bvh.nodes) + records / size_of::<UVec4>() + packed.bvh.group_words.len().div_ceil(4) + of_meshes
 }
 
 /// How many rows [`mesh_rows`] has.
 pub fn mesh_rows_count(packed: &Packed) -> usize {
-    let rows = packed.meshes.iter().map(|mesh| {
+    let rows = packed.bvh.meshes.iter().map(|mesh| {
         let of_vertices = mesh.vertices.len()
             + mesh.attributes.len()
             + 2 * mesh.tangents.len()

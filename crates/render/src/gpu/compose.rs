@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::{fs, io, path::Path};
 
 use super::bake::{tables, tree_tables};
+use super::dispatch;
 use super::functions::is_same_code;
 use crate::records;
 use crate::records::Specialization;
@@ -163,10 +164,12 @@ impl Shaders {
             Some(text) => source.append("(the scene as constants)", text),
             None => {
                 self.append(&mut source, FROM_BUFFERS);
+                source.append("(the loops over kinds of primitives)", &dispatch::linear_loops());
                 source.append("(the tables of records)", &tables());
             }
         }
         source.append("(the tables of trees)", &tree_tables());
+        source.append("(the tests of items of the BVH)", &dispatch::item_tests());
         match texels {
             Some(text) => source.append("(the texels' buffers)", text),
             None => self.append(&mut source, TEXELS),

@@ -21,7 +21,7 @@ pub struct KernelPlan {
 
 /// Predicts the kernel for a packed scene on a device.
 pub fn plan_kernel(packed: &Packed, info: &Info) -> KernelPlan {
-    let kernel = if packed.adaptive { &ADAPTIVE } else { &RENDER };
+    let kernel = if packed.sampling.adaptive { &ADAPTIVE } else { &RENDER };
     let baked = info.is_software().then(|| bake_if_small(packed)).flatten();
     let source = Shaders::built_in().compose(kernel, packed.integrator, baked.as_deref());
     KernelPlan {

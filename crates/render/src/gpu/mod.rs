@@ -6,6 +6,7 @@ pub mod compose;
 mod controls;
 mod depth;
 mod device;
+mod dispatch;
 mod failure;
 mod functions;
 mod interface;

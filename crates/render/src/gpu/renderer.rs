@@ -177,7 +177,7 @@ impl Gpu {
             texels,
             sliders,
         };
-        let render = kernels.compile(device, kernel_of(packed.adaptive))?;
+        let render = kernels.compile(device, kernel_of(packed.sampling.adaptive))?;
         let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let values = kernels.sliders.len().div_ceil(4) as u64 * size_of::<[u32; 4]>() as u64;

@@ -1,7 +1,6 @@
 //! How many samples of a pixel one call may have, so that software Vulkan runs it whole.
 
 use crate::records::{BLOCK, LEAVES, Packed};
-use wgray_scene::Integrator;
 
 /// After so many rounds of all its loops together, Mesa 22.3's software Vulkan ends every loop of an invocation. Rounds
 /// are counted for all lanes of a vector: a round that any of them needs counts.
@@ -43,13 +42,13 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
     let of_hit = of_hit + in_tree;
     // Behind what is hidden from the camera.
     let of_start = 1.0 + f64::from(s.hidden) * (1.0 + of_hit) * 2.0;
-    if packed.integrator == Integrator::Path {
+    if packed.integrator.follows_paths() {
         // Each bounce is a round, with a ray to go on, one to a light, and the loops of textures.
         let to_light = if baked { in_tree } else { casters + in_tree };
         let passing = if s.sees_through == 0 { 1.0 } else { ROUNDS_OF_PASSING };
         let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(LONGEST_ROULETTE)));
         // Down the tree over what shines, and up from what a ray has met.
-        let levels = 2.0 * f64::from(packed.light_nodes.len().max(1).ilog2());
+        let levels = 2.0 * f64::from(packed.lighting.nodes.len().max(1).ilog2());
         let of_bounce = 1.0 + of_hit + to_light + levels + f64::from(s.lookups) * ROUNDS_OF_LOOKUP;
         return of_start + (bounces + 1.0) * passing * of_bounce;
     }

@@ -16,7 +16,7 @@ use crate::records::{BINS, Camera, Packed};
 pub fn bytes_of_scene(packed: &Packed) -> u64 {
     let of_rows = rows(packed).len() + node_rows_count(packed) + mesh_rows_count(packed);
     let sizes = [
-        size_of_val(packed.texels.as_slice()),
+        size_of_val(packed.textures.texels.as_slice()),
         of_rows * size_of::<UVec4>(),
         size_of_val(packed.primitives.as_slice()),
         size_of_val(packed.bounds.as_slice()),
@@ -44,11 +44,11 @@ impl SceneBuffers {
     ) -> Result<SceneBuffers, RenderError> {
         let storage = BufferUsages::STORAGE;
         let (rows, nodes, meshes) = (rows(packed), node_rows(packed), mesh_rows(packed));
-        let mut filter_table = packed.filter_table.clone();
+        let mut filter_table = packed.sampling.filter_table.clone();
         filter_table.resize(BINS as usize, Vec4::ZERO);
         let bytes = bytes_of_scene(packed);
         let uploaded = || {
-            let texels = texels.split(&packed.texels);
+            let texels = texels.split(&packed.textures.texels);
             let texels = texels.map(|part| device.checked(|| device.upload(storage, part)));
             let texels: Vec<wgpu::Buffer> = texels.collect::<Result<_, _>>()?;
             device.checked(|| {

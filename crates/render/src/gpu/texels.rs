@@ -32,8 +32,8 @@ impl TexelParts {
             ("BVHs", size_of::<UVec4>() * node_rows_count(packed)),
             ("meshes", size_of::<UVec4>() * mesh_rows_count(packed)),
             ("materials, lights and textures", {
-                let (materials, lights) = (packed.materials.as_slice(), packed.lights.as_slice());
-                size_of_val(materials) + size_of_val(lights) + size_of_val(packed.textures.as_slice())
+                let (materials, lights) = (packed.materials.as_slice(), packed.lighting.lights.as_slice());
+                size_of_val(materials) + size_of_val(lights) + size_of_val(packed.textures.records.as_slice())
             }),
         ];
         if let Some((name, size)) = sizes.into_iter().find(|(_, size)| *size as u64 > largest) {
@@ -43,10 +43,13 @@ impl TexelParts {
             )));
         }
         let shift = (largest / 4).max(1).ilog2().min(31);
-        let count = packed.texels.len().div_ceil(1 << shift).max(1);
+        let count = packed.textures.texels.len().div_ceil(1 << shift).max(1);
         let most = 1 + (info.storage_buffers as usize).saturating_sub(STORAGE_BUFFERS);
         if count > most {
-            let (size, part) = (mebibytes(4 * packed.texels.len() as u64), mebibytes(4 << shift));
+            let (size, part) = (
+                mebibytes(4 * packed.textures.texels.len() as u64),
+                mebibytes(4 << shift),
+            );
             return Err(too_large(format!(
                 "the scene's images need {size} MiB; the limit is {most} x {part} MiB"
             )));
@@ -117,7 +120,7 @@ mod tests {
         let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
         let text = format!("{start}{}", sphere.repeat(shapes));
         let mut packed = pack(&Scene::parse(&text, "s").unwrap());
-        packed.texels = (0..texels as u32).collect();
+        packed.textures.texels = (0..texels as u32).collect();
         packed
     }
 
@@ -129,10 +132,10 @@ mod tests {
             let parts = TexelParts::of(&info(5000, storage + 3), &packed).unwrap();
             assert_eq!(parts.count, buffers, "{texels} texels");
             assert_eq!(parts.wgsl().is_some(), buffers > 1);
-            let split: Vec<&[u32]> = parts.split(&packed.texels).collect();
+            let split: Vec<&[u32]> = parts.split(&packed.textures.texels).collect();
             assert_eq!(split.len(), buffers);
             assert!(split.iter().all(|part| part.len() <= 1024));
-            assert_eq!(split.concat(), packed.texels);
+            assert_eq!(split.concat(), packed.textures.texels);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Identity of a job: two jobs with the same identity produce the same bits, so one can resume what another left.
 
-use bytemuck::{bytes_of, cast_slice};
+use bytemuck::bytes_of;
 use serde::{Deserialize, Serialize};
 
 use crate::records::{Packed, PackedMesh, Specialization};
@@ -43,7 +43,7 @@ impl Identity {
             scene: hash_of_scene(scene),
             picture: [scene.camera.width, scene.camera.height],
             region: [region.x0, region.y0, region.x1, region.y1],
-            pixel_samples: scene.pixel_samples,
+            pixel_samples: scene.sampling.pixel_samples,
             adaptive: form.adaptive,
             layers: form.layers,
             exact_rounding,
@@ -153,66 +153,34 @@ impl Identity {
 
 /// Returns the hash of a packed scene.
 pub fn hash_of_scene(scene: &Packed) -> String {
-    // Destructures every field, so that a new one cannot be forgotten.
     let Packed {
         origin,
         camera,
         integrator,
         environment,
-        primitives,
-        bounds,
-        nodes,
-        items,
-        instances,
-        meshes,
-        group_words,
-        materials,
-        lights,
-        emitters,
-        light_nodes,
-        light_leaves,
         counts,
-        lookups,
-        textures,
-        texels,
-        filter_table,
-        pixel_samples,
-        adaptive,
+        sampling,
         specialization,
+        ..
     } = scene;
     let mut hasher = blake3::Hasher::new();
-    let records: [&[u8]; 19] = [
+    let records: [&[u8]; 4] = [
         bytes_of(camera),
         bytes_of(environment),
         bytes_of(counts),
-        cast_slice(primitives),
-        cast_slice(bounds),
-        cast_slice(nodes),
-        cast_slice(items),
-        cast_slice(instances),
-        cast_slice(group_words),
-        cast_slice(materials),
-        cast_slice(lights),
-        cast_slice(emitters),
-        cast_slice(light_nodes),
-        cast_slice(light_leaves),
-        cast_slice(lookups),
-        cast_slice(textures),
-        cast_slice(texels),
-        cast_slice(filter_table),
         integrator.name().as_bytes(),
     ];
-    for bytes in records {
+    for bytes in records.into_iter().chain(scene.lists()) {
         list(&mut hasher, bytes);
     }
     for coordinate in origin.to_array() {
         hasher.update(&coordinate.to_le_bytes());
     }
-    for mesh in meshes {
+    for mesh in &scene.bvh.meshes {
         hash_mesh(&mut hasher, mesh);
     }
-    hasher.update(&pixel_samples.to_le_bytes());
-    hasher.update(&[u8::from(*adaptive)]);
+    hasher.update(&sampling.pixel_samples.to_le_bytes());
+    hasher.update(&[u8::from(sampling.adaptive)]);
     // Layers do not change the scene.
     let specialization = Specialization {
         layers: 0,
@@ -226,33 +194,10 @@ pub fn hash_of_scene(scene: &Packed) -> String {
 }
 
 fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
-    let PackedMesh {
-        nodes,
-        triangles,
-        vertices,
-        attributes,
-        tangents,
-        colors,
-        more_uvs,
-        groups,
-        low,
-        high,
-    } = mesh;
-    let records: [&[u8]; 10] = [
-        cast_slice(nodes),
-        cast_slice(triangles),
-        cast_slice(vertices),
-        cast_slice(attributes),
-        cast_slice(tangents),
-        cast_slice(colors),
-        cast_slice(more_uvs),
-        cast_slice(groups),
-        bytes_of(low),
-        bytes_of(high),
-    ];
-    for bytes in records {
+    for bytes in mesh.lists() {
         list(hasher, bytes);
     }
+    hasher.update(bytes_of(&[mesh.low, mesh.high]));
 }
 
 /// Minimum length of a list that is hashed by all threads.

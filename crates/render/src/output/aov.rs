@@ -97,6 +97,13 @@ impl Channel {
     }
 }
 
+/// The properties of a value.
+struct Row {
+    name: &'static str,
+    source: AovSource,
+    channels: &'static [Channel],
+}
+
 impl Aov {
     /// All of them.
     pub const ALL: [Aov; 13] = [
@@ -115,14 +122,11 @@ impl Aov {
         Aov::Variance,
     ];
 
-    /// Where its values come from in pictures by an integrator. By another one there may be none.
+    /// Returns the source of its values in images by an integrator. By another one there may be none.
     pub fn source(self, integrator: Integrator) -> AovSource {
         match self {
-            Aov::SampleCount | Aov::Variance => AovSource::Adaptive,
-            Aov::Albedo | Aov::Direct | Aov::Indirect | Aov::Emission => AovSource::Samples,
-            Aov::ShadingNormal if integrator == Integrator::Path => AovSource::Samples,
-            Aov::Normal | Aov::ShadingNormal | Aov::Depth | Aov::Uv => AovSource::FirstHit,
-            Aov::Primitive | Aov::Instance | Aov::Barycentric => AovSource::FirstHit,
+            Aov::ShadingNormal if integrator.has_layers() => AovSource::Samples,
+            _ => self.row().source,
         }
     }
 
@@ -130,79 +134,116 @@ impl Aov {
     pub fn missing(self, integrator: Integrator, adaptive: bool) -> Option<&'static str> {
         match self.source(integrator) {
             AovSource::Adaptive if !adaptive => Some("needs adaptive sampling"),
-            AovSource::Samples if integrator != Integrator::Path => Some("needs integrator = \"path\""),
+            AovSource::Samples if !integrator.has_layers() => Some("needs integrator = \"path\""),
             _ => None,
         }
     }
 
-    /// The layer of the film that it shows as a picture of light.
+    /// Returns the layer of the film that it shows as an image of light.
     pub fn light(self) -> Option<Layer> {
-        match self {
-            Aov::Albedo => Some(Layer::Albedo),
-            Aov::Direct => Some(Layer::Direct),
-            Aov::Indirect => Some(Layer::Indirect),
-            Aov::Emission => Some(Layer::Emission),
+        self.channels().iter().find_map(|channel| match channel {
+            Channel::Mean(_, layer, _) => Some(*layer),
             _ => None,
-        }
+        })
     }
 
-    /// The name in options, files and layers.
+    /// Returns the name in options, files and layers.
     pub fn name(self) -> &'static str {
-        match self {
-            Aov::Normal => "normal",
-            Aov::ShadingNormal => "shading_normal",
-            Aov::Depth => "depth",
-            Aov::Uv => "uv",
-            Aov::Primitive => "primitive",
-            Aov::Instance => "instance",
-            Aov::Barycentric => "barycentric",
-            Aov::Albedo => "albedo",
-            Aov::Direct => "direct",
-            Aov::Indirect => "indirect",
-            Aov::Emission => "emission",
-            Aov::SampleCount => "sample_count",
-            Aov::Variance => "variance",
-        }
+        self.row().name
     }
 
-    /// The channels of an EXR layer.
-    pub fn channels(self) -> Vec<Channel> {
-        let colors = |names: [&'static str; 3], layer| {
-            let channels = names.into_iter().zip(0..);
-            channels.map(|(name, part)| Channel::Mean(name, layer, part)).collect()
-        };
+    /// Returns the channels of an EXR layer.
+    pub fn channels(self) -> &'static [Channel] {
+        self.row().channels
+    }
+
+    const fn row(self) -> Row {
+        use AovSource::{Adaptive, FirstHit, Samples};
+        use Channel::{Count, Float, Mean, ShadingNormal, Variance, Whole};
+        const fn row(name: &'static str, source: AovSource, channels: &'static [Channel]) -> Row {
+            Row { name, source, channels }
+        }
         match self {
-            Aov::Normal => vec![
-                Channel::Float("normal.X", |hit| hit.normal.x),
-                Channel::Float("normal.Y", |hit| hit.normal.y),
-                Channel::Float("normal.Z", |hit| hit.normal.z),
-            ],
-            Aov::ShadingNormal => vec![
-                Channel::ShadingNormal("shading_normal.X", 0),
-                Channel::ShadingNormal("shading_normal.Y", 1),
-                Channel::ShadingNormal("shading_normal.Z", 2),
-            ],
-            Aov::Depth => vec![Channel::Float("depth.Z", |hit| hit.depth)],
-            Aov::Uv => vec![
-                Channel::Float("uv.U", |hit| hit.uv.x),
-                Channel::Float("uv.V", |hit| hit.uv.y),
-            ],
-            Aov::Primitive => vec![Channel::Whole("primitive.ID", |hit| hit.primitive)],
-            Aov::Instance => vec![Channel::Whole("instance.ID", |hit| hit.shape)],
-            Aov::Barycentric => vec![
-                Channel::Float("barycentric.U", |hit| hit.barycentric.x),
-                Channel::Float("barycentric.V", |hit| hit.barycentric.y),
-            ],
-            Aov::Albedo => colors(["albedo.R", "albedo.G", "albedo.B"], Layer::Albedo),
-            Aov::Direct => colors(["direct.R", "direct.G", "direct.B"], Layer::Direct),
-            Aov::Indirect => colors(["indirect.R", "indirect.G", "indirect.B"], Layer::Indirect),
-            Aov::Emission => colors(["emission.R", "emission.G", "emission.B"], Layer::Emission),
-            Aov::SampleCount => vec![Channel::Count("sample_count.N")],
-            Aov::Variance => vec![
-                Channel::Variance("variance.R", 0),
-                Channel::Variance("variance.G", 1),
-                Channel::Variance("variance.B", 2),
-            ],
+            Aov::Normal => row(
+                "normal",
+                FirstHit,
+                &[
+                    Float("normal.X", |hit| hit.normal.x),
+                    Float("normal.Y", |hit| hit.normal.y),
+                    Float("normal.Z", |hit| hit.normal.z),
+                ],
+            ),
+            Aov::ShadingNormal => row(
+                "shading_normal",
+                FirstHit,
+                &[
+                    ShadingNormal("shading_normal.X", 0),
+                    ShadingNormal("shading_normal.Y", 1),
+                    ShadingNormal("shading_normal.Z", 2),
+                ],
+            ),
+            Aov::Depth => row("depth", FirstHit, &[Float("depth.Z", |hit| hit.depth)]),
+            Aov::Uv => row(
+                "uv",
+                FirstHit,
+                &[Float("uv.U", |hit| hit.uv.x), Float("uv.V", |hit| hit.uv.y)],
+            ),
+            Aov::Primitive => row("primitive", FirstHit, &[Whole("primitive.ID", |hit| hit.primitive)]),
+            Aov::Instance => row("instance", FirstHit, &[Whole("instance.ID", |hit| hit.shape)]),
+            Aov::Barycentric => row(
+                "barycentric",
+                FirstHit,
+                &[
+                    Float("barycentric.U", |hit| hit.barycentric.x),
+                    Float("barycentric.V", |hit| hit.barycentric.y),
+                ],
+            ),
+            Aov::Albedo => row(
+                "albedo",
+                Samples,
+                &[
+                    Mean("albedo.R", Layer::Albedo, 0),
+                    Mean("albedo.G", Layer::Albedo, 1),
+                    Mean("albedo.B", Layer::Albedo, 2),
+                ],
+            ),
+            Aov::Direct => row(
+                "direct",
+                Samples,
+                &[
+                    Mean("direct.R", Layer::Direct, 0),
+                    Mean("direct.G", Layer::Direct, 1),
+                    Mean("direct.B", Layer::Direct, 2),
+                ],
+            ),
+            Aov::Indirect => row(
+                "indirect",
+                Samples,
+                &[
+                    Mean("indirect.R", Layer::Indirect, 0),
+                    Mean("indirect.G", Layer::Indirect, 1),
+                    Mean("indirect.B", Layer::Indirect, 2),
+                ],
+            ),
+            Aov::Emission => row(
+                "emission",
+                Samples,
+                &[
+                    Mean("emission.R", Layer::Emission, 0),
+                    Mean("emission.G", Layer::Emission, 1),
+                    Mean("emission.B", Layer::Emission, 2),
+                ],
+            ),
+            Aov::SampleCount => row("sample_count", Adaptive, &[Count("sample_count.N")]),
+            Aov::Variance => row(
+                "variance",
+                Adaptive,
+                &[
+                    Variance("variance.R", 0),
+                    Variance("variance.G", 1),
+                    Variance("variance.B", 2),
+                ],
+            ),
         }
     }
 

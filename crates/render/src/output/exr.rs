@@ -64,7 +64,7 @@ pub fn write(
 enum Column {
     Radiance(usize),
     Alpha,
-    Aov(Channel),
+    Aov(&'static Channel),
 }
 
 /// The channels by name, in the order of the file, which is that of the alphabet.

@@ -5,27 +5,23 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::geometry::Trees;
 use super::light_tree::{self, Cone, Lamp};
+use super::primitive::{area, axes, bounding_box, bounding_sphere};
 use super::{
-    DIRECTIONAL, DISK, DISTANT, ELLIPSOID, EMITTER, ENVIRONMENT, Emitter, Light, LightNode, Material, NO_INDEX,
-    NO_SHADOW, PLANE, POINT, Primitive, RECTANGLE, SPOT, TRIANGLE, reach,
+    DIRECTIONAL, DISTANT, EMITTER, ENVIRONMENT, Emitter, Light, Material, NO_INDEX, NO_SHADOW, PLANE, POINT, Primitive,
+    SPOT, TRIANGLE, reach,
 };
+use crate::cpu::primitive::is_solid;
+use crate::records::{Lighting, PackedBvh};
 use wgray_scene::{Color, Scene, Texels, TextureKind};
 
 /// What shines.
 #[derive(Default)]
 pub struct PackedEmitters {
-    /// The primitives that shine, and the lights without extent.
-    pub lights: Vec<Light>,
-    /// These, and the triangles of meshes that shine; or, where they are many, a tree and what is far away.
-    pub emitters: Vec<Emitter>,
-    /// How likely a sample of light is one of the image that surrounds the scene.
+    /// The lights, the emitters and the light tree.
+    pub lighting: Lighting,
+    /// The probability of sampling the environment map.
     pub environment: f64,
-    /// The tree, if there is one.
-    pub nodes: Vec<LightNode>,
-    /// [`Packed::light_leaves`](super::Packed::light_leaves) of that tree.
-    pub leaves: Vec<u32>,
     /// Of each instance of a mesh [`Instance::leaves`](super::Instance::leaves), if there is a tree.
     pub of_instances: Vec<u32>,
 }
@@ -42,7 +38,7 @@ pub fn emitters(
     materials: &mut [Material],
     delta_lights: &[Light],
     primitives: &[(Primitive, bool)],
-    trees: &Trees,
+    trees: &PackedBvh,
     around: Option<f64>,
 ) -> PackedEmitters {
     // Of each material the mean radiance, and the power of a unit of area.
@@ -71,7 +67,7 @@ pub fn emitters(
             let light = light_of(primitive, i, material, reach(scene.render.shadow_epsilon));
             powers.push(strength * area(primitive));
             kinds.push(primitive.material as usize);
-            shining.lights.push(light);
+            shining.lighting.lights.push(light);
         }
     }
     for light in delta_lights.iter().filter(|light| light.color != Vec3::ZERO) {
@@ -80,17 +76,17 @@ pub fn emitters(
             SPOT => spot_power(light) * mean(light.color),
             _ => std::f64::consts::PI * radius(primitives, trees).powi(2) * mean(light.color),
         });
-        shining.lights.push(*light);
+        shining.lighting.lights.push(*light);
     }
-    let environment = shining.lights.len();
+    let environment = shining.lighting.lights.len();
     let of_materials = kinds.len();
     kinds.extend((of_materials..environment).map(|i| materials.len() + i));
     if let Some(around) = around {
         powers.push(std::f64::consts::PI * radius(primitives, trees).powi(2) * around);
-        shining.lights.push(environment_light());
+        shining.lighting.lights.push(environment_light());
         kinds.push(materials.len() + environment);
     }
-    let mut places: Vec<(u32, u32)> = (0..shining.lights.len() as u32).map(|i| (0, i)).collect();
+    let mut places: Vec<(u32, u32)> = (0..shining.lighting.lights.len() as u32).map(|i| (0, i)).collect();
     for (number, instance) in (1..).zip(&trees.instances) {
         let mesh = &trees.meshes[instance.mesh as usize];
         let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
@@ -110,8 +106,8 @@ pub fn emitters(
             }
         }
     }
-    balance(&mut powers, &places, &shining.lights);
-    let is_far = |place: &(u32, u32)| is_far(&shining.lights, place);
+    balance(&mut powers, &places, &shining.lighting.lights);
+    let is_far = |place: &(u32, u32)| is_far(&shining.lighting.lights, place);
     let near = places.iter().filter(|place| !is_far(place)).count();
     if (MOST_LISTED + 1..=MOST_IN_TREE).contains(&near) {
         let found = Found {
@@ -136,14 +132,14 @@ pub fn emitters(
             0.0
         };
     }
-    for (light, power) in shining.lights.iter_mut().zip(&powers) {
+    for (light, power) in shining.lighting.lights.iter_mut().zip(&powers) {
         light.density = match light.kind {
             POINT | DIRECTIONAL | SPOT | ENVIRONMENT => (power / total) as f32,
             _ => materials[primitives[light.primitive as usize].0.material as usize].density,
         };
     }
     shining.environment = around.map_or(0.0, |_| powers[environment] / total);
-    shining.emitters = (table(&powers).into_iter().zip(places))
+    shining.lighting.emitters = (table(&powers).into_iter().zip(places))
         .map(|((threshold, other), (instance, index))| Emitter {
             threshold,
             other,
@@ -234,10 +230,10 @@ fn with_tree(
     mut shining: PackedEmitters,
     materials: &mut [Material],
     primitives: &[(Primitive, bool)],
-    trees: &Trees,
+    trees: &PackedBvh,
     found: &Found,
 ) -> PackedEmitters {
-    let is_far = |place: &(u32, u32)| is_far(&shining.lights, place);
+    let is_far = |place: &(u32, u32)| is_far(&shining.lighting.lights, place);
     let (mut in_tree, mut far) = (Vec::new(), Vec::new());
     for (place, power) in found.places.iter().zip(&found.powers) {
         if is_far(place) { &mut far } else { &mut in_tree }.push((*place, *power));
@@ -249,7 +245,7 @@ fn with_tree(
         .iter()
         .map(|(place @ (instance, index), _)| {
             let lamp = match *instance {
-                0 => lamp_of(&shining.lights[*index as usize], primitives, &found.radiances),
+                0 => lamp_of(&shining.lighting.lights[*index as usize], primitives, &found.radiances),
                 number => {
                     let (corners, material) = face(trees, number as usize - 1, *index);
                     lamp_of_triangle(corners, found.radiances[material as usize], true)
@@ -263,28 +259,31 @@ fn with_tree(
             }
         })
         .collect();
-    shining.nodes = light_tree::build(&lamps);
-    shining.leaves = vec![NO_INDEX; primitives.len()];
+    shining.lighting.nodes = light_tree::build(&lamps);
+    shining.lighting.leaves = vec![NO_INDEX; primitives.len()];
     shining.of_instances = vec![NO_INDEX; trees.instances.len()];
     for lamp in lamps.iter().filter(|lamp| lamp.instance != 0) {
         let number = lamp.instance as usize - 1;
         if shining.of_instances[number] == NO_INDEX {
-            shining.of_instances[number] = shining.leaves.len() as u32;
+            shining.of_instances[number] = shining.lighting.leaves.len() as u32;
             let triangles = trees.meshes[trees.instances[number].mesh as usize].triangles.len();
-            shining.leaves.resize(shining.leaves.len() + triangles, NO_INDEX);
+            shining
+                .lighting
+                .leaves
+                .resize(shining.lighting.leaves.len() + triangles, NO_INDEX);
         }
     }
-    for (number, node) in (0..).zip(&shining.nodes) {
+    for (number, node) in (0..).zip(&shining.lighting.nodes) {
         for (i, child) in (4 * number..).zip(0..4) {
             if node.children[child] != NO_INDEX || node.intensity[child] == 0.0 {
                 continue;
             }
             let place = match node.instance[child] {
-                0 => shining.lights[node.index[child] as usize].primitive,
+                0 => shining.lighting.lights[node.index[child] as usize].primitive,
                 number => shining.of_instances[number as usize - 1] + node.index[child],
             };
             if place != NO_INDEX {
-                shining.leaves[place as usize] = i;
+                shining.lighting.leaves[place as usize] = i;
             }
         }
     }
@@ -292,7 +291,7 @@ fn with_tree(
         material.density = if *strength > 0.0 { 1.0 } else { 0.0 };
     }
     for ((_, index), power) in &far {
-        let light = &mut shining.lights[*index as usize];
+        let light = &mut shining.lighting.lights[*index as usize];
         light.density = (power / total) as f32;
         if light.kind == ENVIRONMENT {
             shining.environment = power / total;
@@ -303,7 +302,7 @@ fn with_tree(
         .chain(far.iter().map(|(_, power)| *power))
         .collect();
     let places = [(0, NO_INDEX)].into_iter().chain(far.iter().map(|(place, _)| *place));
-    shining.emitters = (table(&weights).into_iter().zip(places))
+    shining.lighting.emitters = (table(&weights).into_iter().zip(places))
         .map(|((threshold, other), (instance, index))| Emitter {
             threshold,
             other,
@@ -315,7 +314,7 @@ fn with_tree(
 }
 
 /// The corners of a triangle of an instance, and its material.
-fn face(trees: &Trees, number: usize, slot: u32) -> ([DVec3; 3], u32) {
+fn face(trees: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
     let instance = &trees.instances[number];
     let mesh = &trees.meshes[instance.mesh as usize];
     let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
@@ -375,31 +374,24 @@ fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -
     }
     let primitive = &primitives[light.primitive as usize].0;
     let radiance = radiances[primitive.material as usize];
-    let [u, v, w] = axes(primitive);
-    let normal = u.cross(v).normalize_or(DVec3::Z);
+    let [u, v, _] = axes(primitive);
+    if primitive.kind == TRIANGLE {
+        let corners = [center, center + u, center + v];
+        return lamp_of_triangle(corners, radiance, light.sides == 2);
+    }
     let area = area(primitive);
-    let root = |squares: DVec3| squares.map(f64::sqrt);
-    let (half, cone, intensity) = match primitive.kind {
-        TRIANGLE => {
-            let corners = [center, center + u, center + v];
-            return lamp_of_triangle(corners, radiance, light.sides == 2);
+    let (cone, intensity) = match is_solid(primitive.kind) {
+        // The mean projected area of a convex solid (Cauchy).
+        true => (Cone::ALL, radiance * area / 4.0),
+        false => {
+            let normal = u.cross(v).normalize_or(DVec3::Z);
+            (Cone::flat(normal, light.sides == 2), radiance * area)
         }
-        // From afar it is a disk.
-        ELLIPSOID => (root(u * u + v * v + w * w), Cone::ALL, radiance * area / 4.0),
-        DISK => (
-            root(u * u + v * v),
-            Cone::flat(normal, light.sides == 2),
-            radiance * area,
-        ),
-        _ => (u.abs() + v.abs(), Cone::flat(normal, light.sides == 2), radiance * area),
     };
-    let middle = match primitive.kind {
-        ELLIPSOID => center + DMat3::from_cols(u, v, w) * primitive.middle.as_dvec3(),
-        _ => center,
-    };
+    let (low, high) = bounding_box(primitive);
     Lamp {
-        low: middle - half,
-        high: middle + half,
+        low,
+        high,
         cone,
         intensity,
         density: 1.0 / area,
@@ -482,36 +474,10 @@ fn light_of(primitive: &Primitive, number: u32, material: &Material, reach: f32)
     }
 }
 
-/// The images of a local space's axes.
-fn axes(primitive: &Primitive) -> [DVec3; 3] {
-    let rows = [primitive.x, primitive.y, primitive.z].map(Vec3::as_dvec3);
-    let columns = DMat3::from_cols_array_2d(&rows.map(|row| row.to_array()))
-        .transpose()
-        .inverse();
-    [columns.x_axis, columns.y_axis, columns.z_axis]
-}
-
-/// A primitive's area; an ellipsoid's as `ellipsoid_area` has it.
-fn area(primitive: &Primitive) -> f64 {
-    let [u, v, _] = axes(primitive);
-    let span = u.cross(v).length();
-    match primitive.kind {
-        RECTANGLE => 4.0 * span,
-        DISK => std::f64::consts::PI * span,
-        TRIANGLE => 0.5 * span,
-        ELLIPSOID => {
-            let rows = [primitive.x, primitive.y, primitive.z].map(|row| row.as_dvec3().length_squared());
-            let squares: f64 = rows.iter().sum();
-            4.0 * std::f64::consts::PI * (squares / 3.0).sqrt() / f64::from(primitive.determinant).abs()
-        }
-        _ => 0.0,
-    }
-}
-
 /// Half the diagonal of a box around all that is bounded; 1 where there is nothing.
-fn radius(primitives: &[(Primitive, bool)], trees: &Trees) -> f64 {
+fn radius(primitives: &[(Primitive, bool)], trees: &PackedBvh) -> f64 {
     let spheres = primitives.iter().filter(|(p, _)| p.kind != PLANE).map(|(p, _)| {
-        let sphere = super::bounds::sphere(p);
+        let sphere = bounding_sphere(p);
         let (center, radius) = (sphere.center.as_dvec3(), f64::from(sphere.radius));
         (center - radius, center + radius)
     });

@@ -4,34 +4,25 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use bytemuck::cast_vec;
-use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
+use glam::{DAffine3, DVec3, Vec3, Vec4};
 
-use super::{
-    CASTS_SHADOW, DISK, ELLIPSOID, INSTANCE, Instance, Item, NO_INDEX, NO_SHADOW, Node, PAD, Primitive, RECTANGLE,
-    SOME_SHADOWS, TRIANGLE,
-};
+use super::primitive::bounding_box;
+use super::{CASTS_SHADOW, INSTANCE, Instance, Item, NO_INDEX, NO_SHADOW, Node, PAD, Primitive, SOME_SHADOWS};
 use crate::bvh::{Aabb, build};
-use crate::records::PackedMesh;
+use crate::records::{PackedBvh, PackedMesh};
 use wgray_scene::mesh::Mesh;
 use wgray_scene::{Geometry, Scene, Shape};
 
 /// Scenes of more bounded primitives have them in the tree. Fewer are faster one by one, and as constants.
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
-/// All that the scene's tree is over.
-#[derive(Clone, Debug, Default)]
-pub struct Trees {
-    pub nodes: Vec<Node>,
-    pub items: Vec<Item>,
-    pub instances: Vec<Instance>,
-    pub meshes: Vec<Arc<PackedMesh>>,
-    pub group_words: Vec<u32>,
-    pub room: Vec4,
-}
-
-/// The tree over a scene's instances of meshes and these primitives, which have numbers and may cast a shadow.
-pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl Fn(usize) -> bool) -> Trees {
-    let mut trees = Trees::default();
+/// The BVH over a scene's instances of meshes and these primitives, which have indices and may cast a shadow; and [`Counts::room`](super::Counts::room).
+pub fn trees(
+    scene: &Scene,
+    primitives: &[(u32, &Primitive, bool)],
+    casts: impl Fn(usize) -> bool,
+) -> (PackedBvh, Vec4) {
+    let mut trees = PackedBvh::default();
     let with_normal_maps = with_normal_maps(scene);
     let mut known: Vec<*const Mesh> = Vec::new();
     let mut items = Vec::new();
@@ -70,7 +61,7 @@ pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl 
     }
     for (number, primitive, casts) in primitives {
         let kind = primitive.kind | if *casts { CASTS_SHADOW } else { 0 };
-        items.push(item(kind, *number, box_of(primitive)));
+        items.push(item(kind, *number, bounding_box(primitive)));
     }
     let boxes: Vec<Aabb> = items
         .iter()
@@ -87,9 +78,8 @@ pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl 
         .iter()
         .map(|b| b.low.abs().max(b.high.abs()).max_element())
         .fold(0.0, f32::max);
-    trees.room = Vec4::new(PAD * condition, farthest, 0.0, 0.0);
     trees.place_rows();
-    trees
+    (trees, Vec4::new(PAD * condition, farthest, 0.0, 0.0))
 }
 
 /// The meshes of which any instance has a normal map. What else has a direction along the surface, facets that are rougher along one axis and
@@ -106,7 +96,7 @@ fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
     scene.shapes.iter().filter_map(mesh).collect()
 }
 
-impl Trees {
+impl PackedBvh {
     /// Tells the instances where their meshes are in buffers: nodes behind all other rows of the first one.
     fn place_rows(&mut self) {
         let mut node_row = self.mesh_nodes_row();
@@ -216,24 +206,4 @@ fn instance(mesh: &PackedMesh, center: DVec3, to_world: &DAffine3) -> Instance {
         side: if columns.determinant() < 0.0 { -1.0 } else { 1.0 },
         ..bytemuck::Zeroable::zeroed()
     }
-}
-
-/// The box of a bounded primitive.
-fn box_of(primitive: &Primitive) -> (DVec3, DVec3) {
-    let [x, y, z] = [primitive.x, primitive.y, primitive.z].map(Vec3::as_dvec3);
-    let axes = DMat3::from_cols(x, y, z).transpose().inverse();
-    let [a, b, c] = [axes.x_axis, axes.y_axis, axes.z_axis];
-    let center = primitive.anchor.as_dvec3() + axes * primitive.middle.as_dvec3();
-    let root = |squares: DVec3| squares.map(f64::sqrt);
-    let half = match primitive.kind {
-        RECTANGLE => a.abs() + b.abs(),
-        DISK => root(a * a + b * b),
-        ELLIPSOID => root(a * a + b * b + c * c),
-        TRIANGLE => {
-            let zero = DVec3::ZERO;
-            return (center + zero.min(a).min(b), center + zero.max(a).max(b));
-        }
-        _ => DVec3::INFINITY,
-    };
-    (center - half, center + half)
 }

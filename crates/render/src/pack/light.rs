@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use bytemuck::Zeroable as _;
 
-use super::shape::parallelogram;
+use super::primitive::parallelogram;
 use super::{DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, RECTANGLE, SPOT};
 use wgray_scene::{self as scene, Scene};
 

@@ -99,9 +99,9 @@ impl Appearances {
             lookups.max().unwrap_or(0)
         };
         let (others, specular) = (most(false), most(true));
-        match integrator {
-            Integrator::Path => (others.max(specular), others.max(specular)),
-            _ => (others, specular),
+        match integrator.follows_paths() {
+            true => (others.max(specular), others.max(specular)),
+            false => (others, specular),
         }
     }
 
@@ -157,9 +157,9 @@ impl Appearances {
                 specular,
                 shininess,
             } => Material {
-                ambient: match scene.render.integrator {
-                    Integrator::Path => Vec3::ZERO, // without effect
-                    _ => found(ambient, FOR_AMBIENT, None),
+                ambient: match scene.render.integrator.follows_paths() {
+                    true => Vec3::ZERO, // without effect
+                    false => found(ambient, FOR_AMBIENT, None),
                 },
                 kind: PHONG,
                 diffuse: found(diffuse, FOR_DIFFUSE, None),

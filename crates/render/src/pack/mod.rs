@@ -1,11 +1,8 @@
 //! Packing: from a validated scene to the records that both backends read, and the constants that a kernel is compiled for.
 
-mod blocking;
-mod bounds;
 mod camera;
 mod emitters;
 pub mod energy;
-mod extent_tree;
 pub mod filter;
 mod geometry;
 mod light;
@@ -14,8 +11,9 @@ mod materials;
 mod mesh;
 mod order;
 mod origin;
+mod primitive;
 mod pyramid;
-mod shape;
+mod shadow_casters;
 mod specialize;
 mod surroundings;
 
@@ -28,13 +26,13 @@ pub use self::geometry::MAX_LINEAR_PRIMITIVES;
 use self::light::{DISTANT, connect_lights, pack_lights, reach};
 use self::materials::Appearances;
 use self::order::Ordered;
-use self::shape::pack_shapes;
+use self::primitive::pack_shapes;
 #[cfg(test)]
-pub(crate) use self::shape::primitive;
+pub(crate) use self::primitive::primitive;
 use self::specialize::Parts;
 use self::surroundings::EnvironmentMap;
 use crate::records::*;
-use wgray_scene::{Integrator, PixelFilter, PixelFilterKind, Scene};
+use wgray_scene::{PixelFilter, PixelFilterKind, Scene};
 
 /// Rays start at least so far above a surface, relative to the largest coordinate, 32 units of rounding: what the
 /// surface's own arithmetic and a neighbour's lose together (`docs/decisions/shadow-rays.md`).
@@ -51,28 +49,28 @@ pub fn pack(scene: &Scene) -> Packed {
     let (mut lights, mut area_lights) = pack_lights(scene, &mut primitives, &mut materials);
     let order = Ordered::of(scene, primitives);
     connect_lights(&mut lights[..area_lights], order.all(), scene.shapes.len());
-    let mut trees = geometry::trees(scene, &order.in_bvh(), |material| {
-        blocking::casts_shadow(scene, material)
+    let (mut trees, room) = geometry::trees(scene, &order.in_bvh(), |material| {
+        shadow_casters::casts_shadow(scene, material)
     });
     let mut shining = PackedEmitters::default();
-    if scene.render.integrator == Integrator::Path {
+    if scene.render.integrator.needs_emitters() {
         let delta_lights = &lights[area_lights..];
         shining = emitters::emitters(scene, &mut materials, delta_lights, order.all(), &trees, around.sum());
-        (area_lights, lights) = (0, std::mem::take(&mut shining.lights));
+        (area_lights, lights) = (0, std::mem::take(&mut shining.lighting.lights));
     }
     for (instance, leaves) in trees.instances.iter_mut().zip(&shining.of_instances) {
         instance.leaves = *leaves;
     }
     let counts = Counts {
         tree: trees.rows().into(),
-        room: trees.room,
+        room,
         ..counts(
             order.outside(),
             area_lights,
             lights.len(),
             materials.len(),
             &appearances,
-            (shining.emitters.len(), shining.nodes.len()),
+            (shining.lighting.emitters.len(), shining.lighting.nodes.len()),
         )
     };
     let filter_table = match is_pixel(scene.render.filter) {
@@ -101,25 +99,25 @@ pub fn pack(scene: &Scene) -> Packed {
         camera: pack_camera(&scene.camera, origin, scene.width, scene.height, scene.render.seed),
         integrator: scene.render.integrator,
         environment,
-        bounds: primitives.iter().map(bounds::sphere).collect(),
+        bounds: primitives.iter().map(primitive::bounding_sphere).collect(),
         primitives,
-        nodes: trees.nodes,
-        items: trees.items,
-        instances: trees.instances,
-        meshes: trees.meshes,
-        group_words: trees.group_words,
+        bvh: trees,
         materials,
-        lights,
-        emitters: shining.emitters,
-        light_nodes: shining.nodes,
-        light_leaves: shining.leaves,
+        lighting: Lighting {
+            lights,
+            ..shining.lighting
+        },
         counts,
-        lookups: appearances.lookups,
-        textures: appearances.textures,
-        texels: appearances.texels,
-        filter_table,
-        pixel_samples: adaptive.map_or(samples, |adaptive| adaptive.max_samples),
-        adaptive: adaptive.is_some(),
+        textures: PackedTextures {
+            lookups: appearances.lookups,
+            records: appearances.textures,
+            texels: appearances.texels,
+        },
+        sampling: Sampling {
+            filter_table,
+            pixel_samples: adaptive.map_or(samples, |adaptive| adaptive.max_samples),
+            adaptive: adaptive.is_some(),
+        },
         specialization,
     }
 }

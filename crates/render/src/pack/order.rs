@@ -1,6 +1,6 @@
 //! The order of primitives: those outside of the BVH first, sorted by kind and by whether they can cast a shadow.
 
-use super::blocking::can_cast_shadow;
+use super::shadow_casters::{can_cast_shadow, may_cast_shadow};
 use super::{MAX_LINEAR_PRIMITIVES, PLANE, Primitive};
 use wgray_scene::Scene;
 
@@ -13,12 +13,19 @@ pub struct Ordered {
 impl Ordered {
     /// Sorts primitives. Many bounded primitives are in the BVH.
     pub fn of(scene: &Scene, primitives: Vec<Primitive>) -> Ordered {
-        let casts = can_cast_shadow(scene, &primitives);
         let bounded = primitives.iter().filter(|primitive| primitive.kind != PLANE).count();
         let is_in_bvh = |primitive: &Primitive| bounded > MAX_LINEAR_PRIMITIVES && primitive.kind != PLANE;
-        let mut all: Vec<(Primitive, bool)> = primitives.into_iter().zip(casts).collect();
-        all.sort_by_key(|(primitive, casts)| (is_in_bvh(primitive), primitive.kind, !casts));
-        let outside = all.partition_point(|(primitive, _)| !is_in_bvh(primitive));
+        let (in_bvh, linear): (Vec<Primitive>, Vec<Primitive>) = primitives.into_iter().partition(is_in_bvh);
+        let casts = can_cast_shadow(scene, &linear);
+        let mut all: Vec<(Primitive, bool)> = linear.into_iter().zip(casts).collect();
+        let outside = all.len();
+        all.extend(
+            in_bvh
+                .into_iter()
+                .map(|primitive| (primitive, may_cast_shadow(scene, &primitive))),
+        );
+        all[..outside].sort_by_key(|(primitive, casts)| (primitive.kind, !casts));
+        all[outside..].sort_by_key(|(primitive, casts)| (primitive.kind, !casts));
         Ordered { all, outside }
     }
 

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
-use wgray_scene::{Camera, Geometry, Light, Scene};
+use wgray_scene::{Camera, Light, Scene};
 
 /// A point near what the camera looks at: on the grid whose cells are at least as large as their distance, a power of 2.
 /// So what is near the origin of the scene file keeps its coordinates, and no coordinate gets more digits.
@@ -28,13 +28,7 @@ pub fn seen_from(scene: &Scene, origin: DVec3) -> Cow<'_, Scene> {
         }
     }
     for shape in &mut scene.shapes {
-        match &mut shape.geometry {
-            Geometry::Rectangle(shape) | Geometry::Disk(shape) => shape.center -= origin,
-            Geometry::Ellipsoid { center, .. } => *center -= origin,
-            Geometry::Triangles(triangles) => triangles.iter_mut().flatten().for_each(|v| *v -= origin),
-            Geometry::Mesh { to_world, .. } => to_world.translation -= origin,
-            Geometry::Plane { point, .. } => *point -= origin,
-        }
+        shape.geometry.translate(-origin);
     }
     Cow::Owned(scene)
 }

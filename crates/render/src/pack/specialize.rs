@@ -3,16 +3,14 @@
 use glam::{UVec4, Vec3};
 
 use super::emitters::PackedEmitters;
-use super::geometry::Trees;
 use super::materials::Appearances;
 use super::surroundings::EnvironmentMap;
 use super::{
-    Counts, DIFFUSE, FACET_KINDS, FOR_ANISOTROPY, FOR_COAT, FOR_EMISSION, FOR_METALLIC, FOR_ROUGHNESS, FOR_SHEEN,
-    FOR_TRANSMISSION, FOR_WEIGHT, GRID, HALTON, INSTANCE, JITTERED, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN,
-    LOBE_SPECULAR, LOBE_TRANSMISSION, Light, Material, NO_COLORS, OPAQUE, PRINCIPLED, RANDOM, ROTATED_GRID, SOBOL,
-    SPECULAR_KINDS, SPOT, Specialization,
+    Counts, DIFFUSE, FACET_KINDS, FOR_ANISOTROPY, FOR_EMISSION, FOR_ROUGHNESS, GRID, HALTON, INSTANCE, JITTERED, Light,
+    Material, NO_COLORS, OPAQUE, PRINCIPLED, RANDOM, ROTATED_GRID, SOBOL, SPECULAR_KINDS, SPOT, Specialization,
 };
 use crate::cpu::lobe::is_polished;
+use crate::records::{LOBES, Lobe, PackedBvh};
 use wgray_scene::{self as scene, Integrator, Pattern, Projection, Reflection, Samples, Scene};
 
 /// The parts of a packed scene that its specialization depends on.
@@ -25,7 +23,7 @@ pub(super) struct Parts<'a> {
     pub lights: &'a [Light],
     pub shining: &'a PackedEmitters,
     pub around: &'a EnvironmentMap,
-    pub trees: &'a Trees,
+    pub trees: &'a PackedBvh,
     pub counts: &'a Counts,
     pub filter_bins: usize,
 }
@@ -43,7 +41,7 @@ impl Parts<'_> {
         } = *self;
         let (pixels, light_samples) = (scene.render.pixel_samples, scene.render.light_samples);
         let adaptive = scene.render.adaptive;
-        let is_path = scene.render.integrator == Integrator::Path;
+        let is_path = scene.render.integrator.follows_paths();
         let (lookups, specular_lookups) = appearances.lookups(scene.render.integrator);
         let has_vertex_colors = materials.iter().any(|material| material.vertex_colors != NO_COLORS)
             && self.trees.meshes.iter().any(|mesh| !mesh.colors.is_empty());
@@ -101,12 +99,9 @@ impl Parts<'_> {
 }
 
 /// The samples that adaptive sampling gives all pixels before it decides on more: a round, or as many as it takes for an
-/// estimate of the variance. Where light bounces, some of it is rarely found, and few samples do not know of it.
+/// estimate of the variance.
 fn first_look(integrator: Integrator, round: u32, most: u32) -> u32 {
-    let least: u32 = match integrator {
-        Integrator::Phong => 16,
-        Integrator::Path => 64,
-    };
+    let least = integrator.pilot_samples();
     least.next_multiple_of(round).max(round).min(most)
 }
 
@@ -174,9 +169,9 @@ fn of_paths(
 ) -> Specialization {
     let any = |test: fn(&Material) -> bool| u32::from(materials.iter().any(test));
     let has_lookup = |purpose: u32| u32::from(appearances.have_lookup(purpose));
-    let emitters = &shining.emitters;
+    let emitters = &shining.lighting.emitters;
     let meshes_emit = emitters.iter().any(|emitter| emitter.instance != 0)
-        || shining.nodes.iter().any(|node| node.instance != UVec4::ZERO);
+        || shining.lighting.nodes.iter().any(|node| node.instance != UVec4::ZERO);
     Specialization {
         materials: materials.iter().fold(0, |bits, material| bits | 1 << material.kind),
         rough: any(|material| material.kind == DIFFUSE && material.roughness > 0.0) | has_lookup(FOR_ROUGHNESS),
@@ -187,7 +182,7 @@ fn of_paths(
         absorption: any(|material| material.absorption != Vec3::ZERO),
         shines: any(|material| material.density > 0.0),
         emitters: emitters.len().min(2) as u32,
-        light_tree: (!shining.nodes.is_empty()).into(),
+        light_tree: (!shining.lighting.nodes.is_empty()).into(),
         emitter_kinds: lights
             .iter()
             .fold(u32::from(meshes_emit) << INSTANCE, |bits, light| bits | 1 << light.kind),
@@ -202,15 +197,16 @@ fn of_paths(
 
 /// The lobes that any principled material has.
 fn lobes(materials: &[Material], appearances: &Appearances) -> u32 {
-    let principled = || materials.iter().filter(|material| material.kind == PRINCIPLED);
-    let lobe = |lobe: u32, textured: u32, has: fn(&Material) -> bool| {
-        let there = principled().any(has) || principled().next().is_some() && appearances.have_lookup(textured);
-        if there { lobe } else { 0 }
+    let mut principled = materials
+        .iter()
+        .filter(|material| material.kind == PRINCIPLED)
+        .peekable();
+    if principled.peek().is_none() {
+        return 0;
+    }
+    let principled: Vec<&Material> = principled.collect();
+    let has = |lobe: &&Lobe| {
+        principled.iter().any(|material| (lobe.is_in)(material)) || appearances.have_lookup(lobe.purposes)
     };
-    lobe(LOBE_SPECULAR, FOR_METALLIC | FOR_WEIGHT, |m| {
-        m.metallic > 0.0 || m.specular_weight > 0.0
-    }) | lobe(LOBE_TRANSMISSION, FOR_TRANSMISSION, |m| m.transmission > 0.0)
-        | lobe(LOBE_COAT, FOR_COAT, |m| m.clearcoat > 0.0)
-        | lobe(LOBE_SHEEN, FOR_SHEEN, |m| m.sheen != Vec3::ZERO)
-        | lobe(LOBE_ANISOTROPY, FOR_ANISOTROPY, |m| m.anisotropy > 0.0)
+    LOBES.iter().filter(has).fold(0, |bits, lobe| bits | lobe.bit)
 }

@@ -1,12 +1,13 @@
 //! Constants of both sides.
 
 #[cfg(doc)]
-use super::{Camera, Instance, Item, Lookup, Material, Primitive, Texture};
+use super::{Camera, Instance, Item, Lookup, Material, Texture};
 #[cfg(doc)]
 use wgray_scene::Pattern;
 
 use glam::UVec2;
 
+use super::KINDS;
 use super::record::constants;
 
 constants! {
@@ -17,19 +18,6 @@ constants! {
     /// [`Camera::projection`] of a camera that sees in all directions.
     pub const PANORAMA: u32 = 2;
 
-    /// [`Primitive::kind`]: |x| <= 1, |y| <= 1, z = 0 in local space.
-    pub const RECTANGLE: u32 = 0;
-    /// [`Primitive::kind`]: x >= 0, y >= 0, x + y <= 1, z = 0 in local space.
-    pub const TRIANGLE: u32 = 1;
-    /// [`Primitive::kind`]: the unit sphere of local space.
-    pub const ELLIPSOID: u32 = 2;
-    /// [`Primitive::kind`]: z = 0 in local space.
-    pub const PLANE: u32 = 3;
-
-    /// [`Primitive::kind`]: x² + y² <= 1, z = 0 in local space.
-    pub const DISK: u32 = 4;
-    /// How many kinds of primitives there are.
-    pub const KINDS: u32 = 5;
     /// [`Item::kind`]: an instance of a mesh.
     pub const INSTANCE: u32 = KINDS;
     /// In [`Item::kind`]: casts a shadow.
@@ -74,16 +62,6 @@ constants! {
     pub const SMALLEST_ALPHA: f32 = 1e-3;
     /// [`Material::kind`]: glTF's material.
     pub const PRINCIPLED: u32 = 8;
-    /// A lobe of [`PRINCIPLED`] materials: what dielectrics and metals mirror.
-    pub const LOBE_SPECULAR: u32 = 1;
-    /// A lobe of [`PRINCIPLED`] materials: what passes.
-    pub const LOBE_TRANSMISSION: u32 = 2;
-    /// A lobe of [`PRINCIPLED`] materials: that of a clear coat.
-    pub const LOBE_COAT: u32 = 4;
-    /// A lobe of [`PRINCIPLED`] materials: sheen.
-    pub const LOBE_SHEEN: u32 = 8;
-    /// With the lobes of [`PRINCIPLED`] materials: any is anisotropic.
-    pub const LOBE_ANISOTROPY: u32 = 16;
     /// What a clear coat reflects head-on: its index of refraction is 1.5.
     pub const COAT_F0: f32 = 0.04;
     /// The smallest roughness of sheen: a smoother one stands for it.
@@ -100,11 +78,11 @@ constants! {
     pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
 
     /// [`Light::kind`](super::Light::kind), behind the kinds of primitives and instances: light from one point.
-    pub const POINT: u32 = 6;
+    pub const POINT: u32 = KINDS + 1;
     /// [`Light::kind`](super::Light::kind): light from infinitely far away.
-    pub const DIRECTIONAL: u32 = 7;
+    pub const DIRECTIONAL: u32 = KINDS + 2;
     /// [`Light::kind`](super::Light::kind): the image that surrounds the scene.
-    pub const ENVIRONMENT: u32 = 8;
+    pub const ENVIRONMENT: u32 = KINDS + 3;
 
     /// In [`Specialization::surroundings`](super::Specialization::surroundings): an image surrounds the scene.
     pub const IMAGE_AROUND: u32 = 1;
@@ -118,7 +96,7 @@ constants! {
     /// the axes are in the middle of theirs.
     pub const NORMAL_BINS: u32 = 17;
     /// [`Light::kind`](super::Light::kind): a cone of light from one point.
-    pub const SPOT: u32 = 9;
+    pub const SPOT: u32 = KINDS + 4;
     /// [`Material::hidden`]: the camera's rays go through its back.
     pub const HIDDEN_BACK: u32 = 2;
     /// [`Material::vertex_colors`]: colours of vertices do nothing.
@@ -234,7 +212,7 @@ constants! {
     pub const BINS: u32 = 128;
 
     /// No distance of a hit is larger.
-    pub const FAR: f32 = f32::MAX;
+    pub const INFINITE_T: f32 = f32::MAX;
     /// The number of a primitive that is none.
     pub const NO_INDEX: u32 = u32::MAX;
     /// The instance and primitive of a ray's start that is on none.

@@ -3,7 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
+#[cfg(doc)]
 use super::constants::*;
+use super::primitive_kinds::*;
 use super::record::{Field, Record, records, words_of_row};
 
 records! {
@@ -402,7 +404,7 @@ records! {
         pub mesh: u32,
         /// The first of the two rows of the tangents of its first vertex, or [`NO_INDEX`] without tangents.
         pub tangents: u32,
-        /// The offset of its triangles in `Packed::light_leaves`, or [`NO_INDEX`] if none is emissive; 0 without a light tree.
+        /// The offset of its triangles in `Lighting::leaves`, or [`NO_INDEX`] if none is emissive; 0 without a light tree.
         pub leaves: u32,
         /// The row of the color of its first vertex, or [`NO_INDEX`] without vertex colors.
         pub colors: u32,

@@ -1,5 +1,6 @@
 //! Packed meshes: triangles in the order of the leaves of a BVH, vertices in rows.
 
+use bytemuck::cast_slice;
 use glam::{UVec4, Vec3, Vec4};
 
 use super::Node;
@@ -32,17 +33,34 @@ pub struct PackedMesh {
 impl PackedMesh {
     /// Returns its size in bytes.
     pub fn bytes(&self) -> u64 {
-        let lists = [
-            size_of_val(self.nodes.as_slice()),
-            size_of_val(self.triangles.as_slice()),
-            size_of_val(self.vertices.as_slice()),
-            size_of_val(self.attributes.as_slice()),
-            size_of_val(self.tangents.as_slice()),
-            size_of_val(self.colors.as_slice()),
-            size_of_val(self.more_uvs.as_slice()),
-            size_of_val(self.groups.as_slice()),
+        self.lists().map(|bytes| bytes.len() as u64).sum()
+    }
+
+    /// Returns all lists. Every field is named, so that a new one cannot be forgotten.
+    pub fn lists(&self) -> impl Iterator<Item = &[u8]> {
+        let PackedMesh {
+            nodes,
+            triangles,
+            vertices,
+            attributes,
+            tangents,
+            colors,
+            more_uvs,
+            groups,
+            low: _,
+            high: _,
+        } = self;
+        let lists: [&[u8]; 8] = [
+            cast_slice(nodes),
+            cast_slice(triangles),
+            cast_slice(vertices),
+            cast_slice(attributes),
+            cast_slice(tangents),
+            cast_slice(colors),
+            cast_slice(more_uvs),
+            cast_slice(groups),
         ];
-        lists.iter().map(|bytes| *bytes as u64).sum()
+        lists.into_iter()
     }
 
     /// Returns its largest absolute coordinate.

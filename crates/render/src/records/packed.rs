@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use bytemuck::cast_slice;
 use glam::{DVec3, Vec4};
 use wgray_scene::Integrator;
 
@@ -25,7 +26,26 @@ pub struct Packed {
     pub primitives: Vec<Primitive>,
     /// The bounding sphere of each primitive.
     pub bounds: Vec<Sphere>,
-    /// The BVH over all instances of meshes, and over the bounded primitives where these are many.
+    /// The BVH over instances of meshes and primitives.
+    pub bvh: PackedBvh,
+    /// The materials of the scene, then one for each area light.
+    pub materials: Vec<Material>,
+    /// The lights and emitters.
+    pub lighting: Lighting,
+    /// The numbers and positions of all records.
+    pub counts: Counts,
+    /// The textures.
+    pub textures: PackedTextures,
+    /// The samples of pixels.
+    pub sampling: Sampling,
+    /// The constants of the kernel.
+    pub specialization: Specialization,
+}
+
+/// The BVH over all instances of meshes, and over the bounded primitives where these are many.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PackedBvh {
+    /// Its nodes.
     pub nodes: Vec<Node>,
     /// The contents of its leaves, in their order.
     pub items: Vec<Item>,
@@ -35,40 +55,49 @@ pub struct Packed {
     pub meshes: Vec<Arc<PackedMesh>>,
     /// The material of each group of each instance, and [`NO_SHADOW`].
     pub group_words: Vec<u32>,
-    /// The materials of the scene, then one for each area light.
-    pub materials: Vec<Material>,
-    /// The lights, rectangles first; each refers to its primitive. Under the integrator `path` every emissive primitive is one.
+}
+
+/// The lights and emitters of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Lighting {
+    /// The lights, rectangles first; each refers to its primitive. If the integrator needs emitters, every emissive primitive is one.
     pub lights: Vec<Light>,
-    /// Under the integrator `path`, the table from which emitters are sampled.
+    /// The table from which emitters are sampled, if the integrator needs it.
     pub emitters: Vec<Emitter>,
     /// The light tree, which is a single emitter of the table; empty if there are few emitters.
-    pub light_nodes: Vec<LightNode>,
+    pub nodes: Vec<LightNode>,
     /// The leaf of each primitive and of each triangle of emissive instances in the light tree, encoded as [`LightNode::parent`]; else [`NO_INDEX`].
-    pub light_leaves: Vec<u32>,
-    /// The numbers and positions of all records.
-    pub counts: Counts,
-    /// The texture lookups of materials.
+    pub leaves: Vec<u32>,
+}
+
+/// The textures of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PackedTextures {
+    /// The lookups of materials.
     pub lookups: Vec<Lookup>,
     /// The textures of these lookups.
-    pub textures: Vec<Texture>,
+    pub records: Vec<Texture>,
     /// Their images: tables of offsets, and texels.
     pub texels: Vec<u32>,
+}
+
+/// The samples of pixels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sampling {
     /// The bins of the pixel filter; empty if it is the box of the pixel.
     pub filter_table: Vec<Vec4>,
     /// The number of samples per pixel; under adaptive sampling the maximum.
     pub pixel_samples: u32,
     /// True if sampling is adaptive.
     pub adaptive: bool,
-    /// The constants of the kernel.
-    pub specialization: Specialization,
 }
 
 impl Packed {
     /// Returns the number of light samples per hit over all lights; a point or directional light counts as one. Under the integrator `path` it is one
     /// for all lights.
     pub fn light_samples(&self) -> u64 {
-        if self.integrator == Integrator::Path {
-            return u64::from(!self.emitters.is_empty());
+        if self.integrator.needs_emitters() {
+            return u64::from(!self.lighting.emitters.is_empty());
         }
         let (area_lights, lights) = (self.counts.lights.x, self.counts.lights.y);
         u64::from(area_lights) * u64::from(self.specialization.light_samples) + u64::from(lights - area_lights)
@@ -77,14 +106,14 @@ impl Packed {
     /// Returns the number of emitters that the path tracer samples: lights, emissive surfaces, the environment.
     pub fn emitter_count(&self) -> u64 {
         // A light tree is a single entry of the table.
-        let in_tree = self.light_leaves.iter().filter(|leaf| **leaf != NO_INDEX).count();
-        self.emitters.len().saturating_sub(usize::from(in_tree > 0)) as u64 + in_tree as u64
+        let in_tree = self.lighting.leaves.iter().filter(|leaf| **leaf != NO_INDEX).count();
+        self.lighting.emitters.len().saturating_sub(usize::from(in_tree > 0)) as u64 + in_tree as u64
     }
 
-    /// Returns the scene with layers in its film. Only the integrator `path` has layers; others ignore it.
+    /// Returns the scene with layers in its film. Integrators without layers ignore it.
     #[must_use]
     pub fn with_layers(mut self) -> Packed {
-        self.specialization.layers = (self.integrator == Integrator::Path).into();
+        self.specialization.layers = self.integrator.has_layers().into();
         self
     }
 
@@ -97,37 +126,75 @@ impl Packed {
 
     /// Returns the size of all BVHs in bytes.
     pub fn tree_bytes(&self) -> u64 {
-        let of_meshes = self.meshes.iter().map(|mesh| size_of_val(mesh.nodes.as_slice()));
-        let own = size_of_val(self.nodes.as_slice()) + size_of_val(self.items.as_slice());
+        let of_meshes = self.bvh.meshes.iter().map(|mesh| size_of_val(mesh.nodes.as_slice()));
+        let own = size_of_val(self.bvh.nodes.as_slice()) + size_of_val(self.bvh.items.as_slice());
         (own + of_meshes.sum::<usize>()) as u64
     }
 
     /// Returns the size of texels and of the sampling tables of environment maps in bytes.
     pub fn texel_bytes(&self) -> u64 {
-        size_of_val(self.texels.as_slice()) as u64
+        size_of_val(self.textures.texels.as_slice()) as u64
     }
 
     /// Returns the size of all records in bytes.
     pub fn bytes(&self) -> u64 {
-        let lists = [
-            size_of_val(self.primitives.as_slice()),
-            size_of_val(self.bounds.as_slice()),
-            size_of_val(self.nodes.as_slice()),
-            size_of_val(self.items.as_slice()),
-            size_of_val(self.instances.as_slice()),
-            size_of_val(self.group_words.as_slice()),
-            size_of_val(self.materials.as_slice()),
-            size_of_val(self.lights.as_slice()),
-            size_of_val(self.emitters.as_slice()),
-            size_of_val(self.light_nodes.as_slice()),
-            size_of_val(self.light_leaves.as_slice()),
-            size_of_val(self.lookups.as_slice()),
-            size_of_val(self.textures.as_slice()),
-            size_of_val(self.texels.as_slice()),
-            size_of_val(self.filter_table.as_slice()),
+        let of_meshes = self.bvh.meshes.iter().map(|mesh| mesh.bytes());
+        of_meshes.sum::<u64>() + self.lists().map(|bytes| bytes.len() as u64).sum::<u64>()
+    }
+
+    /// Returns the records of all lists but those of meshes. Every field is named, so that a new one cannot be forgotten.
+    pub fn lists(&self) -> impl Iterator<Item = &[u8]> {
+        let Packed {
+            origin: _,
+            camera: _,
+            integrator: _,
+            environment: _,
+            primitives,
+            bounds,
+            bvh,
+            materials,
+            lighting,
+            counts: _,
+            textures,
+            sampling,
+            specialization: _,
+        } = self;
+        let PackedBvh {
+            nodes,
+            items,
+            instances,
+            meshes: _,
+            group_words,
+        } = bvh;
+        let PackedTextures {
+            lookups,
+            records,
+            texels,
+        } = textures;
+        let Lighting {
+            lights,
+            emitters,
+            nodes: light_nodes,
+            leaves,
+        } = lighting;
+        let lists: [&[u8]; 15] = [
+            cast_slice(primitives),
+            cast_slice(bounds),
+            cast_slice(nodes),
+            cast_slice(items),
+            cast_slice(instances),
+            cast_slice(group_words),
+            cast_slice(materials),
+            cast_slice(lights),
+            cast_slice(emitters),
+            cast_slice(light_nodes),
+            cast_slice(leaves),
+            cast_slice(lookups),
+            cast_slice(records),
+            cast_slice(texels),
+            cast_slice(&sampling.filter_table),
         ];
-        let of_meshes = self.meshes.iter().map(|mesh| mesh.bytes());
-        of_meshes.sum::<u64>() + lists.iter().map(|bytes| *bytes as u64).sum::<u64>()
+        lists.into_iter()
     }
 
     /// Returns true if the image has alpha, that is, a transparent background.
@@ -138,60 +205,30 @@ impl Packed {
     /// Returns the form of its film.
     pub fn form(&self) -> Form {
         Form {
-            adaptive: self.adaptive,
+            adaptive: self.sampling.adaptive,
             layers: self.specialization.layers != 0,
         }
     }
 
     /// Returns true if another scene differs in the camera only.
     pub fn same_but_camera(&self, other: &Packed) -> bool {
-        let Packed {
-            origin,
-            camera: _,
-            integrator,
-            environment,
-            primitives,
-            bounds,
-            nodes,
-            items,
-            instances,
-            meshes,
-            group_words,
-            materials,
-            lights,
-            emitters,
-            light_nodes,
-            light_leaves,
-            counts,
-            lookups,
-            textures,
-            texels,
-            filter_table,
-            pixel_samples,
-            adaptive,
-            specialization,
-        } = self;
-        let same_meshes = || {
-            let mut pairs = meshes.iter().zip(&other.meshes);
-            meshes.len() == other.meshes.len() && pairs.all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
+        let plain = |scene: &Packed| {
+            let Sampling {
+                pixel_samples,
+                adaptive,
+                ..
+            } = scene.sampling;
+            (
+                (scene.origin, scene.integrator, pixel_samples, adaptive),
+                (scene.environment, scene.counts, scene.specialization),
+            )
         };
-        (origin, environment, counts, specialization)
-            == (&other.origin, &other.environment, &other.counts, &other.specialization)
-            && (primitives, bounds, materials, lights, emitters)
-                == (
-                    &other.primitives,
-                    &other.bounds,
-                    &other.materials,
-                    &other.lights,
-                    &other.emitters,
-                )
-            && (light_nodes, light_leaves) == (&other.light_nodes, &other.light_leaves)
-            && (lookups, textures, texels, filter_table)
-                == (&other.lookups, &other.textures, &other.texels, &other.filter_table)
-            && (integrator, pixel_samples, adaptive) == (&other.integrator, &other.pixel_samples, &other.adaptive)
-            && (nodes, items, instances, group_words)
-                == (&other.nodes, &other.items, &other.instances, &other.group_words)
-            && same_meshes()
+        let (meshes, others) = (&self.bvh.meshes, &other.bvh.meshes);
+        let mut pairs = meshes.iter().zip(others);
+        plain(self) == plain(other)
+            && self.lists().eq(other.lists())
+            && meshes.len() == others.len()
+            && pairs.all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
     }
 
     /// Returns the kinds of primitives in the scene, each with the range of its primitives.

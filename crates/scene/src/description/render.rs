@@ -10,39 +10,9 @@ use serde::de::{Deserializer, Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use super::integrator::Integrator;
 use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
-use crate::limits::{DEEPEST, MOST};
-
-/// A light transport algorithm. In a file the names are in snake case: `"path"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Integrator {
-    /// Direct light and Phong's reflection model, the formula in the scene format's page.
-    Phong,
-    /// Paths of light from surface to surface.
-    Path,
-}
-
-impl Integrator {
-    /// All of them.
-    pub const ALL: [Integrator; 2] = [Integrator::Phong, Integrator::Path];
-
-    /// The name in files and options.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Integrator::Phong => "phong",
-            Integrator::Path => "path",
-        }
-    }
-
-    /// The fewest and the most bounces of a path.
-    pub fn depths(self) -> (u32, u32) {
-        match self {
-            Integrator::Phong => (1, 64),
-            Integrator::Path => (0, DEEPEST),
-        }
-    }
-}
+use crate::limits::MOST;
 
 /// Whether glass casts shadows. In a file the names are in snake case: `"opaque"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -206,10 +176,7 @@ impl SamplesDescription {
 
     /// Returns the pattern: its own, else `"sobol"` under `"path"` and `"grid"` under `"phong"`.
     pub fn pattern(&self, integrator: Integrator) -> Pattern {
-        self.pattern.unwrap_or(match integrator {
-            Integrator::Phong => Pattern::Grid,
-            Integrator::Path => Pattern::Sobol,
-        })
+        self.pattern.unwrap_or(integrator.pattern())
     }
 }
 

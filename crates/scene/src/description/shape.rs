@@ -22,6 +22,8 @@ tagged! {
         "ellipsoid" => Ellipsoid(EllipsoidDescription),
         /// A sphere.
         "sphere" => Sphere(SphereDescription),
+        /// A cylinder with caps.
+        "cylinder" => Cylinder(CylinderDescription),
         /// A triangle.
         "triangle" => Triangle(TriangleDescription),
         /// Four triangles.
@@ -169,6 +171,40 @@ impl SphereDescription {
             material: material.into(),
             center: center.into(),
             radius,
+        }
+    }
+}
+
+/// A cylinder with caps.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderDescription {
+    /// Name of its material.
+    pub material: String,
+    /// The center of the cap where the texture coordinate v is 0.
+    #[schemars(with = "Point")]
+    pub start: DVec3,
+    /// The center of the cap where v is 1.
+    #[schemars(with = "Point")]
+    pub end: DVec3,
+    /// Its radius.
+    #[schemars(with = "Length")]
+    pub radius: f64,
+    /// Direction from the axis in which the texture coordinate u is 0; any length. If absent, x, or y where the axis is nearly along x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vector>")]
+    pub tangent: Option<DVec3>,
+}
+
+impl CylinderDescription {
+    /// A cylinder of this material, centers of the caps, and radius.
+    pub fn new(material: impl Into<String>, start: impl Into<DVec3>, end: impl Into<DVec3>, radius: f64) -> Self {
+        Self {
+            material: material.into(),
+            start: start.into(),
+            end: end.into(),
+            radius,
+            tangent: None,
         }
     }
 }

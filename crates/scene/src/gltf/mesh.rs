@@ -15,23 +15,9 @@ use super::node::{Nodes, Pose};
 use super::skin::Skin;
 use super::tangent::{generated, unturned};
 use super::texture::LAST_SET;
+use super::vertices::{Frames, Source, attribute};
 use super::{Damage, LONGEST_AXIS};
 use crate::mesh::{Draft, Group, MAX_COORDINATE, Mesh, unit};
-
-/// The most vertices of a mesh, those among them that no triangle has.
-const MOST_VERTICES: usize = 1 << 27;
-
-/// The sets of texture coordinates by their names.
-const TEXCOORDS: [&str; LAST_SET as usize + 1] = [
-    "TEXCOORD_0",
-    "TEXCOORD_1",
-    "TEXCOORD_2",
-    "TEXCOORD_3",
-    "TEXCOORD_4",
-    "TEXCOORD_5",
-    "TEXCOORD_6",
-    "TEXCOORD_7",
-];
 
 /// What tells meshes apart.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -357,33 +343,6 @@ impl<'a> Meshes<'a> {
     }
 }
 
-/// Takes a vertex where a map does. Normals go by the map's cofactors, which flat maps have too.
-fn carry(
-    map: &DAffine3,
-    i: usize,
-    positions: &mut [DVec3],
-    normals: Option<&mut Vec<Vec3>>,
-    tangents: Option<&mut Vec<Vec4>>,
-) {
-    let DMat3 { x_axis, y_axis, z_axis } = map.matrix3;
-    positions[i] = map.transform_point3(positions[i]);
-    if let Some(normals) = normals {
-        let cofactors = DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis));
-        normals[i] = unit(cofactors * normals[i].as_dvec3());
-    }
-    if let Some(tangents) = tangents {
-        let along = unit(map.matrix3 * tangents[i].truncate().as_dvec3());
-        let side = if map.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
-        tangents[i] = along.extend(tangents[i].w * side);
-    }
-}
-
-/// The accessor of an attribute, if it is there.
-fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<usize> {
-    let accessor = primitive.attributes.get(&Checked::Valid(semantic));
-    accessor.map(|accessor| accessor.value())
-}
-
 /// A mesh that is being made of its primitives' vertices.
 #[derive(Default)]
 struct Whole {
@@ -407,166 +366,84 @@ impl Whole {
         key: &Key,
         skin: Option<&Skin>,
     ) -> Result<usize, GltfError> {
-        let (document, primitive) = (meshes.document, part.primitive);
-        let strange = |name: &'static str, is_finite: bool| {
-            if !is_finite {
-                meshes.is_strange(&part.place, name);
-            }
-        };
-        let mut accessors = accessors(primitive);
+        let mut accessors = accessors(part.primitive);
         accessors.push(usize::from(used.tangents.is_some()));
-        // What is turned differently is not the same.
+        // Rotated tangents make other vertices.
         let is_plain = used.tangents.as_ref().is_none_or(|slot| !slot.is_turned());
         if let Some(first) = self.known.get(&accessors).filter(|_| is_plain) {
             return Ok(*first);
         }
-        let fault = |key: &str, rule: String| document.fault(format!("{}.{key}", part.place), rule);
-        let read = |semantic: Semantic| attribute(primitive, semantic);
         let first = self.draft.positions.len();
-        let Some(positions) = read(Semantic::Positions) else {
+        let report = |name: &'static str| meshes.is_strange(&part.place, name);
+        let Some(source) = Source::of(meshes.document, (part.primitive, &part.place), &report, first)? else {
             return Ok(first);
         };
-        let mut positions: Vec<Vec3> = document
-            .vectors::<3>(positions)?
-            .into_iter()
-            .map(Vec3::from_array)
-            .collect();
-        let count = positions.len();
-        if first + count > MOST_VERTICES {
-            let rule = format!("all primitives of a mesh together must have at most {MOST_VERTICES} vertices");
-            return Err(fault("attributes.POSITION", rule));
-        }
-        let same = |name: &str, other: usize| match other == count {
-            true => Ok(()),
-            false => Err(fault(
-                &format!("attributes.{name}"),
-                format!("has {other} elements; POSITION has {count}"),
-            )),
-        };
-        let triples = |name: &str, accessor: Option<usize>| -> Result<Option<Vec<Vec3>>, GltfError> {
-            let Some(accessor) = accessor else { return Ok(None) };
-            let vectors = document.vectors::<3>(accessor)?;
-            same(name, vectors.len())?;
-            Ok(Some(vectors.into_iter().map(Vec3::from_array).collect()))
-        };
-        let mut normals = triples("NORMAL", read(Semantic::Normals))?;
-        strange("NORMAL", normals.iter().flatten().all(|normal| normal.is_finite()));
-        let tangents = read(Semantic::Tangents).filter(|_| used.tangents.is_some() && normals.is_some());
-        let mut tangents = match tangents {
-            None => None,
-            Some(accessor) => {
-                let vectors = document.vectors::<4>(accessor)?;
-                same("TANGENT", vectors.len())?;
-                strange("TANGENT", vectors.as_flattened().iter().all(|x| x.is_finite()));
-                Some(vectors.into_iter().map(Vec4::from_array).collect::<Vec<Vec4>>())
-            }
-        };
-        for (target, weight) in primitive.targets.iter().flatten().zip(key.weights(document)) {
-            if weight == 0.0 {
-                continue;
-            }
-            let moved = |accessor: Option<usize>| triples("targets", accessor);
-            if let Some(moves) = moved(target.positions.map(|accessor| accessor.value()))? {
-                positions.iter_mut().zip(moves).for_each(|(p, d)| *p += d * weight);
-            }
-            if let Some((normals, moves)) = normals
-                .as_mut()
-                .zip(moved(target.normals.map(|accessor| accessor.value()))?)
-            {
-                normals.iter_mut().zip(moves).for_each(|(n, d)| *n += d * weight);
-            }
-            if let Some((tangents, moves)) = tangents
-                .as_mut()
-                .zip(moved(target.tangents.map(|accessor| accessor.value()))?)
-            {
-                (tangents.iter_mut().zip(moves)).for_each(|(t, d)| *t += (d * weight).extend(0.0));
-            }
-        }
-        let mut placed: Vec<DVec3> = positions.into_iter().map(|p| p.as_dvec3()).collect();
-        if let Some(skin) = skin {
-            let maps = skin.maps(document, primitive, &part.place, count)?;
-            for (i, map) in maps.iter().enumerate() {
-                carry(map, i, &mut placed, normals.as_mut(), tangents.as_mut());
-            }
-        }
-        if let Some(map) = key.flat() {
-            (0..count).for_each(|i| carry(&map, i, &mut placed, normals.as_mut(), tangents.as_mut()));
-        }
-        for (i, position) in placed.iter_mut().enumerate() {
-            if !(position.is_finite() && position.abs().max_element() <= MAX_COORDINATE) {
-                *position = DVec3::ZERO;
-                self.unplaced.insert(first + i);
-            }
-        }
-        self.draft.positions.extend(placed.iter().map(|p| *p + DVec3::ZERO));
-        if let Some(normals) = normals {
-            self.draft.normals.resize(first, Vec3::ZERO);
-            self.draft
-                .normals
-                .extend(normals.into_iter().map(|normal| unit(normal.as_dvec3())));
-        }
-        if let Some(tangents) = tangents {
-            self.draft.tangents.resize(first, Vec4::ZERO);
-            let normals = &self.draft.normals[first..];
-            let slot = used.tangents.as_ref();
-            let along = tangents.into_iter().zip(normals).map(|(tangent, normal)| {
-                let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
-                let tangent = unit(tangent.truncate().as_dvec3()).extend(side);
-                slot.map_or(tangent, |slot| unturned(tangent, *normal, slot))
-            });
-            let along = along.map(|tangent| {
-                if tangent.truncate() == Vec3::ZERO {
-                    Vec4::ZERO
-                } else {
-                    tangent
-                }
-            });
-            self.draft.tangents.extend(along);
-        }
-        for set in 0..=LAST_SET {
-            let Some(accessor) = read(Semantic::TexCoords(set)) else {
-                continue;
-            };
-            let vectors = document.vectors::<2>(accessor)?;
-            same(&format!("TEXCOORD_{set}"), vectors.len())?;
-            let set = set as usize;
-            strange(TEXCOORDS[set], vectors.as_flattened().iter().all(|x| x.is_finite()));
-            if self.uvs.len() <= set {
-                self.uvs.resize(set + 1, Vec::new());
-            }
-            let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
-            self.uvs[set].resize(first, Vec2::ZERO);
-            // An image's first row is at v = 0 there, and at v = 1 here.
-            let turned = vectors.into_iter().map(|[u, v]| Vec2::new(finite(u), 1.0 - finite(v)));
-            self.uvs[set].extend(turned);
-        }
-        if let Some(accessor) = read(Semantic::Colors(0)) {
-            let colors: Vec<Vec4> = match document.components(accessor)? {
-                3 => document
-                    .vectors::<3>(accessor)?
-                    .into_iter()
-                    .map(|[r, g, b]| Vec4::new(r, g, b, 1.0))
-                    .collect(),
-                _ => document
-                    .vectors::<4>(accessor)?
-                    .into_iter()
-                    .map(Vec4::from_array)
-                    .collect(),
-            };
-            same("COLOR_0", colors.len())?;
-            strange("COLOR_0", colors.iter().all(|color| color.is_finite()));
-            let inside = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
+        let mut frames = source.frames(used.tangents.is_some())?;
+        frames.morph(&source, &key.weights(meshes.document))?;
+        let positions = frames.place(&source, skin, key.flat())?;
+        self.add_positions(first, positions);
+        self.add_frames(first, frames, used);
+        self.add_uvs(first, &source)?;
+        if let Some(colors) = source.colors()? {
             self.draft.colors.resize(first, Vec4::ONE);
-            let colors = colors
-                .into_iter()
-                .map(|color| Vec4::from_array(color.to_array().map(inside)));
             self.draft.colors.extend(colors);
         }
         if is_plain {
             self.known.insert(accessors, first);
         }
-        self.counts.insert(first, count);
+        self.counts.insert(first, source.count());
         Ok(first)
+    }
+
+    /// Adds positions; vertices that are not finite or too far away are at the origin, without triangles.
+    fn add_positions(&mut self, first: usize, mut positions: Vec<DVec3>) {
+        for (i, position) in positions.iter_mut().enumerate() {
+            if !(position.is_finite() && position.abs().max_element() <= MAX_COORDINATE) {
+                *position = DVec3::ZERO;
+                self.unplaced.insert(first + i);
+            }
+        }
+        self.draft.positions.extend(positions.iter().map(|p| *p + DVec3::ZERO));
+    }
+
+    fn add_frames(&mut self, first: usize, frames: Frames, used: &Used) {
+        if let Some(normals) = frames.normals {
+            self.draft.normals.resize(first, Vec3::ZERO);
+            self.draft
+                .normals
+                .extend(normals.into_iter().map(|normal| unit(normal.as_dvec3())));
+        }
+        if let Some(tangents) = frames.tangents {
+            self.draft.tangents.resize(first, Vec4::ZERO);
+            let normals = &self.draft.normals[first..];
+            let slot = used.tangents.as_ref();
+            let tangents = tangents.into_iter().zip(normals).map(|(tangent, normal)| {
+                let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+                let tangent = unit(tangent.truncate().as_dvec3()).extend(side);
+                let tangent = slot.map_or(tangent, |slot| unturned(tangent, *normal, slot));
+                match tangent.truncate() == Vec3::ZERO {
+                    true => Vec4::ZERO,
+                    false => tangent,
+                }
+            });
+            self.draft.tangents.extend(tangents);
+        }
+    }
+
+    fn add_uvs(&mut self, first: usize, source: &Source) -> Result<(), GltfError> {
+        for set in 0..=LAST_SET {
+            let Some(vectors) = source.uvs(set)? else { continue };
+            let set = set as usize;
+            if self.uvs.len() <= set {
+                self.uvs.resize(set + 1, Vec::new());
+            }
+            let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
+            self.uvs[set].resize(first, Vec2::ZERO);
+            // The first row of an image is at v = 0 in glTF, and at v = 1 here.
+            let uvs = vectors.into_iter().map(|[u, v]| Vec2::new(finite(u), 1.0 - finite(v)));
+            self.uvs[set].extend(uvs);
+        }
+        Ok(())
     }
 
     /// The vertices of a primitive with tangents, made where its material needs some and the file has none. Then the vertices are

@@ -33,6 +33,7 @@ mod skin;
 mod tangent;
 mod texture;
 mod uri;
+mod vertices;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;

@@ -462,7 +462,7 @@ impl Overrides {
             scene.camera = scene.camera_at(frame)?;
         }
         // The count may be the default, and yet somebody asked for it.
-        let is_asked = self.light_samples.is_some() && scene.render.integrator == Integrator::Path;
+        let is_asked = self.light_samples.is_some() && scene.render.integrator.follows_paths();
         if is_asked && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
             scene.notes.push(LIGHT_SAMPLES.into());
         }

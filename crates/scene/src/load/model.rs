@@ -160,7 +160,10 @@ pub(super) fn scene(
 
 /// Returns the light of models that have none. The camera sees gray instead of the studio, unless an environment is selected.
 pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, SceneError> {
-    if overrides.integrator == Some(Integrator::Phong) {
+    if overrides
+        .integrator
+        .is_some_and(|integrator| !integrator.needs_emitters())
+    {
         let rule = "phong does not support environment light, and this model has no other light; use path";
         return Err(SceneError::Override(Problem::of("integrator", rule)));
     }

@@ -235,7 +235,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[[shapes]]\n[[shapes]]",
             1,
-            "shapes[0].type is missing; it must be one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\", \"mesh\", \"gltf\"",
+            "shapes[0].type is missing; it must be one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"cylinder\", \"triangle\", \"tetrahedron\", \"plane\", \"mesh\", \"gltf\"",
         ),
         (
             "[[lights]]\ntype = 'directional'\ndirection = [0, 0, 1]\ncolor = [1, 1, 1]\n[[lights]]\ntype = 'point'\nvertex = 3",

@@ -14,9 +14,9 @@ const ROUGHNESS: f64 = 0.5;
 /// Returns the materials of meshes without and with colors of vertices. `phong` ignores these.
 pub(super) fn default_materials(integrator: Integrator) -> [Material; 2] {
     [false, true].map(|has_colors| Material {
-        reflection: match integrator {
-            Integrator::Phong => phong(),
-            Integrator::Path => Reflection::Principled(Box::new(principled(has_colors))),
+        reflection: match integrator.follows_paths() {
+            false => phong(),
+            true => Reflection::Principled(Box::new(principled(has_colors))),
         },
         emission: Color::BLACK,
         normal_map: None,

@@ -25,7 +25,7 @@ pub(super) fn environment(
 ) -> Checked<Option<Environment>> {
     let background = description.render.background;
     let environment = match &description.environment {
-        None if integrator == Integrator::Phong => return Ok(None),
+        None if !integrator.needs_emitters() => return Ok(None),
         None => plain(background),
         Some(environment) => {
             needs_path(integrator)?;

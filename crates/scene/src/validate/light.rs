@@ -1,12 +1,32 @@
-//! The rules of spot lights.
+//! From descriptions of lights to lights.
 
 use glam::DVec3;
 
 use super::super::limits::{CONES, LENGTHS};
-use super::super::{Light, SpotLightDescription};
+use super::super::{Light, LightDescription, SpotLightDescription};
+use super::shape::rectangle;
 use super::{At, Checked, Problem, between, check, color, number, point, show, unit};
 
-pub(super) fn spot(light: &SpotLightDescription) -> Checked<Light> {
+pub(in super::super) fn light(description: &LightDescription) -> Checked<Light> {
+    Ok(match description {
+        LightDescription::Spot(light) => return spot(light),
+        LightDescription::Rectangle(light) => Light::Rectangle {
+            rectangle: rectangle(light.center, light.size, light.normal, light.tangent)?,
+            color: color(light.color).at("color")?,
+            visible: light.visible,
+        },
+        LightDescription::Point(light) => Light::Point {
+            position: point(light.position).at("position")?,
+            color: color(light.color).at("color")?,
+        },
+        LightDescription::Directional(light) => Light::Directional {
+            direction: unit(light.direction).at("direction")?,
+            color: color(light.color).at("color")?,
+        },
+    })
+}
+
+fn spot(light: &SpotLightDescription) -> Checked<Light> {
     let position = point(light.position).at("position")?;
     let direction = direction(light, position)?;
     let cone = between(light.cone_angle, CONES).at("cone_angle")?;

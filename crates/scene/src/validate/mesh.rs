@@ -24,7 +24,7 @@ use crate::mesh::{Group, Mesh, Normals};
 const MOST_GROUPS: usize = 1 << 24;
 
 /// What shapes name: the scene's materials, and files.
-pub(super) struct Known<'a> {
+pub(super) struct SceneLookup<'a> {
     pub names: &'a BTreeMap<&'a str, usize>,
     pub looks: Looks<'a>,
     pub assets: &'a Assets,
@@ -33,7 +33,7 @@ pub(super) struct Known<'a> {
     pub suggestions: Suggestions,
 }
 
-impl Known<'_> {
+impl SceneLookup<'_> {
     /// The index of a material of the scene.
     pub fn material(&self, name: &str) -> Checked<usize> {
         let unknown = || Problem::new(self.suggestions.unknown("material", name, self.names.keys().copied()));
@@ -60,7 +60,12 @@ struct Placement<'a> {
 
 impl<'a> NamedMesh<'a> {
     /// Reads a mesh of `[meshes.NAME]`. If that fails, its problem is kept.
-    pub fn read(description: &'a MeshFileDescription, name: &str, known: &mut Known, found: &mut Collector) -> Self {
+    pub fn read(
+        description: &'a MeshFileDescription,
+        name: &str,
+        known: &mut SceneLookup,
+        found: &mut Collector,
+    ) -> Self {
         let mesh = load(&description.file, description.normals, known).at(name);
         NamedMesh {
             mesh: found.value(mesh).flatten(),
@@ -70,7 +75,7 @@ impl<'a> NamedMesh<'a> {
 }
 
 /// A shape of type `mesh`.
-pub(super) fn mesh(shape: &MeshDescription, known: &mut Known) -> Checked<Option<Shape>> {
+pub(super) fn mesh(shape: &MeshDescription, known: &mut SceneLookup) -> Checked<Option<Shape>> {
     let mesh = load(&shape.file, shape.normals, known)?;
     let placement = Placement {
         material: shape.material.as_ref(),
@@ -87,7 +92,7 @@ pub(super) fn mesh(shape: &MeshDescription, known: &mut Known) -> Checked<Option
 pub(super) fn instance(
     instance: &InstanceDescription,
     meshes: &BTreeMap<&str, NamedMesh<'_>>,
-    known: &mut Known,
+    known: &mut SceneLookup,
 ) -> Checked<Option<Shape>> {
     let name = &instance.mesh;
     let unknown = || Problem::new(known.suggestions.unknown("mesh", name, meshes.keys().copied()));
@@ -143,7 +148,7 @@ pub(super) fn notes(
 }
 
 /// Returns a mesh; `None` if no files are read.
-fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Option<Arc<Mesh>>> {
+fn load(file: &str, normals: Option<Normals>, known: &mut SceneLookup) -> Checked<Option<Arc<Mesh>>> {
     if let Some(mesh) = known.assets.meshes.get(file) {
         return match mesh.broken_rule() {
             None => Ok(Some(Arc::clone(mesh))),
@@ -173,7 +178,7 @@ fn placed(
     up: Up,
     file: &str,
     placement: &Placement,
-    known: &mut Known,
+    known: &mut SceneLookup,
 ) -> Checked<Option<Shape>> {
     let map = self::placement(placement.translate, placement.rotate, placement.scale, placement.matrix)?;
     let Some(mesh) = mesh else {
@@ -218,7 +223,7 @@ fn placed(
 }
 
 /// For each group of a mesh the index of its material: what the scene says, else what the mesh's own file does.
-fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Known) -> Checked<Vec<usize>> {
+fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut SceneLookup) -> Checked<Vec<usize>> {
     let named = |name: &String| -> Checked<usize> {
         let index = known.material(name)?;
         check(

@@ -12,6 +12,7 @@ mod mesh;
 mod mtl;
 mod path;
 mod principled;
+mod shape;
 
 use crate::note::Note;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,8 +21,10 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use self::appearance::{Images, Textures};
-use self::mesh::{Known, NamedMesh};
+pub(super) use self::light::light;
+use self::mesh::{NamedMesh, SceneLookup};
 use self::mtl::Looks;
+use self::shape::shape;
 use super::key_path::cut;
 use super::key_path::list;
 use super::limits::{
@@ -30,10 +33,9 @@ use super::limits::{
 use super::problem::{At, Collector, Problem, Problems, both};
 use super::suggest::Suggestions;
 use super::{
-    Adaptive, AdaptiveDescription, Assets, Camera, CameraPath, Color, Description, EllipsoidDescription, Environment,
-    Geometry, ImageDescription, InstanceDescription, Integrator, Light, LightDescription, Material, Parallelogram,
-    Pattern, PixelFilter, PixelFilterDescription, Render, RenderDescription, Samples, SamplesDescription, Scene,
-    Shadows, Shape, ShapeDescription, Texture, ViewSettings,
+    Adaptive, AdaptiveDescription, Assets, Camera, CameraPath, Color, Description, Environment, ImageDescription,
+    InstanceDescription, Integrator, Light, Material, Pattern, PixelFilter, PixelFilterDescription, Render,
+    RenderDescription, Samples, SamplesDescription, Scene, Shadows, Shape, Texture, ViewSettings,
 };
 
 pub(super) use self::appearance::TEXEL_MEMORY;
@@ -106,7 +108,7 @@ impl Description {
         let appearance = both(of_textures.at("textures"), of_materials.end(()).at("materials"));
         let environment = environment::environment(self, integrator, &mut images).at("environment");
         let own = (self.materials.keys().cloned().collect(), materials);
-        let mut known = Known {
+        let mut known = SceneLookup {
             names: &indices,
             looks: Looks::new(own, textures, images, files, integrator),
             assets,
@@ -152,7 +154,7 @@ impl Description {
             mut render,
             lights,
         } = settings;
-        if render.integrator == Integrator::Path {
+        if render.integrator.needs_emitters() {
             render.background = environment
                 .as_ref()
                 .map_or(DVec3::ZERO, |environment| environment.color);
@@ -246,7 +248,7 @@ fn samples(description: &SamplesDescription, integrator: Integrator) -> Checked<
 }
 
 fn render(description: &RenderDescription, integrator: Integrator) -> Result<Render, Problems> {
-    let is_path = integrator == Integrator::Path;
+    let follows_paths = integrator.follows_paths();
     let mut found = Collector::default();
     let ambient = found.or_default(color(description.ambient).at("ambient"));
     let background = found.or_default(color(description.background).at("background"));
@@ -268,10 +270,14 @@ fn render(description: &RenderDescription, integrator: Integrator) -> Result<Ren
     let (_, (((pixel_samples, adaptive), light_samples), filter)) = both(found.end(()), samples)?;
     Ok(Render {
         integrator,
-        ambient: if is_path { DVec3::ZERO } else { ambient },
+        ambient: if follows_paths { DVec3::ZERO } else { ambient },
         background,
         shadow_epsilon,
-        shadows: if is_path { Shadows::Opaque } else { description.shadows },
+        shadows: if follows_paths {
+            Shadows::Opaque
+        } else {
+            description.shadows
+        },
         max_depth,
         rr_depth: rr_depth.unwrap_or(RR_DEPTH),
         clamp,
@@ -351,179 +357,6 @@ fn of_path<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<
     let Some(value) = value else { return Ok(None) };
     path::needs_path(integrator)?;
     check(value).map(Some)
-}
-
-pub(super) fn light(description: &LightDescription) -> Checked<Light> {
-    Ok(match description {
-        LightDescription::Spot(light) => return light::spot(light),
-        LightDescription::Rectangle(light) => Light::Rectangle {
-            rectangle: rectangle(light.center, light.size, light.normal, light.tangent)?,
-            color: color(light.color).at("color")?,
-            visible: light.visible,
-        },
-        LightDescription::Point(light) => Light::Point {
-            position: point(light.position).at("position")?,
-            color: color(light.color).at("color")?,
-        },
-        LightDescription::Directional(light) => Light::Directional {
-            direction: unit(light.direction).at("direction")?,
-            color: color(light.color).at("color")?,
-        },
-    })
-}
-
-/// Returns a shape; `None` if it has a file that is not read.
-fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Option<Shape>> {
-    let (geometry, name) = match description {
-        ShapeDescription::Rectangle(shape) => {
-            let rectangle = rectangle(shape.center, shape.size, shape.normal, shape.tangent)?;
-            (Geometry::Rectangle(rectangle), &shape.material)
-        }
-        ShapeDescription::Disk(shape) => {
-            let center = point(shape.center).at("center")?;
-            let radius = length(shape.radius).at("radius")?;
-            let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
-            let disk = Parallelogram {
-                center,
-                u: tangent * radius,
-                v: bitangent * radius,
-            };
-            (Geometry::Disk(disk), &shape.material)
-        }
-        ShapeDescription::Ellipsoid(shape) => (ellipsoid(shape)?, &shape.material),
-        ShapeDescription::Sphere(shape) => {
-            let center = point(shape.center).at("center")?;
-            let radius = length(shape.radius).at("radius")?;
-            let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * radius);
-            (Geometry::Ellipsoid { center, axes }, &shape.material)
-        }
-        ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
-        ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
-        ShapeDescription::Mesh(shape) => return mesh::mesh(shape, known),
-        // Expanded, unless there are problems.
-        ShapeDescription::Gltf(shape) => {
-            placement(shape.translate, shape.rotate, shape.scale, shape.matrix.as_ref())?;
-            return known.assets.find(&shape.file).at("file").map(|_| None);
-        }
-        ShapeDescription::Plane(shape) => {
-            let point = point(shape.point).at("point")?;
-            let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
-            let plane = Geometry::Plane {
-                point,
-                tangent,
-                bitangent,
-            };
-            (plane, &shape.material)
-        }
-    };
-    let material = known.material(name).at("material")?;
-    let has_tangents = !matches!(geometry, Geometry::Triangles(_));
-    check(
-        has_tangents || known.looks.materials[material].normal_map.is_none(),
-        || format!("{name:?} must have no normal map here, because this shape has no tangents"),
-    )
-    .at("material")?;
-    let textures = known.looks.materials[material].textures();
-    let sets = textures.iter().map(|i| known.looks.textures[*i].uv_set);
-    let set = sets.max().unwrap_or(0);
-    check(set == 0, || {
-        format!("{name:?} must have no texture with uv_set = {set} here, because this shape has only the set 0")
-    })
-    .at("material")?;
-    if let Geometry::Plane { .. } = geometry {
-        let emission = &known.looks.materials[material].emission;
-        let is_dark = path::most(emission, &known.looks.textures) == Some(DVec3::ZERO);
-        check(is_dark, || {
-            format!("{name:?} must not emit light here, because this shape is infinite")
-        })
-        .at("material")?;
-    }
-    Ok(Some(Shape { geometry, material }))
-}
-
-fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3, tangent: Option<DVec3>) -> Checked<Parallelogram> {
-    let center = point(center).at("center")?;
-    let width = length(size[0]).at("size")?;
-    let height = length(size[1]).at("size")?;
-    let (tangent, bitangent) = frame(normal, tangent)?;
-    Ok(Parallelogram {
-        center,
-        u: tangent * (width / 2.0),
-        v: bitangent * (height / 2.0),
-    })
-}
-
-fn ellipsoid(shape: &EllipsoidDescription) -> Checked<Geometry> {
-    let center = point(shape.center).at("center")?;
-    let x = unit(shape.a).at("a")?;
-    let y = unit(shape.b).at("b")?;
-    let z = unit(shape.c).at("c")?;
-    check(x.cross(y).length() > FLATTEST, || {
-        format!("{} must not be parallel to a, {}", show(shape.b), show(shape.a))
-    })
-    .at("b")?;
-    check(x.cross(y).dot(z).abs() > FLATTEST, || {
-        let (a, b, c) = (show(shape.a), show(shape.b), show(shape.c));
-        format!("{c} must not lie in the plane of a and b, {a} and {b}")
-    })
-    .at("c")?;
-    Ok(Geometry::Ellipsoid {
-        center,
-        axes: [shape.a, shape.b, shape.c],
-    })
-}
-
-fn triangle(vertices: [DVec3; 3]) -> Checked<Geometry> {
-    let longest = longest_edge(&vertices)?;
-    let [v0, v1, v2] = vertices;
-    let area = (v1 - v0).cross(v2 - v1).length();
-    check(area > FLATTEST * longest * longest, || {
-        format!("{} must not lie on one line", show_all(&vertices))
-    })?;
-    Ok(Geometry::Triangles(vec![vertices]))
-}
-
-fn tetrahedron(vertices: [DVec3; 4]) -> Checked<Geometry> {
-    let longest = longest_edge(&vertices)?;
-    let [v0, mut v1, mut v2, v3] = vertices;
-    let volume = (v1 - v0).cross(v2 - v0).dot(v3 - v0);
-    check(volume.abs() > FLATTEST * longest.powi(3), || {
-        format!("{} must not lie in one plane", show_all(&vertices))
-    })?;
-    if volume < 0.0 {
-        // Mirrored: without this the faces would look inwards.
-        (v1, v2) = (v2, v1);
-    }
-    let faces = vec![[v0, v2, v1], [v0, v1, v3], [v1, v2, v3], [v0, v3, v2]];
-    Ok(Geometry::Triangles(faces))
-}
-
-/// Checks the vertices one by one, then that they are not all the same.
-fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
-    for (i, &vertex) in vertices.iter().enumerate() {
-        point(vertex).at(i)?;
-    }
-    let from = |a: &DVec3| vertices.iter().map(|b| a.distance(*b)).fold(0.0, f64::max);
-    let longest = vertices.iter().map(from).fold(0.0, f64::max);
-    check(longest >= LENGTHS.0, || {
-        format!("{} must be at least {} apart", show_all(vertices), number(LENGTHS.0))
-    })?;
-    Ok(longest)
-}
-
-/// Returns the unit vectors of u and v: the part of the tangent that is orthogonal to the normal, and normal x tangent. Without a
-/// tangent u is along x, or along y if the normal is nearly along x.
-fn frame(normal: DVec3, tangent: Option<DVec3>) -> Checked<(DVec3, DVec3)> {
-    let n = unit(normal).at("normal")?;
-    let tangent = tangent.unwrap_or(if n.x.abs() < 0.9 { DVec3::X } else { DVec3::Y });
-    let t = unit(tangent).at("tangent")?;
-    let t = t - n * n.dot(t);
-    check(t.length() > FLATTEST, || {
-        format!("{} must not be parallel to the normal, {}", show(tangent), show(normal))
-    })
-    .at("tangent")?;
-    let t = t.normalize();
-    Ok((t, n.cross(t)))
 }
 
 pub(super) fn point(p: DVec3) -> Checked<DVec3> {

@@ -140,9 +140,9 @@ impl<'a> Looks<'a> {
         let material = match self.known.get(&key) {
             Some(material) => *material,
             None => {
-                let material = match self.integrator {
-                    Integrator::Phong => self.phong(own, &library.file, traits.has_uvs),
-                    Integrator::Path => self.principled(own, &library.file, traits),
+                let material = match self.integrator.follows_paths() {
+                    false => self.phong(own, &library.file, traits.has_uvs),
+                    true => self.principled(own, &library.file, traits),
                 };
                 self.names.push(own.name.clone());
                 self.materials.push(material);

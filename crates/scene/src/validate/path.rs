@@ -17,9 +17,7 @@ pub(crate) const LIGHT_SAMPLES: &str =
 
 /// The rule of what only paths have.
 pub(super) fn needs_path(integrator: Integrator) -> Checked<()> {
-    check(integrator == Integrator::Path, || {
-        "needs integrator = \"path\"".to_owned()
-    })
+    check(integrator.follows_paths(), || "needs integrator = \"path\"".to_owned())
 }
 
 /// The largest value that a colour has in each component; of images that is not known.
@@ -41,7 +39,7 @@ pub(super) fn notes(
     (names, materials): (&[String], &[Material]),
     textures: &[Texture],
 ) -> Vec<String> {
-    if integrator != Integrator::Path {
+    if !integrator.follows_paths() {
         return Vec::new();
     }
     let mut notes = Vec::new();

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use super::super::limits::{ABSORPTIONS, BRIGHTEST};
 use super::super::{Camera, Material, Projection, Reflection, SceneError};
 use super::*;
+use crate::{Geometry, Parallelogram};
 
 /// One of everything; every line is there once, so that a test can put another in its place.
 const GOOD: &str = r#"
@@ -477,6 +478,56 @@ fn a_disk_has_the_radii_that_lengths_have() {
     }
     let told = scene("1.1e9", "[0, 0, 1]").unwrap_err();
     assert!(told.contains("shapes[0].radius: 1.1e9 must be"), "{told}");
+}
+
+#[test]
+fn a_cylinder_has_the_radii_and_heights_that_lengths_have() {
+    let scene = |start: f64, end: f64, rest: &str| {
+        let text = format!(
+            "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\
+             materials.m = {{ type = 'mirror' }}\nshapes = [{{ type = 'cylinder', material = 'm', start = [0, 0, {start:?}], \
+             end = [0, 0, {end:?}], {rest} }}]\n"
+        );
+        crate::Scene::parse(&text, "s.toml").map_err(|error| error.to_string())
+    };
+    for radius in [1e-9, 1.0, 1e9] {
+        for height in [1e-9, 1.0, 1e9] {
+            let scene = scene(0.0, height, &format!("radius = {radius:e}")).unwrap();
+            let Geometry::Cylinder {
+                center,
+                axes: [u, v, w],
+            } = scene.shapes[0].geometry
+            else {
+                panic!("a cylinder");
+            };
+            assert_eq!(w, DVec3::Z * height / 2.0);
+            assert_eq!((center, u, v), (w, DVec3::X * radius, DVec3::Y * radius));
+        }
+    }
+    for (start, end, rest, error) in [
+        (
+            1.0,
+            1.0,
+            "radius = 1",
+            "shapes[0].end: [0, 0, 1] must be at least 1e-9 from the start, [0, 0, 1]",
+        ),
+        (
+            0.0,
+            1.0,
+            "radius = 0",
+            "shapes[0].radius: 0 must be finite and greater than 0",
+        ),
+        (
+            0.0,
+            1.0,
+            "radius = 1, tangent = [0, 0, 2]",
+            "shapes[0].tangent: [0, 0, 2] must not be parallel to the axis, [0, 0, 1]",
+        ),
+        (f64::NAN, 1.0, "radius = 1", "shapes[0].start: "),
+    ] {
+        let message = scene(start, end, rest).unwrap_err();
+        assert!(message.contains(error), "{message}");
+    }
 }
 
 /// Returns the messages of a text, line by line.

@@ -34,8 +34,8 @@ use crate::cpu::texture::appearance;
 use crate::cpu::thin::thin_reflectance;
 use crate::cpu::vertices::with_vertex_colors;
 use crate::records::{
-    BACKGROUND, DIFFUSE, EMITTER, FAR, GLASS, IMAGE_AROUND, INSTANCE, METAL, MOST_PASSED, Material, NO_INDEX, NOWHERE,
-    OPAQUE, PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN, UNSEEN_AROUND,
+    BACKGROUND, DIFFUSE, EMITTER, GLASS, IMAGE_AROUND, INFINITE_T, INSTANCE, METAL, MOST_PASSED, Material, NO_INDEX,
+    NOWHERE, OPAQUE, PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN, UNSEEN_AROUND,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -417,7 +417,7 @@ pub fn with_light(
         power_heuristic(light.pdf, reflected.pdf)
     };
     let most = largest(found);
-    let dark = !(wanted && most > 0.0 && most < FAR);
+    let dark = !(wanted && most > 0.0 && most < INFINITE_T);
     if scene.specialization.sees_through != 0 {
         let bounce = state.path.depth + 1;
         let (reach, goal) = (light.reach, light.primitive);

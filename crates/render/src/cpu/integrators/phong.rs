@@ -98,11 +98,11 @@ pub fn radiance_from(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: U
     let look = appearance(scene, spot, hit, plain, surface, at, s.lookups);
     let material = &look.material;
     surface.shading_normal = look.normal;
-    if !scene.instances.is_empty() {
+    if !scene.bvh.instances.is_empty() {
         surface.start += surface.bulge;
     }
     let mut sum = scene.environment.ambient * material.ambient;
-    let (area_lights, delta_lights) = scene.lights.split_at(scene.counts.lights.x as usize);
+    let (area_lights, delta_lights) = scene.lighting.lights.split_at(scene.counts.lights.x as usize);
     for light in area_lights {
         let (pattern, side, count) = (s.light_pattern, s.light_side, s.light_samples);
         let lobes = lobes_of_light(

@@ -1,0 +1,288 @@
+//! Twin of `shaders/cylinder.wgsl`: the surface of x² + y² <= 1, |z| <= 1 in local space.
+
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+use super::ellipsoid::longitude;
+use super::math::{max, min};
+use super::ray::{Ray, vector_to_local};
+use crate::records::{INFINITE_T, Primitive};
+
+pub fn cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2 {
+    let side = from_anchor.x * (from_anchor.x - q.middle.x * 2.0)
+        + from_anchor.y * (from_anchor.y - q.middle.y * 2.0)
+        + q.level;
+    let top = from_anchor.z - (q.middle.z + 1.0);
+    let bottom = (q.middle.z - 1.0) - from_anchor.z;
+    Vec2::new(side, max(top, bottom))
+}
+
+pub fn levels_on_surface(levels: Vec2, on: f32) -> Vec2 {
+    if levels.x >= levels.y {
+        Vec2::new(on, min(levels.y, on))
+    } else {
+        Vec2::new(min(levels.x, on), on)
+    }
+}
+
+pub fn cylinder_interval(o: Vec3, d: Vec3, levels: Vec2) -> Vec2 {
+    let a = d.x * d.x + d.y * d.y;
+    let b = o.x * d.x + o.y * d.y;
+    let moment = o.x * d.y - o.y * d.x;
+    let discriminant = if levels.x < 1.0 {
+        b * b - a * levels.x
+    } else {
+        a - moment * moment
+    };
+    let root = max(discriminant, 0.0).sqrt();
+    let sum = if b < 0.0 { root - b } else { -b - root };
+    let s0 = levels.x / sum;
+    let s1 = sum / a;
+    let is_parallel = a == 0.0;
+    let misses = if is_parallel {
+        !((levels.x <= 0.0) & (b == 0.0))
+    } else {
+        !(discriminant >= 0.0)
+    };
+    if misses {
+        return Vec2::new(INFINITE_T, -INFINITE_T);
+    }
+    let near_side = if is_parallel { -INFINITE_T } else { min(s0, s1) };
+    let far_side = if is_parallel { INFINITE_T } else { max(s0, s1) };
+    let (upper, lower) = if o.z > 0.0 {
+        (levels.y, -2.0 - levels.y)
+    } else {
+        (-2.0 - levels.y, levels.y)
+    };
+    let slope = if d.z == 0.0 { 1e-30 } else { d.z };
+    let s2 = -upper / slope;
+    let s3 = lower / slope;
+    Vec2::new(max(near_side, min(s2, s3)), min(far_side, max(s2, s3)))
+}
+
+pub fn intersect_cylinder(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
+    let from_anchor = vector_to_local(q, ray.origin - q.anchor);
+    let d = vector_to_local(q, ray.direction);
+    let free = cylinder_levels(q, from_anchor);
+    let levels = if from_inside {
+        levels_on_surface(free, 0.0)
+    } else {
+        free
+    };
+    let inside = cylinder_interval(from_anchor - q.middle, d, levels);
+    let t = if inside.x > 0.0 { inside.x } else { inside.y };
+    if (inside.x < inside.y) & (t > 0.0) & (t < limit) {
+        t
+    } else {
+        limit
+    }
+}
+
+pub fn cylinder_blocks(o: Vec3, d: Vec3, levels: Vec2, reach: f32) -> bool {
+    let inside = cylinder_interval(o, d, levels);
+    let enters = (inside.x > 0.0) & (inside.x < reach);
+    let leaves = (inside.y > 0.0) & (inside.y < reach);
+    (inside.x < inside.y) & (enters | leaves)
+}
+
+pub fn is_on_cap(local: Vec3) -> bool {
+    local.z * local.z > local.x * local.x + local.y * local.y
+}
+
+pub fn cap_side(local: Vec3) -> f32 {
+    if local.z > 0.0 { 1.0 } else { -1.0 }
+}
+
+pub fn cylinder_gradient(local: Vec3) -> Vec3 {
+    if is_on_cap(local) {
+        Vec3::new(0.0, 0.0, cap_side(local))
+    } else {
+        Vec3::new(local.x, local.y, 0.0)
+    }
+}
+
+pub fn cylinder_gradient_derivative(local: Vec3, d: Vec3) -> Vec3 {
+    if is_on_cap(local) {
+        Vec3::ZERO
+    } else {
+        Vec3::new(d.x, d.y, 0.0)
+    }
+}
+
+pub fn cylinder_height(q: &Primitive, from_anchor: Vec3) -> f32 {
+    let levels = cylinder_levels(q, from_anchor);
+    if is_on_cap(from_anchor - q.middle) {
+        levels.y
+    } else {
+        0.5 * levels.x
+    }
+}
+
+pub fn cylinder_uv(local: Vec3) -> Vec2 {
+    if is_on_cap(local) {
+        Vec2::new(0.5 * local.x + 0.5, 0.5 * (local.y * cap_side(local)) + 0.5)
+    } else {
+        Vec2::new(longitude(local), 0.5 * local.z + 0.5)
+    }
+}
+
+pub fn cylinder_uv_derivative(local: Vec3, d: Vec3) -> Vec2 {
+    if is_on_cap(local) {
+        Vec2::new(0.5 * d.x, 0.5 * (d.y * cap_side(local)))
+    } else {
+        let du = (local.x * d.y - local.y * d.x) / max(local.x * local.x + local.y * local.y, 1e-12);
+        Vec2::new(du * (0.5 * FRAC_1_PI), 0.5 * d.z)
+    }
+}
+
+pub fn cylinder_tangent(local: Vec3) -> Vec3 {
+    if is_on_cap(local) {
+        Vec3::new(2.0, 0.0, 0.0)
+    } else {
+        Vec3::new(-local.y, local.x, 0.0) * TAU
+    }
+}
+
+pub fn cylinder_bitangent(local: Vec3) -> Vec3 {
+    if is_on_cap(local) {
+        Vec3::new(0.0, 2.0 * cap_side(local), 0.0)
+    } else {
+        Vec3::new(0.0, 0.0, 2.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::cpu::math::normalize;
+    use crate::cpu::primitive::{primitive_normal, solid_levels};
+    use crate::cpu::ray::point_to_local;
+    use crate::pack::primitive;
+    use crate::records::CYLINDER;
+
+    fn cylinder(center: DVec3, radius: f64, height: f64) -> Primitive {
+        let axes = DMat3::from_diagonal(DVec3::new(radius, radius, height / 2.0));
+        primitive(CYLINDER, center, axes, 0, 0)
+    }
+
+    fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
+        Ray {
+            origin: origin.into(),
+            direction: normalize(direction.into()),
+        }
+    }
+
+    /// Distance and normal of a hit; INFINITE_T if it misses.
+    fn hit(q: &Primitive, ray: Ray) -> (f32, Vec3) {
+        let t = intersect_cylinder(q, false, ray, INFINITE_T);
+        (
+            t,
+            primitive_normal(q, point_to_local(q, ray.origin + ray.direction * t)),
+        )
+    }
+
+    #[test]
+    fn the_side_and_both_caps_are_hit() {
+        let q = cylinder(DVec3::new(1.0, 2.0, 3.0), 2.0, 6.0);
+        for (origin, direction, t, normal) in [
+            ([-4.0, 2.0, 3.0], [1.0, 0.0, 0.0], 3.0, Vec3::NEG_X),
+            ([1.0, 9.0, 5.9], [0.0, -1.0, 0.0], 5.0, Vec3::Y),
+            ([1.5, 2.5, 9.0], [0.0, 0.0, -1.0], 3.0, Vec3::Z),
+            ([1.5, 2.5, -4.0], [0.0, 0.0, 1.0], 4.0, Vec3::NEG_Z),
+            // From inside.
+            ([1.0, 2.0, 3.0], [0.0, -1.0, 0.0], 2.0, Vec3::NEG_Y),
+            ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0], 3.0, Vec3::Z),
+            // In through a cap, and past the rim onto the side.
+            ([-2.0, 2.0, 7.0], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::NEG_X),
+            ([-0.9, 2.0, 7.0], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::Z),
+        ] {
+            let (found, n) = hit(&q, ray(origin, direction));
+            assert!((found - t).abs() < 1e-5, "{origin:?} {direction:?}: {found}");
+            assert!((n - normal).length() < 1e-5, "{origin:?} {direction:?}: {n}");
+        }
+    }
+
+    #[test]
+    fn rays_beside_and_beyond_it_miss() {
+        let q = cylinder(DVec3::ZERO, 1.0, 2.0);
+        for (origin, direction) in [
+            ([-4.0, 1.01, 0.0], [1.0, 0.0, 0.0]),
+            ([-4.0, 0.0, 1.01], [1.0, 0.0, 0.0]),
+            ([1.01, 0.0, 4.0], [0.0, 0.0, -1.0]),
+            ([0.0, 0.0, 4.0], [0.0, 0.0, 1.0]),
+            ([0.0, 0.0, -1.01], [0.0, 1.0, 0.0]),
+            ([-3.0, 0.0, 2.5], [1.0, 0.0, -0.3]),
+        ] {
+            assert_eq!(
+                hit(&q, ray(origin, direction)).0,
+                INFINITE_T,
+                "{origin:?} {direction:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_far_end_of_a_chord_is_hit_from_the_surface() {
+        let q = cylinder(DVec3::ZERO, 1.0, 2.0);
+        for (origin, direction, t) in [
+            ([1.0, 0.0, 0.5], [-1.0, 0.0, 0.0], 2.0),
+            ([0.0, 0.3, 1.0], [0.0, 0.0, -1.0], 2.0),
+            ([0.6, 0.8, 0.0], [-0.6, -0.8, 0.0], 2.0),
+            ([0.0, 0.0, -1.0], [1.0, 0.0, 1.0], 2.0f32.sqrt()),
+        ] {
+            for off in [-1e-6, 0.0, 1e-6] {
+                let origin = Vec3::from(origin) * (1.0 + off);
+                let ray = Ray {
+                    origin,
+                    direction: normalize(direction.into()),
+                };
+                let found = intersect_cylinder(&q, true, ray, INFINITE_T);
+                assert!((found - t).abs() < 1e-5, "{origin} {direction:?}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_huge_cylinder_keeps_its_digits_near_the_origin() {
+        // A pipe on which the scene stands, and a tower whose roof it is.
+        let pipe = primitive(
+            CYLINDER,
+            DVec3::NEG_Z * 1e6,
+            DMat3::from_cols(DVec3::Z * 1e6, DVec3::X * 1e6, DVec3::Y * 1e6),
+            0,
+            0,
+        );
+        let tower = cylinder(DVec3::NEG_Z * 1e6, 1e6, 2e6);
+        for q in [pipe, tower] {
+            for height in [1.0, 1e-2, 1e-4] {
+                let (t, normal) = hit(&q, ray([0.3, 0.2, height], [0.0, 0.0, -1.0]));
+                assert!((t / height - 1.0).abs() < 1e-2, "{t} for {height}");
+                assert!((normal - Vec3::Z).length() < 1e-5, "{normal}");
+            }
+        }
+    }
+
+    #[test]
+    fn segments_are_cut_that_cross_the_surface() {
+        let q = cylinder(DVec3::ZERO, 1.0, 2.0);
+        let cut = |p: [f32; 3], to: [f32; 3], from_inside| {
+            let levels = solid_levels(CYLINDER, &q, vector_to_local(&q, Vec3::from(p) - q.anchor), from_inside);
+            cylinder_blocks(p.into(), to.into(), levels, 1.0)
+        };
+        assert!(cut([-3.0, 0.0, 0.0], [6.0, 0.0, 0.0], false), "through");
+        assert!(cut([-3.0, 0.0, 0.0], [3.0, 0.0, 0.0], false), "into");
+        assert!(cut([0.0, 0.0, 0.0], [0.0, 0.0, 3.0], false), "out of");
+        assert!(!cut([-0.5, 0.0, 0.0], [1.0, 0.0, 0.5], false), "inside");
+        assert!(!cut([-3.0, 0.0, 0.0], [1.9, 0.0, 0.0], false), "ends before");
+        assert!(!cut([-3.0, 0.0, 1.1], [6.0, 0.0, 0.0], false), "above");
+        assert!(!cut([1.5, 0.0, 1.5], [3.0, 0.0, 3.0], false), "away");
+        assert!(cut([1.0, 0.0, 0.0], [-3.0, 0.0, 0.0], true), "from the surface inwards");
+        assert!(
+            !cut([1.0, 0.0, 0.0], [-1.5, 0.0, 0.0], true),
+            "from the surface to the inside"
+        );
+    }
+}

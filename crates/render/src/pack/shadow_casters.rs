@@ -1,0 +1,146 @@
+//! The primitives that can occlude a segment from a surface to a light. A flat primitive cannot if all shapes and lights lie on one side of
+//! its plane, as the walls of a room do.
+
+use glam::DVec3;
+
+use super::{MAX_LINEAR_PRIMITIVES, Primitive};
+use crate::cpu::primitive::is_solid;
+use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
+
+/// A point within this distance of a plane counts as on it, relative to the coordinates: the rounding of the plane's record.
+const TOLERANCE: f64 = 1e-6;
+
+/// For each primitive outside of the BVH, whether it can occlude a point of a surface from a light. If there are more than
+/// [`MAX_LINEAR_PRIMITIVES`], planes are not tested, because each test takes a time in proportion to the number of shapes.
+pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
+    let is_tested = primitives.len() <= MAX_LINEAR_PRIMITIVES && !has_environment_map(scene);
+    let casts =
+        |p: &Primitive| may_cast_shadow(scene, p) && (!is_tested || is_solid(p.kind) || has_both_sides(scene, p));
+    primitives.iter().map(casts).collect()
+}
+
+/// Returns whether the material of a primitive lets it occlude light.
+pub fn may_cast_shadow(scene: &Scene, primitive: &Primitive) -> bool {
+    match scene.shapes.get(primitive.shape as usize) {
+        Some(shape) => casts_shadow(scene, shape.material),
+        // An area light that is an emitter occludes what is behind it.
+        None => scene.render.integrator.needs_emitters(),
+    }
+}
+
+pub fn casts_shadow(scene: &Scene, material: usize) -> bool {
+    let is_glass = matches!(scene.materials[material].reflection, Reflection::Glass { .. });
+    scene.render.shadows == Shadows::Opaque || !is_glass
+}
+
+/// Light of an environment map comes from both sides of every plane.
+fn has_environment_map(scene: &Scene) -> bool {
+    scene
+        .environment
+        .as_ref()
+        .is_some_and(|environment| environment.image.is_some())
+}
+
+/// Returns whether there is a part of a shape or a light on each side of the plane of a flat primitive.
+fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
+    let normal = primitive.z.as_dvec3().normalize();
+    let center = primitive.anchor.as_dvec3();
+    let (mut below, mut above) = (false, false);
+    let mut height = |height: f64, size: f64| {
+        below |= height < -TOLERANCE * size;
+        above |= height > TOLERANCE * size;
+        below && above
+    };
+    let mut point = |p: DVec3| height((p - center).dot(normal), p.abs().max(center.abs()).max_element());
+    let of_lights = scene.lights.iter().any(|light| match light {
+        Light::Rectangle { rectangle, .. } => rectangle.corners().into_iter().any(&mut point),
+        Light::Point { position, .. } | Light::Spot { position, .. } => point(*position),
+        Light::Directional { .. } => false,
+    });
+    let of_shapes = of_lights
+        || scene.shapes.iter().any(|shape| {
+            let mut found = false;
+            shape.geometry.each_extreme(normal, |p| found |= point(p));
+            found
+        });
+    // Infinitely far away: directions.
+    let of_directions = of_shapes
+        || scene.lights.iter().any(|light| match light {
+            Light::Directional { direction, .. } => height(-direction.dot(normal), 1.0),
+            _ => false,
+        });
+    of_directions
+        || scene.shapes.iter().any(|shape| match shape.geometry {
+            Geometry::Plane { tangent, bitangent, .. } => [tangent, bitangent, -tangent, -bitangent]
+                .into_iter()
+                .any(|direction| height(direction.dot(normal), 1.0)),
+            _ => false,
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pack::pack_shapes;
+    use wgray_scene::Description;
+
+    /// Returns whether each primitive of a scene with these shapes can cast a shadow.
+    fn casting(shapes: &str) -> Vec<bool> {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -9, 1], look_at = [0, 0, 0], fov = 45 }}\n\
+             materials.m = {{ type = 'phong', color = [1, 1, 1] }}\n{shapes}"
+        );
+        let scene = Description::parse(&text, "s.toml").unwrap().validate().unwrap();
+        can_cast_shadow(&scene, &pack_shapes(&scene))
+    }
+
+    const FLOOR: &str = "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [1, 2, 3]\nnormal = [0.6, 0, 0.8]\n";
+
+    /// A sphere whose center is at a height above the floor.
+    fn ball(height: f64) -> String {
+        let center = [1.0 + 0.6 * height, 2.0, 3.0 + 0.8 * height];
+        format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = {center:?}\nradius = 1\n")
+    }
+
+    fn light(kind: &str, key: &str, value: [f64; 3]) -> String {
+        format!("[[lights]]\ntype = '{kind}'\n{key} = {value:?}\ncolor = [1, 1, 1]\n")
+    }
+
+    #[test]
+    fn a_floor_under_everything_casts_no_shadow() {
+        assert_eq!(casting(FLOOR), [false]);
+        assert_eq!(casting(&(ball(1.0) + FLOOR)), [true, false]);
+        let above =
+            light("point", "position", [7.0, 2.0, 11.0]) + &light("directional", "direction", [-0.6, 0.0, -0.8]);
+        assert_eq!(casting(&(above + &ball(2.0) + FLOOR)), [true, false]);
+    }
+
+    #[test]
+    fn anything_below_a_floor_makes_it_cast_a_shadow() {
+        assert_eq!(casting(&(ball(0.99) + FLOOR)), [true, true], "a part of a sphere");
+        let below = light("point", "position", [0.0, 2.0, 2.0]);
+        assert_eq!(casting(&(below + &ball(2.0) + FLOOR)), [true, true]);
+        let upwards = light("directional", "direction", [0.6, 0.0, 0.8]);
+        assert_eq!(casting(&(upwards + &ball(2.0) + FLOOR)), [true, true]);
+        let slope = FLOOR.replace("0.8", "-0.8");
+        assert_eq!(casting(&(slope + FLOOR)), [true, true], "each crosses the other");
+    }
+
+    #[test]
+    fn the_walls_of_a_room_cast_no_shadows() {
+        let walls: String = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]]
+            .map(|normal| {
+                let center = normal.map(|x| -2 * x);
+                format!(
+                    "[[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = {center:?}\nnormal = {normal:?}\nsize = [4, 4]\n"
+                )
+            })
+            .concat();
+        let inside = "[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n";
+        assert_eq!(casting(&walls), [false; 6]);
+        assert_eq!(
+            casting(&(walls + inside)),
+            [false, false, false, false, false, false, true]
+        );
+    }
+}

@@ -1,0 +1,189 @@
+//! The form and place of shapes, their extents and bounding boxes.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::Scene;
+use super::mesh::Mesh;
+
+/// The minimum and maximum corner of a box.
+pub type Bounds = (DVec3, DVec3);
+
+/// The points `center + x u + y v` for x, y in -1..=1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Parallelogram {
+    /// The middle.
+    pub center: DVec3,
+    /// Half the first edge: half the width along the tangent.
+    pub u: DVec3,
+    /// Half the second edge: half the height along the bitangent, normal x tangent.
+    pub v: DVec3,
+}
+
+/// A shape with its material.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Shape {
+    /// Its form and place.
+    pub geometry: Geometry,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+}
+
+/// The form and place of a shape.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// A rectangle; its normal is u x v.
+    Rectangle(Parallelogram),
+    /// A disk: of the points of a parallelogram those with x² + y² <= 1; its normal is u x v.
+    Disk(Parallelogram),
+    /// An ellipsoid (a sphere among them): the points `center + x a + y b + z c` with x² + y² + z² = 1.
+    Ellipsoid {
+        /// The middle.
+        center: DVec3,
+        /// The half axes, linearly independent.
+        axes: [DVec3; 3],
+    },
+    /// A capped cylinder: the surface of the points `center + x a + y b + z c` with x² + y² <= 1 and |z| <= 1.
+    Cylinder {
+        /// The middle.
+        center: DVec3,
+        /// Two radii and half the axis, perpendicular to each other.
+        axes: [DVec3; 3],
+    },
+    /// Triangles that share one shape number (a triangle, the faces of a tetrahedron), each with its vertices
+    /// counter-clockwise as seen from outside: normal (v1 - v0) x (v2 - v1).
+    Triangles(Vec<[DVec3; 3]>),
+    /// A mesh of triangles.
+    Mesh {
+        /// Its triangles.
+        mesh: Arc<Mesh>,
+        /// The map from the mesh file's coordinates to the scene's; invertible.
+        to_world: DAffine3,
+        /// For each group of the mesh an index into [`Scene::materials`].
+        materials: Vec<usize>,
+    },
+    /// An infinite plane.
+    Plane {
+        /// A point of it, the origin of its texture coordinates.
+        point: DVec3,
+        /// Unit tangent: the direction of u.
+        tangent: DVec3,
+        /// Unit normal x tangent: the direction of v.
+        bitangent: DVec3,
+    },
+}
+
+impl Scene {
+    /// Returns the bounding box of all shapes except planes, or `None` if there are only planes.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let all = self.shapes.iter().filter_map(|shape| shape.geometry.bounds());
+        all.reduce(join)
+    }
+}
+
+impl Parallelogram {
+    /// Returns its corners.
+    pub fn corners(&self) -> [DVec3; 4] {
+        [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)].map(|(a, b)| self.center + self.u * a + self.v * b)
+    }
+}
+
+impl Geometry {
+    /// Returns the value of `type` in a scene file: a sphere and a triangle have names of their own.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Geometry::Rectangle(_) => "rectangle",
+            Geometry::Disk(_) => "disk",
+            Geometry::Ellipsoid { axes, .. } if is_sphere(axes) => "sphere",
+            Geometry::Ellipsoid { .. } => "ellipsoid",
+            Geometry::Cylinder { .. } => "cylinder",
+            Geometry::Triangles(all) if all.len() == 1 => "triangle",
+            Geometry::Triangles(_) => "tetrahedron",
+            Geometry::Mesh { .. } => "mesh",
+            Geometry::Plane { .. } => "plane",
+        }
+    }
+
+    /// Moves it by an offset.
+    pub fn translate(&mut self, offset: DVec3) {
+        match self {
+            Geometry::Rectangle(shape) | Geometry::Disk(shape) => shape.center += offset,
+            Geometry::Ellipsoid { center, .. } | Geometry::Cylinder { center, .. } => *center += offset,
+            Geometry::Triangles(triangles) => triangles.iter_mut().flatten().for_each(|v| *v += offset),
+            Geometry::Mesh { to_world, .. } => to_world.translation += offset,
+            Geometry::Plane { point, .. } => *point += offset,
+        }
+    }
+
+    /// Returns the bounding box, or `None` for a plane, which is infinite.
+    pub fn bounds(&self) -> Option<Bounds> {
+        match self {
+            Geometry::Rectangle(shape) => around(shape.center, shape.u.abs() + shape.v.abs()),
+            Geometry::Disk(shape) => around(shape.center, root_of_squares(&[shape.u, shape.v])),
+            Geometry::Ellipsoid { center, axes } => around(*center, root_of_squares(axes)),
+            Geometry::Cylinder {
+                center,
+                axes: [a, b, c],
+            } => around(*center, root_of_squares(&[*a, *b]) + c.abs()),
+            Geometry::Triangles(triangles) => {
+                let points = triangles.iter().flatten().map(|point| (*point, *point));
+                points.reduce(join)
+            }
+            Geometry::Mesh { mesh, to_world, .. } => {
+                let place = |point: &Vec3| to_world.transform_point3(point.as_dvec3() + mesh.center);
+                let points = mesh.positions.par_iter().map(place);
+                points.map(|point| (point, point)).reduce_with(join)
+            }
+            Geometry::Plane { .. } => None,
+        }
+    }
+
+    /// Calls a function with points between whose projections onto a unit vector those of all its points lie: with one point of a
+    /// plane, and with the corners of a mesh's bounding box.
+    pub fn each_extreme(&self, direction: DVec3, mut point: impl FnMut(DVec3)) {
+        let mut between = |center: DVec3, half: f64| {
+            point(center + direction * half);
+            point(center - direction * half);
+        };
+        let round = |axes: &[DVec3]| axes.iter().map(|axis| axis.dot(direction).powi(2)).sum::<f64>().sqrt();
+        match self {
+            Geometry::Rectangle(rectangle) => rectangle.corners().into_iter().for_each(point),
+            Geometry::Disk(disk) => between(disk.center, round(&[disk.u, disk.v])),
+            Geometry::Ellipsoid { center, axes } => between(*center, round(axes)),
+            Geometry::Cylinder {
+                center,
+                axes: [a, b, c],
+            } => {
+                between(*center, round(&[*a, *b]) + c.dot(direction).abs());
+            }
+            Geometry::Triangles(triangles) => triangles.iter().flatten().for_each(|v| point(*v)),
+            Geometry::Mesh { mesh, to_world, .. } => {
+                mesh.corners()
+                    .for_each(|corner| point(to_world.transform_point3(corner)));
+            }
+            Geometry::Plane { point: p, .. } => point(*p),
+        }
+    }
+}
+
+/// Returns true if half axes are those of a sphere that is not rotated.
+fn is_sphere(axes: &[DVec3; 3]) -> bool {
+    *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
+}
+
+fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Bounds {
+    (low.min(other_low), high.max(other_high))
+}
+
+fn around(center: DVec3, reach: DVec3) -> Option<Bounds> {
+    Some((center - reach, center + reach))
+}
+
+/// The extent of a disk or an ellipsoid along each axis is the norm of its half axes' components there.
+fn root_of_squares(axes: &[DVec3]) -> DVec3 {
+    axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt)
+}
