@@ -14,7 +14,7 @@ use wgray_image::color::srgb_to_linear;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Background {
-    /// Transparency. Only for [`Integrator::Path`].
+    /// Transparency. Only for [`Integrator::Path`](crate::Integrator::Path).
     Transparent,
     /// This radiance, in linear RGB.
     Color(DVec3),

@@ -195,8 +195,8 @@ mod tests {
             // From inside.
             ([1.0, 2.0, 3.0], [0.0, -1.0, 0.0], 2.0, Vec3::NEG_Y),
             ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0], 3.0, Vec3::Z),
-            // In through a cap, and past the rim onto the side.
-            ([-2.0, 2.0, 7.0], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::NEG_X),
+            // Just below the rim, and just inside of it.
+            ([-2.0, 2.0, 6.5], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::NEG_X),
             ([-0.9, 2.0, 7.0], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::Z),
         ] {
             let (found, n) = hit(&q, ray(origin, direction));
