@@ -5,7 +5,6 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::Scene;
 use super::mesh::Mesh;
 
 /// The minimum and maximum corner of a box.
@@ -75,14 +74,6 @@ pub enum Geometry {
         /// Unit normal x tangent: the direction of v.
         bitangent: DVec3,
     },
-}
-
-impl Scene {
-    /// Returns the bounding box of all shapes except planes, or `None` if there are only planes.
-    pub fn bounds(&self) -> Option<Bounds> {
-        let all = self.shapes.iter().filter_map(|shape| shape.geometry.bounds());
-        all.reduce(join)
-    }
 }
 
 impl Parallelogram {
@@ -175,7 +166,8 @@ fn is_sphere(axes: &[DVec3; 3]) -> bool {
     *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }
 
-fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Bounds {
+/// Returns the bounding box of two boxes.
+pub(crate) fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Bounds {
     (low.min(other_low), high.max(other_high))
 }
 

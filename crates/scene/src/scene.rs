@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 
 use crate::camera_path::CameraPath;
 use crate::description::{AlphaMode, Integrator, Pattern, PixelFilterKind, Shadows, VertexColors};
-use crate::geometry::{Parallelogram, Shape};
+use crate::geometry::{Bounds, Parallelogram, Shape, join};
 use crate::gltf::Imported;
 use crate::metals::MetalIndex;
 use crate::note::Note;
@@ -467,4 +467,12 @@ pub enum Light {
         /// The angle up to which it is as bright as in the middle, 0 to `cone`.
         inner: f64,
     },
+}
+
+impl Scene {
+    /// Returns the bounding box of all shapes except planes, or `None` if there are only planes.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let all = self.shapes.iter().filter_map(|shape| shape.geometry.bounds());
+        all.reduce(join)
+    }
 }

@@ -246,7 +246,7 @@ mod tests {
     fn overrides_with_values_are_sliders() {
         let lines = Shaders::built_in().text("phong.wgsl").lines().count();
         let found = found(
-            "override gain: f32 = 0.1; // 0..4\n  override steps: i32 = -3; // slider -8..8 steps\n\
+            "override gain: f32 = 0.1; // 0..4\n  override passes: i32 = -3; // slider -8..8 steps\n\
              override many = 20u;\noverride on: bool = true; // whether\noverride wide: f32 = 2.0 * 1.5; // 0..1\n",
         );
         let slider = |line, name: &str, kind, [min, max]: [f64; 2], default| Slider {
@@ -262,7 +262,7 @@ mod tests {
             found,
             [
                 slider(1, "gain", Kind::F32, [0.0, 4.0], Value::Number(0.1)),
-                slider(2, "steps", Kind::I32, [-8.0, 8.0], Value::Number(-3.0)),
+                slider(2, "passes", Kind::I32, [-8.0, 8.0], Value::Number(-3.0)),
                 slider(3, "many", Kind::U32, [0.0, 40.0], Value::Number(20.0)),
                 slider(4, "on", Kind::Bool, [0.0, 1.0], Value::Bool(true)),
                 slider(5, "wide", Kind::F32, [0.0, 3.0], Value::Number(3.0)),
