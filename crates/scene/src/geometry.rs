@@ -28,7 +28,7 @@ pub struct Parallelogram {
 pub struct Shape {
     /// Its form and place.
     pub geometry: Geometry,
-    /// Index into [`Scene::materials`].
+    /// Index into [`Scene::materials`](crate::Scene::materials).
     pub material: usize,
 }
 
@@ -62,7 +62,7 @@ pub enum Geometry {
         mesh: Arc<Mesh>,
         /// The map from the mesh file's coordinates to the scene's; invertible.
         to_world: DAffine3,
-        /// For each group of the mesh an index into [`Scene::materials`].
+        /// For each group of the mesh an index into [`Scene::materials`](crate::Scene::materials).
         materials: Vec<usize>,
     },
     /// An infinite plane.
