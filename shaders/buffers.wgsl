@@ -1,5 +1,5 @@
-// The scene from buffers, by loops over all primitives outside of the tree. What calls a loop for each kind of primitive is generated
-// (crates/render/src/gpu/dispatch.rs).
+// The scene from buffers, by loops over all primitives outside of the BVH. The functions that call a loop for each kind of primitive are
+// generated (crates/render/src/gpu/dispatch.rs).
 
 fn load_primitive(i: u32) -> Primitive {
     return primitives[i];
@@ -20,7 +20,7 @@ fn closest_of(kind: u32, before: Hit, ray: Ray, left: u32, wall: u32) -> Hit {
     return hit;
 }
 
-// Whether it is so before, or any primitive of a kind but `goal` cuts the way from a surface to `reach` times `to`.
+// Returns whether any primitive of a kind except `goal` occludes the segment from a surface to `reach` times `to`, or `before`.
 fn is_hidden_by(kind: u32, before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
     let range = counts.primitives[kind];
     var hidden = before;

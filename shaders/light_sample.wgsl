@@ -43,13 +43,13 @@ fn ellipsoid_pdf(q: Primitive, p: vec3f, wi: vec3f) -> f32 {
     return 0.15915494309189535 / cap * abs(q.determinant) / (l2 * sqrt(l2));
 }
 
-// The part of a cylinder that light is sampled from at a point: what faces it. Of areas the unit is that of a cap.
+// The part of a cylinder that faces a point, from which light is sampled there. Areas are relative to the area of a cap.
 struct CylinderPart {
     arc: f32,              // half the angle of the part of the side, 1 for the whole side
     middle: vec2f,         // unit vector to its middle
     side: f32,             // its area
-    end: f32,              // 1 where the cap at the end is seen, else 0
-    start: f32,            // the same for that at the start
+    end: f32,              // 1 if the cap at the end faces the point, else 0
+    start: f32,            // the same for the cap at the start
 }
 
 // A point on the surface of a cylinder: the vector to it, and its outward normal.
@@ -58,7 +58,8 @@ struct CylinderPoint {
     normal: vec3f,
 }
 
-// The part of a cylinder that faces a point: of the side an arc, where the point is outside of the infinite cylinder; all from inside.
+// Returns the part that faces a point: an arc of the side if the point is outside of the infinite cylinder, and a cap if it is beyond it; the whole
+// surface if the point is inside.
 fn cylinder_part(q: Primitive, o: vec3f, levels: vec2f) -> CylinderPart {
     let inside = (levels.x <= 0.0) & (levels.y <= 0.0);
     let r2 = o.x * o.x + o.y * o.y;

@@ -22,7 +22,7 @@ fn intersect(kind: u32, q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
     return intersect_plane(q, ray, limit);
 }
 
-// Whether it cuts the segment o + s d, s in (0, reach), of local space; `levels` are those of o.
+// Returns whether a primitive cuts the segment o + s d, s in (0, reach), of local space; `levels` are the `solid_levels` of o.
 fn blocks(kind: u32, o: vec3f, d: vec3f, levels: vec2f, reach: f32) -> bool {
     if kind == RECTANGLE {
         return rectangle_blocks(o, d, reach);
@@ -42,7 +42,7 @@ fn blocks(kind: u32, o: vec3f, d: vec3f, levels: vec2f, reach: f32) -> bool {
     return plane_blocks(o, d, reach);
 }
 
-// Whether primitives of a kind are the surfaces of convex solids: a ray that leaves one through the inside hits it again.
+// Returns whether primitives of a kind are the surfaces of convex solids: a ray that leaves one through the inside hits it again.
 fn is_solid(kind: u32) -> bool {
     return ((SOLID_KINDS >> kind) & 1u) == 1u;
 }
@@ -52,8 +52,8 @@ fn is_centered(kind: u32) -> bool {
     return (kind == RECTANGLE) | (kind == DISK);
 }
 
-// How far outside of a solid a point of local space is, for `blocks`: y only of cylinders. `wall` says that it is on the surface and counts as
-// inside, by as little as can be: rays inwards are occluded if they end outside.
+// The levels of a point of local space for `blocks`, below 0 inside of a solid; y is used by cylinders only. `wall` says that the point is on the
+// surface and counts as inside, by the least amount: rays inwards are occluded if they end outside.
 fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, wall: bool) -> vec2f {
     if kind == CYLINDER {
         let levels = cylinder_levels(q, from_anchor);
@@ -69,7 +69,7 @@ fn primitive_gradient(q: Primitive, local: vec3f) -> vec3f {
     return select(q.z, gradient, is_solid(q.kind));
 }
 
-// That of a solid in local space.
+// The gradient of a solid in local space.
 fn solid_gradient(kind: u32, local: vec3f) -> vec3f {
     return select(local, cylinder_gradient(local), kind == CYLINDER);
 }
@@ -79,7 +79,7 @@ fn solid_gradient_derivative(kind: u32, local: vec3f, d: vec3f) -> vec3f {
     return select(d, cylinder_gradient_derivative(local, d), kind == CYLINDER);
 }
 
-// What `primitive_gradient` is the gradient of.
+// The function whose gradient `primitive_gradient` is, 0 on the primitive.
 fn primitive_height(q: Primitive, from_anchor: vec3f) -> f32 {
     let round = 0.5 * ellipsoid_level(q, from_anchor);
     let solid = select(round, cylinder_height(q, from_anchor), q.kind == CYLINDER);

@@ -63,7 +63,8 @@ fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
     return Hit(select(hit.t, t, nearer), hit.instance, select(hit.primitive, i, nearer), hit.slot, hit.barycentric);
 }
 
-// Of two hits, the second of which may be none at INFINITE_T, the nearer one; of equally near ones that of the lower instance and primitive.
+// Returns the nearer of two hits; if they are equally near, the one with the lower instance and primitive. The second one misses if its t is
+// INFINITE_T.
 fn nearer_hit(a: Hit, b: Hit) -> Hit {
     let lower = (b.instance < a.instance) | ((b.instance == a.instance) & (b.primitive < a.primitive));
     let nearer = (b.t < INFINITE_T) & ((b.t < a.t) | ((b.t == a.t) & lower));

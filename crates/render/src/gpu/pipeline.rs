@@ -49,8 +49,8 @@ pub const STORAGE_BUFFERS: usize = {
 /// WebGPU promises so many by default.
 const _: () = assert!(STORAGE_BUFFERS <= 8);
 
-/// The groups of every kernel; that of the scene ends with so many further buffers of texels, that of a call with the values
-/// of sliders, if it has `sliders`.
+/// Returns the bind group layouts of every kernel. The group of the scene ends with the further buffers of texels, the group of a dispatch with
+/// the values of sliders if the kernel has any.
 pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) -> Vec<wgpu::BindGroupLayout> {
     let layout = |(group, types): (usize, &&[BufferBindingType])| {
         let more = match group {

@@ -163,6 +163,19 @@ impl Aov {
         const fn row(name: &'static str, source: AovSource, channels: &'static [Channel]) -> Row {
             Row { name, source, channels }
         }
+        macro_rules! colors {
+            ($name:literal, $layer:ident) => {
+                row(
+                    $name,
+                    Samples,
+                    &[
+                        Mean(concat!($name, ".R"), Layer::$layer, 0),
+                        Mean(concat!($name, ".G"), Layer::$layer, 1),
+                        Mean(concat!($name, ".B"), Layer::$layer, 2),
+                    ],
+                )
+            };
+        }
         match self {
             Aov::Normal => row(
                 "normal",
@@ -198,42 +211,10 @@ impl Aov {
                     Float("barycentric.V", |hit| hit.barycentric.y),
                 ],
             ),
-            Aov::Albedo => row(
-                "albedo",
-                Samples,
-                &[
-                    Mean("albedo.R", Layer::Albedo, 0),
-                    Mean("albedo.G", Layer::Albedo, 1),
-                    Mean("albedo.B", Layer::Albedo, 2),
-                ],
-            ),
-            Aov::Direct => row(
-                "direct",
-                Samples,
-                &[
-                    Mean("direct.R", Layer::Direct, 0),
-                    Mean("direct.G", Layer::Direct, 1),
-                    Mean("direct.B", Layer::Direct, 2),
-                ],
-            ),
-            Aov::Indirect => row(
-                "indirect",
-                Samples,
-                &[
-                    Mean("indirect.R", Layer::Indirect, 0),
-                    Mean("indirect.G", Layer::Indirect, 1),
-                    Mean("indirect.B", Layer::Indirect, 2),
-                ],
-            ),
-            Aov::Emission => row(
-                "emission",
-                Samples,
-                &[
-                    Mean("emission.R", Layer::Emission, 0),
-                    Mean("emission.G", Layer::Emission, 1),
-                    Mean("emission.B", Layer::Emission, 2),
-                ],
-            ),
+            Aov::Albedo => colors!("albedo", Albedo),
+            Aov::Direct => colors!("direct", Direct),
+            Aov::Indirect => colors!("indirect", Indirect),
+            Aov::Emission => colors!("emission", Emission),
             Aov::SampleCount => row("sample_count", Adaptive, &[Count("sample_count.N")]),
             Aov::Variance => row(
                 "variance",

@@ -21,24 +21,10 @@ pub(super) fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
             }
             Geometry::Disk(disk) => primitives.push(parallelogram(DISK, disk, material, number)),
             Geometry::Ellipsoid { center, axes } => {
-                let [a, b, c] = *axes;
-                primitives.push(primitive(
-                    ELLIPSOID,
-                    *center,
-                    DMat3::from_cols(a, b, c),
-                    material,
-                    number,
-                ));
+                primitives.push(primitive(ELLIPSOID, *center, from_columns(axes), material, number));
             }
             Geometry::Cylinder { center, axes } => {
-                let [a, b, c] = *axes;
-                primitives.push(primitive(
-                    CYLINDER,
-                    *center,
-                    DMat3::from_cols(a, b, c),
-                    material,
-                    number,
-                ));
+                primitives.push(primitive(CYLINDER, *center, from_columns(axes), material, number));
             }
             Geometry::Triangles(triangles) => {
                 for &[v0, v1, v2] in triangles {
@@ -61,6 +47,10 @@ pub(super) fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
     primitives
 }
 
+fn from_columns([a, b, c]: &[DVec3; 3]) -> DMat3 {
+    DMat3::from_cols(*a, *b, *c)
+}
+
 pub(super) fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Primitive {
     primitive(
         kind,
@@ -71,8 +61,8 @@ pub(super) fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: 
     )
 }
 
-/// The primitive whose local space is mapped to the world by `columns` and then `center`. The anchor of a solid is the point of it towards the
-/// origin, so that coordinates near the origin keep their digits however large the solid is.
+/// The primitive whose transform from local space has these columns and this translation. The anchor of a solid is a point of its surface, the one
+/// towards the origin, so that coordinates near the origin keep their digits however large the solid is.
 pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
     let to_local = columns.inverse();
     let rows = to_local.transpose();
@@ -106,7 +96,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
     }
 }
 
-/// A point of the cylinder of local space near a point: of a cap if the point is beyond it, else of the side.
+/// Returns a point on the surface of a cylinder, in local space, near a point: on a cap if the point is beyond it, else on the side.
 fn nearest_of_cylinder(point: DVec3) -> DVec3 {
     let across = point.truncate();
     let across = match point.z.abs() > 1.0 && across.length() < 1.0 {

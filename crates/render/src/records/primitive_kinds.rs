@@ -9,12 +9,12 @@ pub struct PrimitiveKind {
     /// The name of its constant, in Rust and in WGSL.
     pub name: &'static str,
     /// It is flat, a convex solid or infinite.
-    pub form: Form,
+    pub form: PrimitiveForm,
 }
 
 /// The form of a kind of primitive.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Form {
+pub enum PrimitiveForm {
     /// Flat and bounded.
     Flat,
     /// The surface of a convex solid: a ray that leaves it through the inside hits it again.
@@ -35,7 +35,7 @@ macro_rules! primitive_kinds {
 
         /// All kinds, in the order of their numbers.
         pub const PRIMITIVE_KINDS: &[PrimitiveKind] = &[
-            $(PrimitiveKind { name: stringify!($name), form: Form::$form }),*
+            $(PrimitiveKind { name: stringify!($name), form: PrimitiveForm::$form }),*
         ];
 
         /// Evaluates an expression with a kind as a constant, so that it is compiled for each kind.
@@ -75,7 +75,7 @@ primitive_kinds! { ($)
 const fn solid(kinds: &[PrimitiveKind]) -> u32 {
     let (mut bits, mut i) = (0, 0);
     while i < kinds.len() {
-        bits |= if matches!(kinds[i].form, Form::Solid) {
+        bits |= if matches!(kinds[i].form, PrimitiveForm::Solid) {
             1 << i
         } else {
             0

@@ -5,16 +5,16 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::Overrides;
+use super::gltf_choice::GltfChoice;
+use super::overrides::Overrides;
 use crate::error::SceneError;
 use crate::framing::check_extent;
 use crate::mesh::{Mesh, MeshError};
 use crate::problem::Problem;
 use crate::validate::turned_up;
 use crate::{
-    CameraDescription, Description, EnvironmentDescription, EnvironmentName, Framing, GltfChoice, ImageDescription,
-    Integrator, MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed,
-    is_gltf,
+    CameraDescription, Description, EnvironmentDescription, EnvironmentName, Framing, ImageDescription, Integrator,
+    MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed, is_gltf,
 };
 
 /// The longer side of the image in pixels, and samples of a pixel, by default.

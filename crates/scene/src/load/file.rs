@@ -1,0 +1,104 @@
+//! Files of scenes: their texts and bytes.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::Path;
+
+use crate::error::SceneError;
+use crate::parse::{NOT_UTF8, encoding, syntax_error};
+use wgray_image::waiting;
+
+/// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
+const LARGEST_FILE: u64 = 64 << 20;
+
+/// The folder of a file.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new("."))
+}
+
+/// The text of a file.
+pub fn read_text(path: &Path) -> Result<String, SceneError> {
+    let bytes = read_bytes(path).map_err(|error| SceneError::Read {
+        path: path.to_owned(),
+        error,
+    })?;
+    String::from_utf8(bytes).map_err(|error| {
+        let text = String::from_utf8_lossy(error.as_bytes());
+        // Up to there the lossy text is the file's.
+        let valid = error.utf8_error().valid_up_to();
+        let name = path.display().to_string();
+        match encoding(error.as_bytes()) {
+            Some(message) => SceneError::Syntax {
+                origin: name,
+                line: 1,
+                column: 1,
+                message,
+            },
+            None => syntax_error(&text, &name, valid, NOT_UTF8),
+        }
+    })
+}
+
+/// The bytes of a file, which must be one that ends, and no longer than a scene may be.
+pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    waiting::check(path)?;
+    if path.is_dir() {
+        return Err(io::Error::new(
+            io::ErrorKind::IsADirectory,
+            "it is a folder, and a scene is a file",
+        ));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "it is larger than 64 MiB"));
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scene;
+
+    const SCENE: &str = "\
+image = { width = 4, height = 3 }
+camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
+";
+
+    #[test]
+    fn files_are_read_or_the_message_says_why_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let load = |name: &str| Scene::load(folder.path().join(name));
+        let told = |name: &str| load(name).unwrap_err().to_string();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+        write("good.toml", SCENE.as_bytes());
+        assert_eq!(load("good.toml").unwrap().width, 4);
+        write("latin.toml", b"# \xc3\xa9t\xc3\xa9\n# \xc3\xa9t\xe9");
+        assert_eq!(
+            told("latin.toml"),
+            format!("{}:2:5: not valid UTF-8", path("latin.toml"))
+        );
+        for (name, bytes, encoding) in [
+            ("little.toml", &b"\xff\xfe[\0"[..], "UTF-16 (little-endian)"),
+            ("big.toml", b"\xfe\xff\0[", "UTF-16 (big-endian)"),
+        ] {
+            write(name, bytes);
+            let message = format!(
+                "{}:1:1: the file is encoded in {encoding}; save it as UTF-8",
+                path(name)
+            );
+            assert_eq!(told(name), message);
+        }
+        assert!(told("none.toml").starts_with(&format!("{}: cannot be read: ", path("none.toml"))));
+        File::create(folder.path().join("huge.toml"))
+            .unwrap()
+            .set_len(LARGEST_FILE + 1)
+            .unwrap();
+        assert_eq!(
+            told("huge.toml"),
+            format!("{}: cannot be read: it is larger than 64 MiB", path("huge.toml"))
+        );
+    }
+}

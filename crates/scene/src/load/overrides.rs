@@ -1,0 +1,326 @@
+//! Values in place of those of a scene file.
+
+use std::path::{Path, PathBuf};
+
+use super::gltf_choice::GltfChoice;
+use crate::around::{Background, of_option, surround};
+use crate::define::Define;
+use crate::error::SceneError;
+use crate::key_path::KeyPath;
+use crate::problem::{At, Problem, Problems};
+use crate::turntable::turning;
+use crate::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
+use crate::{
+    AdaptiveDescription, Assets, CameraPath, Description, EnvironmentDescription, Integrator, Pattern, Presentation,
+    SamplesDescription, Scene, ViewSettings, ViewTransform,
+};
+
+/// Values that stand in for those of a file. Where one is bad the error is [`SceneError::Override`], which names the
+/// field.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides {
+    /// Width and height of the picture, in pixels, 1 to 65,536.
+    pub size: Option<(u32, u32)>,
+    /// The count of every pixel's samples; their pattern stays.
+    pub pixel_samples: Option<u32>,
+    /// The count of samples of every area light at every hit; their pattern stays.
+    pub light_samples: Option<u32>,
+    /// The seed of all random patterns.
+    pub seed: Option<u32>,
+    /// The layout of a pixel's samples; their count stays.
+    pub pixel_pattern: Option<Pattern>,
+    /// The error that adaptive sampling aims at, 0 to 1; the most samples stay.
+    pub adaptive: Option<f64>,
+    /// What light is simulated.
+    pub integrator: Option<Integrator>,
+    /// The most bounces of a path, 1 to 64, or 0 to 1024 where the integrator is [`Integrator::Path`].
+    pub max_depth: Option<u32>,
+    /// The folder that files named by the scene must lie in, instead of the scene's own.
+    pub asset_root: Option<PathBuf>,
+    /// The frame that [`Scene::camera`] is of, if the camera moves. Without it the camera is as the file has it by itself, or
+    /// as in the first key of its path.
+    pub frame: Option<f64>,
+    /// What surrounds the scene, for [`Integrator::Path`]. Whether the camera sees it stays as it is. Its file may lie anywhere, if its name is
+    /// absolute.
+    pub environment: Option<EnvironmentDescription>,
+    /// What the camera sees where nothing is.
+    pub background: Option<Background>,
+    /// The view transform.
+    pub view_transform: Option<ViewTransform>,
+    /// The exposure in stops, -100 to 100.
+    pub exposure: Option<f64>,
+    /// So many frames, 1 to 100,000, around what the camera looks at, in place of the way that it goes by itself: a picture of one is that of
+    /// [`Overrides::frame`], from 1 on.
+    pub turntable: Option<u32>,
+    /// Whether damage to a file that the scene names is an error. Otherwise it is a warning, and a stand-in is rendered.
+    pub strict: bool,
+    /// How a model file is shown without a scene.
+    pub presentation: Presentation,
+    /// What is shown of a glTF file, and from where.
+    pub gltf: GltfChoice,
+    /// Values for any keys of the file, one after the other; the fields above go before them.
+    pub define: Vec<Define>,
+}
+
+impl Overrides {
+    pub(super) fn apply(&self, description: &mut Description) -> Result<(), Problem> {
+        if let Some((width, height)) = self.size {
+            description.image.width = side(width).at("size")?;
+            description.image.height = side(height).at("size")?;
+        }
+        description.image.view_transform = self.view_transform.unwrap_or(description.image.view_transform);
+        if let Some(stops) = self.exposure {
+            let rule = |rule: String| Problem::of("exposure", format!("{stops} {rule}"));
+            description.image.exposure = ViewSettings::check_exposure(stops).map_err(rule)?;
+        }
+        if self.integrator.is_some() {
+            description.render.integrator = self.integrator;
+        }
+        // Before the settings, as they may decide the integrator.
+        if let Some(environment) = &self.environment {
+            surround(description, environment);
+        }
+        if let Some(background) = self.background {
+            background.show(description).at("background")?;
+        }
+        let integrator = description.integrator();
+        let render = &mut description.render;
+        if let Some(depth) = self.max_depth {
+            render.max_depth = max_depth(depth, integrator).at("max_depth")?;
+        }
+        if let Some(pattern) = self.pixel_pattern {
+            render.pixel_samples.pattern = Some(pattern);
+        }
+        set_count(&mut render.pixel_samples, self.pixel_samples, integrator).at("pixel_samples")?;
+        set_count(&mut render.light_samples, self.light_samples, integrator).at("light_samples")?;
+        render.seed = self.seed.unwrap_or(render.seed);
+        if let Some(error) = self.adaptive {
+            adaptive_error(error).at("adaptive")?;
+            let max_samples = (render.adaptive.as_ref()).and_then(|adaptive| adaptive.max_samples);
+            let further = AdaptiveDescription { error, max_samples };
+            adaptive(&further, &render.pixel_samples, integrator).at("adaptive")?;
+            render.adaptive = Some(further);
+        }
+        if let Some(frames) = self.turntable
+            && description.camera.validate().is_ok()
+        {
+            description.camera = turning(&description.camera, frames).at("turntable")?;
+        }
+        Ok(())
+    }
+}
+
+impl Overrides {
+    /// What stands in for the value of a key of the file, or for a part of it, if anything does.
+    pub fn in_place_of(&self, key: &KeyPath) -> Option<String> {
+        if let Some(define) = self.define.iter().find(|define| define.stands_in_for(key)) {
+            return Some(format!("--define {define}"));
+        }
+        let options: [(bool, &str, &[&str]); 9] = [
+            (self.size.is_some(), "--size", &["image.width", "image.height"]),
+            (self.integrator.is_some(), "integrator", &["render.integrator"]),
+            (self.max_depth.is_some(), "max_depth", &["render.max_depth"]),
+            (self.seed.is_some(), "seed", &["render.seed"]),
+            (
+                self.pixel_samples.is_some() || self.pixel_pattern.is_some(),
+                "pixel_samples",
+                &["render.pixel_samples"],
+            ),
+            (self.light_samples.is_some(), "light_samples", &["render.light_samples"]),
+            (self.adaptive.is_some(), "adaptive", &["render.adaptive"]),
+            (
+                self.environment.is_some(),
+                "--environment",
+                &["environment", "render.background"],
+            ),
+            (
+                self.background.is_some(),
+                "--background",
+                &["environment", "render.background", "render.alpha"],
+            ),
+        ];
+        let path = key.exact();
+        let is_in = |whole: &&str| {
+            path.strip_prefix(*whole)
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        let mut given = options.into_iter().filter(|(is_given, ..)| *is_given);
+        let found = given.find(|(_, _, keys)| keys.iter().any(is_in));
+        found.map(|(_, name, _)| name.to_owned())
+    }
+}
+
+fn set_count(samples: &mut SamplesDescription, count: Option<u32>, integrator: Integrator) -> Result<(), Problem> {
+    if let Some(count) = count {
+        samples.count = sample_count(samples.pattern(integrator), count)?;
+    }
+    Ok(())
+}
+
+impl Overrides {
+    /// Where the files of a scene in this folder are, which lie in a root of their own unless these say another.
+    pub fn assets(&self, folder: &Path, root: &Path) -> Assets {
+        let mut assets = Assets::beside(folder);
+        if let Some(root) = self.asset_root.as_deref().or((root != folder).then_some(root)) {
+            assets.root = root.to_owned();
+        }
+        let around = self.environment.as_ref().and_then(|around| around.file.clone());
+        assets.elsewhere.extend(around.map(PathBuf::from));
+        assets.strict = self.strict;
+        assets
+    }
+
+    /// A scene that was checked, at its frame, or why there is none.
+    pub(super) fn finish(
+        &self,
+        checked: Result<Scene, Problems>,
+        invalid: impl Fn(Problems) -> SceneError,
+        place: impl Fn(&mut CameraPath),
+    ) -> Result<Scene, SceneError> {
+        let mut scene = checked.map_err(|problems| {
+            let of_option = self
+                .environment
+                .as_ref()
+                .and_then(|_| problems.iter().find_map(of_option));
+            of_option.map_or_else(|| invalid(problems), SceneError::Override)
+        })?;
+        if let Some(path) = &mut scene.camera_path {
+            place(path);
+        }
+        if let Some(frame) = self.frame {
+            scene.camera = scene.camera_at(frame)?;
+        }
+        // The count may be the default, and yet somebody asked for it.
+        let is_asked = self.light_samples.is_some() && scene.render.integrator.follows_paths();
+        if is_asked && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
+            scene.notes.push(LIGHT_SAMPLES.into());
+        }
+        Ok(scene)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = "\
+image = { width = 4, height = 3 }
+camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
+[render]
+light_samples = { pattern = 'random', count = 5 }
+";
+
+    #[test]
+    fn overrides_stand_in_for_the_files_values() {
+        let overrides = Overrides {
+            size: Some((50, 40)),
+            pixel_samples: Some(9),
+            light_samples: Some(8),
+            seed: Some(3),
+            pixel_pattern: None,
+            adaptive: None,
+            integrator: None,
+            max_depth: None,
+            asset_root: None,
+            frame: None,
+            environment: None,
+            background: None,
+            view_transform: None,
+            exposure: None,
+            turntable: None,
+            strict: false,
+            presentation: Presentation::default(),
+            gltf: GltfChoice::default(),
+            define: Vec::new(),
+        };
+        let scene = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap();
+        let render = scene.render;
+        assert_eq!((scene.width, scene.height, render.seed), (50, 40, 3));
+        assert_eq!((render.pixel_samples.count, render.light_samples.count), (9, 8));
+        let scene = Scene::parse(SCENE, "s.toml").unwrap();
+        let render = scene.render;
+        assert_eq!((scene.width, scene.height, render.seed), (4, 3, 0));
+        assert_eq!((render.pixel_samples.count, render.light_samples.count), (16, 5));
+    }
+
+    #[test]
+    fn an_integrator_brings_its_own_ranges() {
+        let load = |integrator, max_depth| {
+            let overrides = Overrides {
+                integrator,
+                max_depth,
+                ..Overrides::default()
+            };
+            Scene::parse_with(SCENE, "s.toml", &overrides).map(|scene| scene.render)
+        };
+        let (phong, path) = (Some(Integrator::Phong), Some(Integrator::Path));
+        for (integrator, depth) in [
+            (None, 1),
+            (None, 64),
+            (phong, 1),
+            (phong, 64),
+            (path, 0),
+            (path, 64),
+            (path, 1024),
+        ] {
+            let render = load(integrator, Some(depth)).unwrap();
+            assert_eq!(render.integrator, integrator.unwrap_or(Integrator::Phong));
+            assert_eq!(render.max_depth, depth);
+        }
+        assert_eq!(load(path, None).unwrap().max_depth, 8);
+        let told = |integrator, depth| load(integrator, Some(depth)).unwrap_err().to_string();
+        assert_eq!(told(None, 0), "max_depth: 0 must be from 1 to 64");
+        assert_eq!(told(phong, 65), "max_depth: 65 must be from 1 to 64");
+        assert_eq!(told(path, 1025), "max_depth: 1025 must be from 0 to 1024");
+        // The pattern of the samples is the integrator's, if none is said.
+        let samples = |integrator| {
+            let overrides = Overrides {
+                integrator,
+                pixel_samples: Some(8),
+                ..Overrides::default()
+            };
+            Scene::parse_with(SCENE, "s.toml", &overrides)
+        };
+        assert_eq!(samples(path).unwrap().render.pixel_samples.pattern, Pattern::Sobol);
+        assert!(samples(phong).is_err());
+    }
+
+    #[test]
+    fn bad_overrides_are_told_by_their_names() {
+        let none = Overrides::default;
+        for (overrides, told) in [
+            (
+                Overrides {
+                    size: Some((0, 1)),
+                    ..none()
+                },
+                "size: 0 must be from 1 to 65536",
+            ),
+            (
+                Overrides {
+                    size: Some((1, 65_537)),
+                    ..none()
+                },
+                "size: 65537 must be from 1 to 65536",
+            ),
+            (
+                Overrides {
+                    pixel_samples: Some(8),
+                    ..none()
+                },
+                "pixel_samples: 8 must be a square number, such as 4 or 9: the pattern \"grid\" is an n x n grid; other patterns take any number",
+            ),
+            (
+                Overrides {
+                    light_samples: Some(0),
+                    ..none()
+                },
+                "light_samples: 0 must be from 1 to 65536",
+            ),
+        ] {
+            let error = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap_err();
+            assert!(matches!(error, SceneError::Override(_)), "{error}");
+            assert_eq!(error.to_string(), told);
+        }
+    }
+}
