@@ -22,7 +22,7 @@ impl Description {
         let text = self.sections()?;
         match Description::parse(&text, "") {
             Ok(read) if read == *self => Ok(text),
-            _ => toml::to_string(self), // all of it, word for word
+            _ => toml::to_string(&Table::try_from(self)?), // with all keys
         }
     }
 

@@ -42,7 +42,12 @@ impl<'de> Deserializer<'de> for Read {
                 let pairs = table.into_iter().map(|(key, value)| (key, Read(value)));
                 visitor.visit_map(MapDeserializer::new(pairs))
             }
-            plain => plain.deserialize_any(visitor),
+            // Not by `Value::deserialize_any`, for which the compiler would generate the derived code of tables and lists again.
+            Value::Boolean(value) => visitor.visit_bool(value),
+            Value::Integer(value) => visitor.visit_i64(value),
+            Value::Float(value) => visitor.visit_f64(value),
+            Value::String(value) => visitor.visit_string(value),
+            Value::Datetime(value) => visitor.visit_string(value.to_string()),
         }
     }
 
@@ -66,14 +71,17 @@ impl<'de> Deserializer<'de> for Read {
         visitor.visit_newtype_struct(self)
     }
 
-    /// Enums of a scene file have names alone.
+    /// Enums of a scene file are strings.
     fn deserialize_enum<V: Visitor<'de>>(
         self,
-        name: &'static str,
-        variants: &'static [&'static str],
+        _: &'static str,
+        _: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Error> {
-        self.0.deserialize_enum(name, variants, visitor)
+        match self.0 {
+            Value::String(name) => visitor.visit_enum(name.into_deserializer()),
+            _ => Err(Error::invalid_type(Unexpected::UnitVariant, &"string only")),
+        }
     }
 
     forward_to_deserialize_any! {

@@ -1,8 +1,8 @@
 //! Accessors (specification, section 3.6.2): typed views of bytes, as numbers of 32 bits.
 
-use gltf::json::accessor::sparse::Sparse;
-use gltf::json::accessor::{Accessor, ComponentType, Type};
-use gltf::json::validation::Checked;
+use gltf_json::accessor::sparse::Sparse;
+use gltf_json::accessor::{Accessor, ComponentType, Type};
+use gltf_json::validation::Checked;
 
 use super::budget::Thing;
 use super::document::Document;

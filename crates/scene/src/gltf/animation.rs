@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use ::gltf::json::animation::{Interpolation, Property};
-use ::gltf::json::validation::Checked;
 use glam::{DQuat, DVec3};
+use gltf_json::animation::{Interpolation, Property};
+use gltf_json::validation::Checked;
 
 use super::document::Document;
 use super::error::GltfError;

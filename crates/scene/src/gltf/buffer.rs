@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use gltf::json::Root;
+use gltf_json::Root;
 
 use super::budget::{Budget, Thing};
 use super::error::Fault;

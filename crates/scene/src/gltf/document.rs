@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use gltf::json::Root;
+use gltf_json::Root;
 
 use super::budget::Budget;
 use super::buffer::{Buffers, MOST_BYTES};

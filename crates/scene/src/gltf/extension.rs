@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use gltf::json::Root;
-use gltf::json::accessor::Accessor;
-use gltf::json::mesh::Semantic;
-use gltf::json::validation::Checked;
+use gltf_json::Root;
+use gltf_json::accessor::Accessor;
+use gltf_json::mesh::Semantic;
+use gltf_json::validation::Checked;
 use serde_json::{Map, Value};
 
 use super::error::{Fault, shown};

@@ -1,9 +1,9 @@
 //! From the text of a glTF file to [`Root`]: limits, what files in the wild get wrong and the crate is strict about, and the
 //! crate's own validation.
 
-use gltf::json::camera::Type;
-use gltf::json::validation::{Checked, Error, Validate as _};
-use gltf::json::{Path, Root};
+use gltf_json::camera::Type;
+use gltf_json::validation::{Checked, Error, Validate as _};
+use gltf_json::{Path, Root};
 use serde_json::{Map, Number, Value};
 
 use super::error::{Fault, Place, plain, shown};

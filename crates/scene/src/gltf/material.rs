@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use ::gltf::json::material::AlphaMode as JsonAlphaMode;
-use ::gltf::json::mesh::Primitive;
-use ::gltf::json::validation::Checked;
+use gltf_json::material::AlphaMode as JsonAlphaMode;
+use gltf_json::mesh::Primitive;
+use gltf_json::validation::Checked;
 use serde_json::{Map, Value};
 
 use super::ImportedMaterial;

@@ -1,7 +1,7 @@
 //! Nodes: where they are. Section 3.5.
 
-use ::gltf::json::scene::Node;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
+use gltf_json::scene::Node;
 
 use super::document::Document;
 use super::error::GltfError;

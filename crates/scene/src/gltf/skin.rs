@@ -1,8 +1,8 @@
 //! Skins: section 3.7.3. A vertex goes with its joints, wherever the node of its mesh is.
 
-use ::gltf::json::mesh::{Primitive, Semantic};
-use ::gltf::json::validation::Checked;
 use glam::{DAffine3, DMat4};
+use gltf_json::mesh::{Primitive, Semantic};
+use gltf_json::validation::Checked;
 
 use super::document::Document;
 use super::error::GltfError;

@@ -3,8 +3,8 @@
 
 use std::io::Cursor;
 
-use ::gltf::json::texture::{MagFilter, WrappingMode};
-use ::gltf::json::validation::Checked;
+use gltf_json::texture::{MagFilter, WrappingMode};
+use gltf_json::validation::Checked;
 use image::{ImageDecoder as _, ImageReader};
 use serde::Deserialize;
 use serde_json::{Map, Value};

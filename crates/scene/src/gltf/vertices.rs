@@ -1,8 +1,8 @@
 //! The vertices of a primitive, from its accessors: morphed, skinned and checked.
 
-use ::gltf::json::mesh::{Primitive, Semantic};
-use ::gltf::json::validation::Checked;
 use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
+use gltf_json::mesh::{Primitive, Semantic};
+use gltf_json::validation::Checked;
 
 use super::document::Document;
 use super::error::GltfError;

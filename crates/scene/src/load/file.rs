@@ -1,4 +1,4 @@
-//! Files of scenes: their texts and bytes.
+//! Reads scene files with a limit on their size.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -8,15 +8,15 @@ use crate::error::SceneError;
 use crate::parse::{NOT_UTF8, encoding, syntax_error};
 use wgray_image::waiting;
 
-/// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
-const LARGEST_FILE: u64 = 64 << 20;
+/// Maximum size of a scene file in bytes: far above any that people write, far below the memory of a machine.
+const MAX_FILE_BYTES: u64 = 64 << 20;
 
-/// The folder of a file.
+/// Returns the folder of a file.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().unwrap_or(Path::new("."))
 }
 
-/// The text of a file.
+/// Reads a file of UTF-8 text.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
     let bytes = read_bytes(path).map_err(|error| SceneError::Read {
         path: path.to_owned(),
@@ -24,7 +24,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     })?;
     String::from_utf8(bytes).map_err(|error| {
         let text = String::from_utf8_lossy(error.as_bytes());
-        // Up to there the lossy text is the file's.
+        // The lossy text equals the file up to this byte.
         let valid = error.utf8_error().valid_up_to();
         let name = path.display().to_string();
         match encoding(error.as_bytes()) {
@@ -39,7 +39,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     })
 }
 
-/// The bytes of a file, which must be one that ends, and no longer than a scene may be.
+/// Reads a file of at most [`MAX_FILE_BYTES`]; pipes and devices that may block are refused.
 pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     waiting::check(path)?;
     if path.is_dir() {
@@ -49,8 +49,8 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
         ));
     }
     let mut bytes = Vec::new();
-    File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST_FILE {
+    File::open(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, "it is larger than 64 MiB"));
     }
     Ok(bytes)
@@ -94,7 +94,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         assert!(told("none.toml").starts_with(&format!("{}: cannot be read: ", path("none.toml"))));
         File::create(folder.path().join("huge.toml"))
             .unwrap()
-            .set_len(LARGEST_FILE + 1)
+            .set_len(MAX_FILE_BYTES + 1)
             .unwrap();
         assert_eq!(
             told("huge.toml"),

@@ -1,29 +1,29 @@
-//! The parts of a glTF file that are shown.
+//! Selection of the parts of a glTF file to render.
 
 use crate::error::SceneError;
 use crate::gltf::GltfError;
 use crate::problem::Problem;
 use crate::{Selection, View};
 
-/// What is shown of a glTF file, and from where.
+/// The parts of a glTF file to render, and the view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GltfChoice {
-    /// Which of its scenes; without, the one that the file names, else the first.
+    /// The scene; `None` is the default scene of the file, or its first one.
     pub scene: Option<Selection>,
-    /// Which of its cameras; without, the first, if there is any.
+    /// The camera; `None` is the first one, if the file has cameras.
     pub camera: Option<Selection>,
-    /// From where it is seen as a whole, in place of any camera of its own; if it has none, [`View::Corner`].
+    /// A view of the whole model instead of a camera of the file; [`View::Corner`] if the file has no camera.
     pub view: Option<View>,
-    /// At which second of an animation.
+    /// The time of the animation in seconds.
     pub time: Option<f64>,
-    /// Which of its animations; without, the first, where a time is said.
+    /// The animation; `None` is the first one if `time` is set.
     pub animation: Option<Selection>,
-    /// Which of its variants of materials.
+    /// The material variant.
     pub variant: Option<Selection>,
 }
 
 impl GltfChoice {
-    /// The first thing that is chosen, as a command line calls it.
+    /// Returns the name of the first option that is set, as on the command line.
     pub(crate) fn first(&self) -> Option<&'static str> {
         let all = [
             (self.scene.is_some(), "gltf_scene"),
@@ -37,8 +37,8 @@ impl GltfChoice {
         chosen.map(|(_, name)| name)
     }
 
-    /// Returns an error of the file, or of the option that chooses something that it does not have.
-    pub(super) fn told(&self, error: GltfError) -> SceneError {
+    /// Converts an error: one of the file, or of the option that selects something the file does not have.
+    pub(super) fn error(&self, error: GltfError) -> SceneError {
         let given = |option: &str| match option {
             "gltf_scene" => self.scene.is_some(),
             "animation" => self.animation.is_some(),

@@ -72,7 +72,7 @@ pub(crate) fn describe(
         error,
     })?;
     let choice = Choice::of(&shape).map_err(SceneError::Override)?;
-    let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.told(error.at(path)))?;
+    let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.error(error.at(path)))?;
     let presentation = &overrides.presentation;
     let camera = match view.is_some() || presentation.orbit.is_some() {
         true => None,

@@ -1,4 +1,4 @@
-//! Values in place of those of a scene file.
+//! Overrides of the values of a scene file.
 
 use std::path::{Path, PathBuf};
 
@@ -15,50 +15,47 @@ use crate::{
     SamplesDescription, Scene, ViewSettings, ViewTransform,
 };
 
-/// Values that stand in for those of a file. Where one is bad the error is [`SceneError::Override`], which names the
-/// field.
+/// Values that override those of a file. An invalid one is a [`SceneError::Override`], which names the field.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
-    /// Width and height of the picture, in pixels, 1 to 65,536.
+    /// Width and height of the image in pixels, each 1 to 65,536.
     pub size: Option<(u32, u32)>,
-    /// The count of every pixel's samples; their pattern stays.
+    /// Samples per pixel; the pattern is not changed.
     pub pixel_samples: Option<u32>,
-    /// The count of samples of every area light at every hit; their pattern stays.
+    /// Samples per area light at each hit; the pattern is not changed.
     pub light_samples: Option<u32>,
     /// The seed of all random patterns.
     pub seed: Option<u32>,
-    /// The layout of a pixel's samples; their count stays.
+    /// Sample pattern of the pixels; the count is not changed.
     pub pixel_pattern: Option<Pattern>,
-    /// The error that adaptive sampling aims at, 0 to 1; the most samples stay.
+    /// Target error of adaptive sampling, 0 to 1; the maximum number of samples is not changed.
     pub adaptive: Option<f64>,
-    /// What light is simulated.
+    /// The integrator.
     pub integrator: Option<Integrator>,
-    /// The most bounces of a path, 1 to 64, or 0 to 1024 where the integrator is [`Integrator::Path`].
+    /// Maximum path depth, 1 to 64; 0 to 1024 for [`Integrator::Path`].
     pub max_depth: Option<u32>,
-    /// The folder that files named by the scene must lie in, instead of the scene's own.
+    /// Folder that must contain all files of the scene; `None` is the folder of the scene file.
     pub asset_root: Option<PathBuf>,
-    /// The frame that [`Scene::camera`] is of, if the camera moves. Without it the camera is as the file has it by itself, or
-    /// as in the first key of its path.
+    /// Frame of an animated camera; `None` is the camera of the file outside of its path, or the first key of the path.
     pub frame: Option<f64>,
-    /// What surrounds the scene, for [`Integrator::Path`]. Whether the camera sees it stays as it is. Its file may lie anywhere, if its name is
-    /// absolute.
+    /// The environment, for [`Integrator::Path`]. Its visibility to the camera is not changed. A file with an absolute path may be anywhere.
     pub environment: Option<EnvironmentDescription>,
-    /// What the camera sees where nothing is.
+    /// The background.
     pub background: Option<Background>,
     /// The view transform.
     pub view_transform: Option<ViewTransform>,
     /// The exposure in stops, -100 to 100.
     pub exposure: Option<f64>,
-    /// So many frames, 1 to 100,000, around what the camera looks at, in place of the way that it goes by itself: a picture of one is that of
-    /// [`Overrides::frame`], from 1 on.
+    /// Number of frames of an orbit around the point that the camera looks at, 1 to 100,000, instead of the path of the camera.
+    /// [`Overrides::frame`] selects one of them, from 1.
     pub turntable: Option<u32>,
-    /// Whether damage to a file that the scene names is an error. Otherwise it is a warning, and a stand-in is rendered.
+    /// If true, damage to a file of the scene is an error; otherwise it is a warning and a placeholder is rendered.
     pub strict: bool,
-    /// How a model file is shown without a scene.
+    /// Presentation of a model file without a scene.
     pub presentation: Presentation,
-    /// What is shown of a glTF file, and from where.
+    /// The parts of a glTF file to render.
     pub gltf: GltfChoice,
-    /// Values for any keys of the file, one after the other; the fields above go before them.
+    /// Values of any keys of the file, applied in order; the fields above take precedence.
     pub define: Vec<Define>,
 }
 
@@ -76,7 +73,7 @@ impl Overrides {
         if self.integrator.is_some() {
             description.render.integrator = self.integrator;
         }
-        // Before the settings, as they may decide the integrator.
+        // First, as the environment and the background may determine the integrator.
         if let Some(environment) = &self.environment {
             surround(description, environment);
         }
@@ -111,7 +108,7 @@ impl Overrides {
 }
 
 impl Overrides {
-    /// What stands in for the value of a key of the file, or for a part of it, if anything does.
+    /// Returns the option that overrides the value of a key of the file, or a part of it.
     pub fn in_place_of(&self, key: &KeyPath) -> Option<String> {
         if let Some(define) = self.define.iter().find(|define| define.stands_in_for(key)) {
             return Some(format!("--define {define}"));
@@ -158,7 +155,7 @@ fn set_count(samples: &mut SamplesDescription, count: Option<u32>, integrator: I
 }
 
 impl Overrides {
-    /// Where the files of a scene in this folder are, which lie in a root of their own unless these say another.
+    /// Returns the locations of the files of a scene in `folder`. They must be below `root`, or below the overridden root.
     pub fn assets(&self, folder: &Path, root: &Path) -> Assets {
         let mut assets = Assets::beside(folder);
         if let Some(root) = self.asset_root.as_deref().or((root != folder).then_some(root)) {
@@ -170,7 +167,7 @@ impl Overrides {
         assets
     }
 
-    /// A scene that was checked, at its frame, or why there is none.
+    /// Applies the frame to a validated scene, or returns its errors.
     pub(super) fn finish(
         &self,
         checked: Result<Scene, Problems>,
@@ -190,7 +187,7 @@ impl Overrides {
         if let Some(frame) = self.frame {
             scene.camera = scene.camera_at(frame)?;
         }
-        // The count may be the default, and yet somebody asked for it.
+        // The user may have asked for the default count, which validation does not notice.
         let is_asked = self.light_samples.is_some() && scene.render.integrator.follows_paths();
         if is_asked && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
             scene.notes.push(LIGHT_SAMPLES.into());
