@@ -14,7 +14,7 @@ use wgray_render::cpu::light::segments_to_light;
 use wgray_render::cpu::phong::{Lobes, phong_block};
 use wgray_render::cpu::ray::Ray;
 use wgray_render::cpu::rectangle::intersect_rectangle;
-use wgray_render::cpu::shadow::{Block, cone_to_light, may_block, shadow_bits};
+use wgray_render::cpu::shadow::{SampleBlock, light_frustum, may_block, occlusion_mask};
 use wgray_render::cpu::surface::surface_at;
 use wgray_render::cpu::triangle::intersect_triangle;
 use wgray_render::gpu::{self, Choice, Gpu, Options, compose::Shaders};
@@ -85,7 +85,7 @@ fn twins(criterion: &mut Criterion) {
     };
     let light = &scene.lighting.lights[0];
     let surface = surface_at(rectangle, 0, ray, 3.0, 1e-5);
-    let block = Block {
+    let block = SampleBlock {
         pattern: GRID,
         side: 4,
         first: 0,
@@ -93,7 +93,7 @@ fn twins(criterion: &mut Criterion) {
         group: 0,
         key: UVec2::ZERO,
     };
-    let cone = cone_to_light(light, surface.start);
+    let cone = light_frustum(light, surface.ray_origin);
     let bound = scene.bounds[of_kind(ELLIPSOID)];
 
     let mut group = criterion.benchmark_group("twins");
@@ -107,14 +107,14 @@ fn twins(criterion: &mut Criterion) {
         b.iter(|| intersect_ellipsoid(ellipsoid, false, black_box(ray), INFINITE_T))
     });
     group.bench_function("may_block", |b| b.iter(|| may_block(&black_box(bound), &cone)));
-    group.bench_function("shadow_bits of 16 samples, triangle", |b| {
-        b.iter(|| shadow_bits(TRIANGLE, triangle, black_box(surface.start), false, light, block))
+    group.bench_function("occlusion_mask of 16 samples, triangle", |b| {
+        b.iter(|| occlusion_mask(TRIANGLE, triangle, black_box(surface.ray_origin), false, light, block))
     });
-    group.bench_function("shadow_bits of 16 samples, ellipsoid", |b| {
-        b.iter(|| shadow_bits(ELLIPSOID, ellipsoid, black_box(surface.start), false, light, block))
+    group.bench_function("occlusion_mask of 16 samples, ellipsoid", |b| {
+        b.iter(|| occlusion_mask(ELLIPSOID, ellipsoid, black_box(surface.ray_origin), false, light, block))
     });
     group.bench_function("phong_block of 16 samples", |b| {
-        let to = segments_to_light(light, surface.start);
+        let to = segments_to_light(light, surface.ray_origin);
         let none = Lobes {
             diffuse: 0.0,
             specular: 0.0,

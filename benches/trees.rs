@@ -6,7 +6,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use rayon::prelude::*;
 use wgray_render::bvh::{Aabb, MOST_IN_LEAF, Tree, build};
-use wgray_render::cpu::walk::{Directions, Level, Line, Mesh, Nearest, Segments, closest, hidden};
+use wgray_render::cpu::traversal::{Directions, Level, Line, Mesh, Nearest, Segments, closest, occluded};
 
 /// Triangles, three corners each.
 struct Surface {
@@ -146,8 +146,8 @@ impl View {
         closest(level, &self.mesh(), &line, 0.0, u32::MAX, none)
     }
 
-    /// Which of the samples of the light are hidden; none where the light is behind the surface.
-    fn hidden(&self, level: Level, pixel: usize, hit: Nearest) -> Option<u32> {
+    /// Which of the samples of the light are occluded; `None` where the light is behind the surface.
+    fn occluded(&self, level: Level, pixel: usize, hit: Nearest) -> Option<u32> {
         let triangle = self.surface.triangles.get(hit.number as usize)?;
         let [a, b, c] = triangle.map(|i| self.surface.corners[i as usize]);
         let d = View::direction(pixel);
@@ -165,10 +165,10 @@ impl View {
             o,
             pad: PAD,
             directions: &Directions::new(&directions),
-            reach: 1.0,
+            t_max: 1.0,
             skip: hit.number,
         };
-        Some(hidden(level, &self.mesh(), &segments, 0xffff))
+        Some(occluded(level, &self.mesh(), &segments, 0xffff))
     }
 }
 
@@ -177,7 +177,7 @@ fn walks(criterion: &mut Criterion) {
     let level = Level::new();
     let pixels = SIDE * SIDE;
     let hits: Vec<Nearest> = (0..pixels).map(|i| view.first_hit(level, i)).collect();
-    let to_light = (0..pixels).filter_map(|i| view.hidden(level, i, hits[i])).count();
+    let to_light = (0..pixels).filter_map(|i| view.occluded(level, i, hits[i])).count();
     let mut group = criterion.benchmark_group("walk over 70k triangles");
     group.sample_size(20);
     group.throughput(Throughput::Elements(pixels as u64));
@@ -191,7 +191,7 @@ fn walks(criterion: &mut Criterion) {
     group.bench_function("16 segments to a light", |b| {
         b.iter(|| -> u32 {
             let rays = (0..pixels).into_par_iter().with_min_len(SIDE);
-            rays.map(|i| view.hidden(level, i, hits[i]).unwrap_or(0).count_ones())
+            rays.map(|i| view.occluded(level, i, hits[i]).unwrap_or(0).count_ones())
                 .sum()
         });
     });

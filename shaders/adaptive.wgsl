@@ -45,15 +45,15 @@ fn display_slope_squared(value: f32) -> f32 {
 
 // A first look at a pixel after another sample: y the sum over samples and channels of squared deviations, z the sum
 // over samples of their squares.
-fn look_with(look: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
+fn pilot_add(shading: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     let deviation = squared_deviation(sum, sample);
     let total = deviation.x + deviation.y + deviation.z;
-    return vec4f(look.x, look.y + total, look.z + total * total, look.w);
+    return vec4f(shading.x, shading.y + total, shading.z + total * total, shading.w);
 }
 
 // A first look at its end: x the square of the standard error that the pixel then has as displayed, w one pixel.
-fn whole_look(look: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
-    return vec4f(display_variance(sum, moments), look.y, look.z, 1.0);
+fn pilot_finish(shading: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
+    return vec4f(display_variance(sum, moments), shading.y, shading.z, 1.0);
 }
 
 // The samples of a pixel, at most so many, by the sum of its neighbours' first looks of `first` samples each: twice as
@@ -67,7 +67,7 @@ fn samples_wanted(looks: vec4f, first: u32, squared_error: f32, most: u32) -> u3
     var count = first;
     while count < most {
         let enough = variance <= squared_error * f32(count);
-        let evident = looks.y * looks.y >= looks.z * (EVIDENCE * (f32(2u * count / first) - 1.0));
+        let evident = looks.y * looks.y >= looks.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * (f32(2u * count / first) - 1.0));
         if enough | !evident {
             break;
         }

@@ -11,21 +11,21 @@ fn light_counts() -> vec2u {
 }
 
 // Of the hit so far and the primitives of a kind.
-fn closest_of(kind: u32, before: Hit, ray: Ray, left: u32, wall: u32) -> Hit {
+fn closest_of(kind: u32, before: Hit, ray: Ray, origin_prim: u32, inside_prim: u32) -> Hit {
     var hit = before;
     let range = counts.primitives[kind];
     for (var i = range.x; i < range.z; i++) {
-        hit = closer(hit, intersect(kind, primitives[i], i == wall, ray, hit.t), i, left);
+        hit = closer(hit, intersect(kind, primitives[i], i == inside_prim, ray, hit.t), i, origin_prim);
     }
     return hit;
 }
 
-// Returns whether any primitive of a kind except `goal` occludes the segment from a surface to `reach` times `to`, or `before`.
-fn is_hidden_by(kind: u32, before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+// Returns whether any primitive of a kind except `target_prim` occludes the segment from a surface to `t_max` times `to`, or `before`.
+fn is_occluded_by(kind: u32, before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let range = counts.primitives[kind];
     var hidden = before;
     for (var i = range.x; i < range.y && !hidden; i++) {
-        hidden = is_cut(kind, primitives[i], i, surface, to, reach, goal);
+        hidden = is_occluded_by_primitive(kind, primitives[i], i, surface, to, t_max, target_prim);
     }
     return hidden;
 }

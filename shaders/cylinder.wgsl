@@ -55,10 +55,10 @@ fn intersect_cylinder(q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> 
 }
 
 // Returns whether the surface cuts the segment o + s d, s in (0, reach), of local space.
-fn cylinder_blocks(o: vec3f, d: vec3f, levels: vec2f, reach: f32) -> bool {
+fn cylinder_occludes(o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     let inside = cylinder_interval(o, d, levels);
-    let enters = (inside.x > 0.0) & (inside.x < reach);
-    let leaves = (inside.y > 0.0) & (inside.y < reach);
+    let enters = (inside.x > 0.0) & (inside.x < t_max);
+    let leaves = (inside.y > 0.0) & (inside.y < t_max);
     return (inside.x < inside.y) & (enters | leaves);
 }
 

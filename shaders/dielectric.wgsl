@@ -23,19 +23,19 @@ fn refracts_inwards(surface: Surface, material: Material, normal: vec3f) -> bool
 
 // The path's way on, by `random` in [0, 1). Radiance grows with the square of the index of refraction where it enters: Veach,
 // "Robust Monte Carlo Methods for Light Transport Simulation", thesis, 1997, section 5.2.
-struct Passage {
+struct DielectricSample {
     path: Path,
     passes: bool,          // through the surface
     eta: f32,              // the ratio of the indices before and behind it if so, else 1
 }
 
-fn dielectric_sample(path: Path, surface: Surface, at: Arrival, material: Material, random: f32) -> Passage {
+fn dielectric_sample(path: Path, surface: Surface, at: HitDifferential, material: Material, random: f32) -> DielectricSample {
     let eta = eta_of(surface, material);
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
     let cosine_t = refracted_cosine(cosine_i, eta);
     if random < fresnel(cosine_i, cosine_t, eta) {
-        return Passage(reflected_path(path, surface, at, path.throughput), false, 1.0);
+        return DielectricSample(reflected_path(path, surface, at, path.throughput), false, 1.0);
     }
     let throughput = path.throughput * material.tint * (eta * eta);
-    return Passage(refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t), true, eta);
+    return DielectricSample(refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t), true, eta);
 }

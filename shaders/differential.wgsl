@@ -49,27 +49,27 @@ fn refracted_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f, e
 }
 
 // A ray's differential at a surface: the positions on it, the directions still those before it, and the normal's.
-struct Arrival {
+struct HitDifferential {
     x: Derivative,
     y: Derivative,
     normal_x: vec3f,
     normal_y: vec3f,
 }
 
-fn arrival(q: Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival {
+fn arrival(q: Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential {
     let local = point_to_local(q, surface.position);
     let x = transferred(differential.x, ray, t, surface.normal);
     let y = transferred(differential.y, ray, t, surface.normal);
     let normal_x = normal_derivative(q, local, x.position) * surface.side;
     let normal_y = normal_derivative(q, local, y.position) * surface.side;
-    return Arrival(x, y, normal_x, normal_y);
+    return HitDifferential(x, y, normal_x, normal_y);
 }
 
-fn reflected_differential(at: Arrival, d: vec3f, n: vec3f) -> Differential {
+fn reflected_differential(at: HitDifferential, d: vec3f, n: vec3f) -> Differential {
     return Differential(reflected_derivative(at.x, d, n, at.normal_x), reflected_derivative(at.y, d, n, at.normal_y));
 }
 
-fn refracted_differential(at: Arrival, d: vec3f, n: vec3f, eta: f32, cosine: f32) -> Differential {
+fn refracted_differential(at: HitDifferential, d: vec3f, n: vec3f, eta: f32, cosine: f32) -> Differential {
     return Differential(refracted_derivative(at.x, d, n, at.normal_x, eta, cosine),
                         refracted_derivative(at.y, d, n, at.normal_y, eta, cosine));
 }

@@ -10,7 +10,7 @@ fn intersect_disk(q: Primitive, ray: Ray, limit: f32) -> f32 {
 }
 
 // Whether it cuts the segment o + s d, s in (0, reach), of local space.
-fn disk_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
+fn disk_occludes(o: vec3f, d: vec3f, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
-    return crosses_plane(o, d, reach) & (p.x * p.x + p.y * p.y <= d.z * d.z);
+    return crosses_plane(o, d, t_max) & (p.x * p.x + p.y * p.y <= d.z * d.z);
 }

@@ -22,16 +22,16 @@ fn longitude(local: vec3f) -> f32 {
     return select(turn, turn + 1.0, turn < 0.0);
 }
 
-// The distance of the nearest hit in (0, limit), else `limit`. `wall` says that the ray starts on the surface and goes
+// The distance of the nearest hit in (0, limit), else `limit`. `inside_prim` says that the ray starts on the surface and goes
 // through the inside: then the other end of the chord is the hit. The nearer root avoids cancellation: Haines, Guenther
 // and Akenine-Moeller, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.
-fn intersect_ellipsoid(q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
+fn intersect_ellipsoid(q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let o = from_anchor - q.middle;
     let d = vector_to_local(q, ray.direction);
     let a = dot(d, d);
     let b = dot(o, d);
-    let start = select(ellipsoid_level(q, from_anchor), 0.0, wall);
+    let start = select(ellipsoid_level(q, from_anchor), 0.0, inside_prim);
     let discriminant = ellipsoid_discriminant(o, d, start);
     let root = sqrt(max(discriminant, 0.0));
     let sum = select(-b - root, root - b, b < 0.0);
@@ -45,10 +45,10 @@ fn intersect_ellipsoid(q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
 // Whether its surface cuts the segment o + s d, s in (0, reach), of local space; `start` is |o|^2 - 1. It does if the ends
 // lie on different sides; or if both are outside, the nearest point to the centre is between them, and the line comes
 // within the sphere.
-fn ellipsoid_blocks(o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
+fn ellipsoid_occludes(o: vec3f, d: vec3f, start: f32, t_max: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);
-    let end = start + reach * (2.0 * b + reach * a);
-    let passes = (b < 0.0) & (-b < reach * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
+    let end = start + t_max * (2.0 * b + t_max * a);
+    let passes = (b < 0.0) & (-b < t_max * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
     return ((start < 0.0) != (end < 0.0)) | ((start > 0.0) & passes);
 }

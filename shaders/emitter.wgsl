@@ -6,13 +6,13 @@ struct LightSample {
     radiance: vec3f,       // of a light without extent, what its light weighs there for a density of 1
     pdf: f32,              // per solid angle, with the light's choice; the choice's alone of a light without extent
     is_delta: bool,        // has no extent, so that no other ray finds it
-    reach: f32,            // where shadow rays end, as a multiple of `to`
+    t_max: f32,            // where shadow rays end, as a multiple of `to`
     primitive: u32,        // the emissive primitive, which does not occlude itself, or NO_INDEX
 }
 
 // One of all that shines, by its power: Walker, "An Efficient Method for Generating Discrete Random Variables with General
 // Distributions", ACM TOMS 3(3), 1977. Two numbers of 32 random bits.
-fn chosen_emitter(bits: vec2u) -> Emitter {
+fn select_emitter(bits: vec2u) -> Emitter {
     let count = emitter_count();
     if EMITTERS == 1u {
         return load_emitter(0u);
@@ -24,7 +24,7 @@ fn chosen_emitter(bits: vec2u) -> Emitter {
 
 // A sample of the light that arrives at p from what was chosen, for a uniform u. `normal` is that of a surface which light from its side
 // alone can reach, or 0.
-fn sample_emitter(chosen: Chosen, p: vec3f, normal: vec3f, u: vec2f) -> LightSample {
+fn sample_emitter(chosen: EmitterSelection, p: vec3f, normal: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     if (EMITTER_KINDS & (1u << INSTANCE)) != 0u {
         if emitter.instance != 0u {
@@ -89,18 +89,18 @@ fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
             let q = load_primitive(light.primitive);
             let uv = primitive_uv(q, point_to_local(q, p + to));
             let hit = hit_on_primitive(light.primitive);
-            radiance = emission_at(load_material(q.material), spot_by_itself(q), hit, uv);
+            radiance = emission_at(load_material(q.material), standalone_hit_primitive(q), hit, uv);
         }
     }
-    if SEES_THROUGH != 0u {
+    if ALPHA_SURFACES != 0u {
         if !is_delta {
             let q = load_primitive(light.primitive);
             let hit = hit_on_primitive(light.primitive);
-            radiance *= presence_at(load_material(q.material), spot_by_itself(q), hit, primitive_uv(q, point_to_local(q, p + to)));
+            radiance *= opacity_at(load_material(q.material), standalone_hit_primitive(q), hit, primitive_uv(q, point_to_local(q, p + to)));
         }
     }
     radiance = select(radiance, vec3f(0.0), behind);
-    return LightSample(to, radiance, pdf, is_delta, light.reach, light.primitive);
+    return LightSample(to, radiance, pdf, is_delta, light.t_max, light.primitive);
 }
 
 // A hit on a primitive by itself, for what asks for no more of it.
@@ -109,7 +109,7 @@ fn hit_on_primitive(primitive: u32) -> Hit {
 }
 
 // Of a triangle of a mesh.
-fn sample_face(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
+fn sample_face(chosen: EmitterSelection, p: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     let b = triangle_sample(u);
     let hit = Hit(0.0, emitter.instance, 0u, emitter.index, b);
@@ -125,25 +125,25 @@ fn sample_face(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
             radiance *= vertex_color(hit).xyz;
         }
     }
-    if SEES_THROUGH != 0u {
-        radiance *= presence_at(material, face, hit, face_uv(face, b));
+    if ALPHA_SURFACES != 0u {
+        radiance *= opacity_at(material, face, hit, face_uv(face, b));
     }
     var density = material.density;
     if LIGHT_TREE != 0u {
         density = chosen.density;
     }
     let pdf = solid_angle_pdf(density, to, face.primitive.z);
-    return LightSample(to, radiance, pdf, false, environment.reach, NO_INDEX);
+    return LightSample(to, radiance, pdf, false, environment.t_max, NO_INDEX);
 }
 
 // What a surface radiates at texture coordinates, the colours of its vertices aside.
-fn emission_at(material: Material, spot: Spot, hit: Hit, uv: vec2f) -> vec3f {
+fn emission_at(material: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> vec3f {
     var emission = material.emission;
     for (var i = 0u; i < LOOKUPS; i++) {
         if i < material.lookups.y {
             let lookup = load_lookup(material.lookups.x + i);
             if (lookup.purposes & FOR_EMISSION) != 0u {
-                let place = uv_in_set(uv, spot, hit, lookup.uv_set);
+                let place = uv_in_set(uv, prim, hit, lookup.uv_set);
                 emission = texture_color(load_texture(lookup.texture), Footprint(place, vec2f(0.0), vec2f(0.0)));
             }
         }
@@ -152,17 +152,17 @@ fn emission_at(material: Material, spot: Spot, hit: Hit, uv: vec2f) -> vec3f {
 }
 
 // The density that `sample_emitter` gives to what a ray has met, with the emitter's choice, where samples have this density per area.
-fn emitter_pdf(spot: Spot, hit: Hit, density: f32, ray: Ray, normal: vec3f) -> f32 {
+fn emitter_pdf(prim: HitPrimitive, hit: Hit, density: f32, ray: Ray, normal: vec3f) -> f32 {
     if (EMITTER_KINDS & (1u << ELLIPSOID)) != 0u {
-        if spot.primitive.kind == ELLIPSOID {
-            let q = spot.primitive;
+        if prim.primitive.kind == ELLIPSOID {
+            let q = prim.primitive;
             return density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
         }
     }
     var per_area = density;
     if (EMITTER_KINDS & (1u << CYLINDER)) != 0u {
-        if spot.primitive.kind == CYLINDER {
-            per_area = density * cylinder_share(spot.primitive, ray.origin);
+        if prim.primitive.kind == CYLINDER {
+            per_area = density * cylinder_share(prim.primitive, ray.origin);
         }
     }
     return solid_angle_pdf(per_area, ray.direction * hit.t, normal);

@@ -1,7 +1,7 @@
 // Directional albedo of microfacet lobes by single scattering, from tables (`crates/render/src/pack/energy.rs`).
 
 // Directional albedo of rough glass, reflected and transmitted: interpolated in its table, rows by roughness and columns by the cosine.
-fn energy_kept(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
+fn single_scatter_albedo(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     let last = f32(ENERGY_SIZE - 1u);
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
     let row = min(sqrt(sqrt(square)), 1.0) * last;
@@ -17,8 +17,8 @@ fn energy_kept(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
 
 // The same of facets that are rougher along one axis: from one of the parts of their table, between its rows by roughness and by anisotropy,
 // where textures give these, its lines and its columns.
-fn streak_energy(material: Material, alpha: vec2f, wo: vec3f, part: u32) -> f32 {
-    let start = material.streaks - 1u;
+fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part: u32) -> f32 {
+    let start = material.aniso_table - 1u;
     let rows = vec2u(texel_word(start), texel_word(start + 1u));
     let rough = min(max(material.roughness, 0.0), 1.0) * f32(rows.x - 1u);
     let long = min(max(material.anisotropy, 0.0), 1.0) * f32(rows.y - 1u);
@@ -47,15 +47,15 @@ fn streak_energy(material: Material, alpha: vec2f, wo: vec3f, part: u32) -> f32 
 }
 
 // What rough glass reflects and lets pass at once, by whichever table it has.
-fn glass_kept(material: Material, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
+fn single_scatter_albedo_glass(material: Material, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     if ANISOTROPIC != 0u {
-        if material.streaks != 0u {
+        if material.aniso_table != 0u {
             // Those of the two sides come last.
             let behind = select(2u, 0u, material.kind == ROUGH_GLASS) + select(1u, 0u, side > 0.0);
-            return streak_energy(material, alpha, wo, behind);
+            return single_scatter_albedo_aniso(material, alpha, wo, behind);
         }
     }
-    return energy_kept(material.energy, alpha, wo, side);
+    return single_scatter_albedo(material.energy, alpha, wo, side);
 }
 
 // What is known of a principled material's facets: the two parts of what those reflect that are rougher along one axis, as `ggx_albedo` has
@@ -64,14 +64,14 @@ fn principled_energy(material: Material, wo: vec3f, side: f32) -> vec3f {
     var found = vec3f(1.0);
     let alpha = facet_alpha(material);
     if ANISOTROPIC != 0u {
-        if material.streaks != 0u {
-            found.x = streak_energy(material, alpha, wo, 0u);
-            found.y = streak_energy(material, alpha, wo, 1u);
+        if material.aniso_table != 0u {
+            found.x = single_scatter_albedo_aniso(material, alpha, wo, 0u);
+            found.y = single_scatter_albedo_aniso(material, alpha, wo, 1u);
         }
     }
     if (LOBES & LOBE_TRANSMISSION) != 0u {
         if (material.thin == 0u) & (material.transmission > 0.0) {
-            found.z = glass_kept(material, alpha, wo, side);
+            found.z = single_scatter_albedo_glass(material, alpha, wo, side);
         }
     }
     return found;

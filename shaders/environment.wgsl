@@ -5,7 +5,7 @@
 // stratified samples stay stratified over the blocks.
 
 // The light that arrives from a direction.
-struct Arriving {
+struct EnvironmentEval {
     radiance: vec3f,
     pdf: f32,              // of samples of light there, per solid angle, with the choice of the map among all emitters
 }
@@ -51,7 +51,7 @@ fn interval_width(distribution: u32, index: u32) -> f32 {
 }
 
 // Bilinear between the centres of texels. The pdf is that of samples at a surface of this normal: the block's probability, by the cell's mean.
-fn arriving_from(direction: vec3f, normal: vec3f) -> Arriving {
+fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     let d = vec3f(dot(environment.x, direction), dot(environment.y, direction), dot(environment.z, direction));
     let cell = cell_towards(d, environment.width, environment.height);
     let next = column_after(cell.column, environment.width);
@@ -68,13 +68,13 @@ fn arriving_from(direction: vec3f, normal: vec3f) -> Arriving {
     let columns = rows + (row + 1u) * (ENVIRONMENT_BLOCKS + 1u);
     let probability = interval_width(rows, row) * interval_width(columns, column) * environment.density;
     let inverse = environment_float(environment.blocks + row * ENVIRONMENT_BLOCKS + column);
-    return Arriving(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
+    return EnvironmentEval(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
 }
 
 // The light that a ray which leaves the scene finds, weighed against the samples of light that find the same. `pdf` is that of the ray's
 // direction, `normal` that of the surface which it left.
-fn light_from_afar(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
-    let arriving = arriving_from(direction, normal);
+fn environment_mis(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
+    let arriving = environment_eval(direction, normal);
     return arriving.radiance * select(1.0, power_heuristic(pdf, arriving.pdf), pdf > 0.0);
 }
 
@@ -103,6 +103,6 @@ fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
     let inside = vec2f(x - f32(cell.x), y - f32(cell.y));
     let d = direction_in_cell(chosen & 65535u, chosen >> 16u, inside, width, height);
     let to = normalize(environment.x * d.x + environment.y * d.y + environment.z * d.z);
-    let arriving = arriving_from(to, normal);
-    return LightSample(to, arriving.radiance, arriving.pdf, false, light.reach, NO_INDEX);
+    let arriving = environment_eval(to, normal);
+    return LightSample(to, arriving.radiance, arriving.pdf, false, light.t_max, NO_INDEX);
 }

@@ -4,14 +4,14 @@
 
 // The layers of a pixel, the first of which is this part of the film.
 fn stored_layers(index: u32, part: u32) -> Layers {
-    let pixels = work.film_size.x * work.film_size.y;
+    let pixels = params.film_size.x * params.film_size.y;
     let first = part * pixels + index;
     return Layers(film[first], film[first + pixels], film[first + 2u * pixels], film[first + 3u * pixels],
                   film[first + 4u * pixels]);
 }
 
 fn store_layers(layers: Layers, index: u32, part: u32) {
-    let pixels = work.film_size.x * work.film_size.y;
+    let pixels = params.film_size.x * params.film_size.y;
     let first = part * pixels + index;
     film[first] = layers.emission;
     film[first + pixels] = layers.direct;

@@ -45,7 +45,7 @@ pub static SHARED: &[File] = files![
     "rough_dielectric.wgsl",
     "thin.wgsl",
     "light_sample.wgsl",
-    "surroundings.wgsl",
+    "equirect.wgsl",
     "footprint.wgsl",
     "procedural.wgsl",
     "texel.wgsl",
@@ -53,7 +53,7 @@ pub static SHARED: &[File] = files![
     "filter.wgsl",
     "adaptive.wgsl",
     "slab.wgsl",
-    "node.wgsl",
+    "bvh_node.wgsl",
     "mesh.wgsl",
 ];
 /// Software quotients and square roots. First in a kernel, since naga requires functions before their calls.
@@ -61,10 +61,10 @@ pub static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
 /// The buffers and the scene traversal, which every kernel adds to [`SHARED`].
 pub static KERNEL: &[File] = files![
     "bindings.wgsl",
-    "receipt.wgsl",
-    "traverse.wgsl",
+    "completion.wgsl",
+    "linear_primitives.wgsl",
     "meshes.wgsl",
-    "tree.wgsl",
+    "bvh.wgsl",
     "geometry.wgsl",
     "vertices.wgsl",
     "texture.wgsl",

@@ -1,7 +1,7 @@
 // Which of much that shines a sample of light is taken from: the way down the tree over it, and up from what a ray has met.
 
 // What was chosen.
-struct Chosen {
+struct EmitterSelection {
     emitter: Emitter,
     density: f32,          // of samples on it, per area, with its choice; 0 for what was not chosen by the tree
 }
@@ -9,8 +9,8 @@ struct Chosen {
 // What light is sampled of at p, where the table of emitters gives `emitter`: this, or what the tree chooses if it stands for the
 // tree. n is as `light_importance` has it. Each level has random numbers of its own: sets over the pixel's samples, for two levels at
 // a time.
-fn chosen_light(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -> Chosen {
-    var chosen = Chosen(emitter, 0.0);
+fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -> EmitterSelection {
+    var chosen = EmitterSelection(emitter, 0.0);
     if emitter.index != NO_INDEX {
         return chosen;
     }
@@ -40,7 +40,7 @@ fn chosen_light(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -
 }
 
 // The density of samples, per area, on what the ray from p has met: 0 for what the tree does not know, or unless it is wanted.
-fn met_density(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
+fn light_tree_pdf(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     var at = NO_INDEX;
     if wanted {
         at = light_leaf(hit);
@@ -60,7 +60,7 @@ fn met_density(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
 // Returns the leaf of a hit in the light tree, encoded as `LightNode.parent`, or NO_INDEX.
 fn light_leaf(hit: Hit) -> u32 {
     var place = hit.primitive;
-    if (IN_TREE & (1u << INSTANCE)) != 0u {
+    if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
         if hit.instance != 0u {
             let leaves = load_instance(hit.instance - 1u).leaves;
             if leaves == NO_INDEX {

@@ -46,8 +46,8 @@ fn triangle_crossing(v0: vec3f, v1: vec3f, v2: vec3f, origin: vec3f, shear: Shea
     let sum = u + v + w;
     let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
     let t = (u * a.z + v * b.z + w * c.z) / sum;
-    let passage = box_passage(lowest(v0, v1, v2), highest(v0, v1, v2), s);
-    let met = inside & (abs(sum) > 0.0) & is_passed(passage, INFINITE_T);
+    let passage = box_interval(lowest(v0, v1, v2), highest(v0, v1, v2), s);
+    let met = inside & (abs(sum) > 0.0) & interval_hits(passage, INFINITE_T);
     return Crossing(met, min(passage.y, max(passage.x, t)), vec2f(v / sum, w / sum));
 }
 
@@ -81,11 +81,11 @@ fn normal_from_mesh(i: Instance, n: vec3f) -> vec3f {
 
 // How far from a mesh's boxes a ray still counts as passing them: the rounding of all that is computed of it in this space.
 fn mesh_pad(i: Instance, origin: vec3f) -> f32 {
-    return PAD * (largest(origin) + i.size);
+    return BOX_PAD * (largest(origin) + i.size);
 }
 
 // What was hit: a primitive by itself, which is all then, or a triangle of a mesh in the world.
-struct Spot {
+struct HitPrimitive {
     primitive: Primitive,  // a mesh's triangle as one by itself
     edge_1: vec3f,         // from the first vertex to the second
     edge_2: vec3f,
@@ -103,10 +103,10 @@ struct Spot {
 }
 
 // A primitive by itself.
-fn spot_by_itself(q: Primitive) -> Spot {
+fn standalone_hit_primitive(q: Primitive) -> HitPrimitive {
     let zero = vec3f(0.0);
     let none = Tangents(zero, zero);
-    return Spot(q, zero, zero, zero.xy, zero.xy, zero.xy, zero, zero, zero, none, none, none, zero, 0.0);
+    return HitPrimitive(q, zero, zero, zero.xy, zero.xy, zero.xy, zero, zero, zero, none, none, none, zero, 0.0);
 }
 
 // The triangle as a primitive: local x and y are the barycentric coordinates of its second and third vertex. Edges are the
@@ -124,7 +124,7 @@ fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material
 }
 
 // The point of a triangle at barycentric coordinates b, as a ray in direction d meets it.
-fn face_surface(face: Spot, place: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> Surface {
+fn face_surface(face: HitPrimitive, place: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> Surface {
     let q = face.primitive;
     let from_anchor = face.edge_1 * b.x + face.edge_2 * b.y;
     let position = q.anchor + from_anchor;
@@ -140,7 +140,7 @@ fn face_surface(face: Spot, place: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> S
                    face_uv(face, b), tangents.u, tangents.v);
 }
 
-fn face_uv(face: Spot, b: vec2f) -> vec2f {
+fn face_uv(face: HitPrimitive, b: vec2f) -> vec2f {
     return face.uv_0 + (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
 }
 
@@ -150,7 +150,7 @@ fn color_between(c0: vec4f, c1: vec4f, c2: vec4f, b: vec2f) -> vec4f {
 }
 
 // The unit normal between the vertices' own, on the outer side of the triangle; the triangle's where they have none.
-fn face_normal(face: Spot, b: vec2f) -> vec3f {
+fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let length2 = dot(n, n);
     let unit = n / sqrt(max(length2, 1e-12));
@@ -165,7 +165,7 @@ fn turned_to(v: vec3f, side: vec3f) -> vec3f {
 // From the triangle to the smooth surface that the vertices' normals tell of, where that is above it: shadow rays start there,
 // so that a coarse mesh does not shadow itself where light grazes it. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems
 // II, 2021, chapter 4.
-fn face_bulge(face: Spot, b: vec2f, side: f32) -> vec3f {
+fn face_bulge(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
     let lift_0 = lift(turned_to(face.normal_0, up), p, up);
@@ -182,16 +182,16 @@ fn lift(n: vec3f, way: vec3f, up: vec3f) -> vec3f {
 
 // Whether light that comes from the direction of `to` passes the triangle itself on its way to where shadow rays start: from behind
 // it may come past the edges up to a bulge, but not through the triangle.
-fn face_lets_pass(face: Spot, surface: Surface, to: vec3f) -> bool {
+fn face_lets_pass(face: HitPrimitive, surface: Surface, to: vec3f) -> bool {
     let fall = -dot(surface.normal, to);
-    let height = dot(surface.normal, surface.bulge);
-    let crossing = surface.position + surface.bulge + to * (height / max(fall, 1e-30));
+    let height = dot(surface.normal, surface.terminator_offset);
+    let crossing = surface.position + surface.terminator_offset + to * (height / max(fall, 1e-30));
     let b = point_to_local(face.primitive, crossing);
     return (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0);
 }
 
 // The derivatives of a point by u and by v. Where the vertices' texture coordinates give none, some in the triangle's plane.
-fn face_tangents(face: Spot) -> Tangents {
+fn face_tangents(face: HitPrimitive) -> Tangents {
     let a = face.uv_1 - face.uv_0;
     let b = face.uv_2 - face.uv_0;
     let area = a.x * b.y - a.y * b.x;
@@ -204,7 +204,7 @@ fn face_tangents(face: Spot) -> Tangents {
 
 // The tangents between the vertices' own, so that they do not jump from a triangle to the next; the triangle's where those are
 // none.
-fn face_frame(face: Spot, b: vec2f) -> Tangents {
+fn face_frame(face: HitPrimitive, b: vec2f) -> Tangents {
     let a = 1.0 - b.x - b.y;
     let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;
     let v = face.tangents_0.v * a + face.tangents_1.v * b.x + face.tangents_2.v * b.y;
@@ -214,13 +214,13 @@ fn face_frame(face: Spot, b: vec2f) -> Tangents {
 }
 
 // Of `face_uv`, where the position has the derivative d.
-fn face_uv_derivative(face: Spot, d: vec3f) -> vec2f {
+fn face_uv_derivative(face: HitPrimitive, d: vec3f) -> vec2f {
     let b = vector_to_local(face.primitive, d);
     return (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
 }
 
 // Of `face_normal`, where the position has the derivative d.
-fn face_normal_derivative(face: Spot, b: vec2f, d: vec3f) -> vec3f {
+fn face_normal_derivative(face: HitPrimitive, b: vec2f, d: vec3f) -> vec3f {
     let db = vector_to_local(face.primitive, d);
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let dn = (face.normal_1 - face.normal_0) * db.x + (face.normal_2 - face.normal_0) * db.y;
@@ -233,19 +233,19 @@ fn face_normal_derivative(face: Spot, b: vec2f, d: vec3f) -> vec3f {
 }
 
 // A ray's differential at the point of a triangle at barycentric coordinates b.
-fn face_arrival(face: Spot, b: vec2f, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival {
+fn face_hit_differential(face: HitPrimitive, b: vec2f, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential {
     let x = transferred(differential.x, ray, t, surface.normal);
     let y = transferred(differential.y, ray, t, surface.normal);
     let normal_x = face_normal_derivative(face, b, x.position) * surface.side;
     let normal_y = face_normal_derivative(face, b, y.position) * surface.side;
-    return Arrival(x, y, normal_x, normal_y);
+    return HitDifferential(x, y, normal_x, normal_y);
 }
 
-fn face_footprint(face: Spot, surface: Surface, dx: vec3f, dy: vec3f) -> Footprint {
+fn face_footprint(face: HitPrimitive, surface: Surface, dx: vec3f, dy: vec3f) -> Footprint {
     return Footprint(surface.uv, face_uv_derivative(face, dx), face_uv_derivative(face, dy));
 }
 
-fn face_first_hit(face: Spot, hit: Hit) -> FirstHit {
+fn face_first_hit(face: HitPrimitive, hit: Hit) -> FirstHit {
     let b = hit.barycentric;
     let normal = with_positive_zeros(face.primitive.z);
     let shading_normal = with_positive_zeros(face_normal(face, b));

@@ -32,7 +32,7 @@ fn triangle_casts(i: Instance, slot: u32) -> bool {
 }
 
 // The triangle of a mesh that was hit.
-fn face_of(i: Instance, hit: Hit) -> Spot {
+fn face_of(i: Instance, hit: Hit) -> HitPrimitive {
     let corners = meshes[i.triangles + hit.slot];
     let v0 = load_position(i, corners.x);
     let edge_1 = vector_from_mesh(i, load_position(i, corners.y) - v0);
@@ -40,7 +40,7 @@ fn face_of(i: Instance, hit: Hit) -> Spot {
     let q = face_primitive(i, v0, edge_1, edge_2, group_word(i, hit.slot) & ~NO_SHADOW);
     let zero = vec3f(0.0);
     let none = Tangents(zero, zero);
-    var face = Spot(q, edge_1, edge_2, vec2f(0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0), zero, zero, zero, none, none, none,
+    var face = HitPrimitive(q, edge_1, edge_2, vec2f(0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0), zero, zero, zero, none, none, none,
                     i.anchor, i.condition);
     if i.attributes != NO_INDEX {
         let row_0 = bitcast<vec4f>(meshes[i.attributes + corners.x]);

@@ -6,14 +6,14 @@ struct Path {
     throughput: vec3f,     // factor of the light that comes along the ray
     depth: u32,            // bounces so far
     branch: u32,           // bit i is set if this is the reflection at the split of bounce i
-    left: vec2u,           // the instance and primitive that the ray starts on and cannot meet again, else NOWHERE
-    wall: vec2u,           // the ellipsoid that it starts on and goes through
+    origin_prim: vec2u,           // the instance and primitive that the ray starts on and cannot meet again, else NOWHERE
+    inside_prim: vec2u,           // the ellipsoid that it starts on and goes through
 }
 
 // What becomes of a path at a mirror or at glass.
-struct Scattered {
-    onward: Path,
-    other: Path,           // the second branch, if there is one
+struct SpecularSplit {
+    primary: Path,
+    secondary: Path,           // the second branch, if there is one
     splits: bool,
 }
 
@@ -22,9 +22,9 @@ fn is_specular(material: Material) -> bool {
     return (material.kind == MIRROR) | (material.kind == GLASS);
 }
 
-fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: Material) -> Scattered {
-    let onward = reflected_path(path, surface, at, path.throughput * material.tint);
-    return Scattered(onward, onward, false);
+fn mirrored_path(path: Path, surface: Surface, at: HitDifferential, material: Material) -> SpecularSplit {
+    let primary = reflected_path(path, surface, at, path.throughput * material.tint);
+    return SpecularSplit(primary, primary, false);
 }
 
 // A normal map's normal, if it is usable; else the smooth one, else the surface's own.
@@ -40,45 +40,45 @@ fn is_usable(surface: Surface, normal: vec3f) -> bool {
 }
 
 // Both branches at the first bounces; then the one that `random`, in [0, 1), chooses.
-fn glass_path(path: Path, surface: Surface, at: Arrival, material: Material, random: f32) -> Scattered {
+fn glass_path(path: Path, surface: Surface, at: HitDifferential, material: Material, random: f32) -> SpecularSplit {
     let eta = select(material.ior, 1.0 / material.ior, surface.side > 0.0);
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
     let cosine_t = refracted_cosine(cosine_i, eta);
     let reflectance = fresnel(cosine_i, cosine_t, eta);
-    let splits = (path.depth < SPLITS) & (reflectance > 0.0) & (reflectance < 1.0);
+    let splits = (path.depth < MAX_SPLIT_DEPTH) & (reflectance > 0.0) & (reflectance < 1.0);
     let share = select(1.0, reflectance, splits);
     var reflection = reflected_path(path, surface, at, path.throughput * share);
     let rest = select(1.0, 1.0 - reflectance, splits);
     let refraction = refracted_path(path, surface, at, path.throughput * material.tint * rest, eta, cosine_i, cosine_t);
     if splits {
         reflection.branch |= 1u << path.depth;
-        return Scattered(refraction, reflection, true);
+        return SpecularSplit(refraction, reflection, true);
     }
     if random < reflectance {
-        return Scattered(reflection, reflection, false);
+        return SpecularSplit(reflection, reflection, false);
     }
-    return Scattered(refraction, refraction, false);
+    return SpecularSplit(refraction, refraction, false);
 }
 
-fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f) -> Path {
+fn reflected_path(path: Path, surface: Surface, at: HitDifferential, throughput: vec3f) -> Path {
     let d = path.ray.direction;
-    let ray = Ray(surface.start, reflected_direction(d, surface.shading_normal));
+    let ray = Ray(surface.ray_origin, reflected_direction(d, surface.shading_normal));
     let differential = reflected_differential(at, d, surface.shading_normal);
-    return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.above, surface.below);
+    return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.exclude_front, surface.exclude_back);
 }
 
-fn refracted_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f, eta: f32, cosine_i: f32,
+fn refracted_path(path: Path, surface: Surface, at: HitDifferential, throughput: vec3f, eta: f32, cosine_i: f32,
                   cosine_t: f32) -> Path {
     let d = path.ray.direction;
-    let below = surface.position - (surface.start - surface.position);
+    let below = surface.position - (surface.ray_origin - surface.position);
     let ray = Ray(below, refracted_direction(d, surface.shading_normal, eta, cosine_i, cosine_t));
     let differential = refracted_differential(at, d, surface.shading_normal, eta, cosine_t);
-    return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.below, surface.above);
+    return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.exclude_back, surface.exclude_front);
 }
 
 // The path behind a surface that it does not see.
-fn passed_path(path: Path, surface: Surface, at: Arrival) -> Path {
-    let below = surface.position - (surface.start - surface.position);
+fn pass_through_path(path: Path, surface: Surface, at: HitDifferential) -> Path {
+    let below = surface.position - (surface.ray_origin - surface.position);
     let ray = Ray(below, path.ray.direction);
-    return Path(ray, Differential(at.x, at.y), path.throughput, path.depth, path.branch, surface.below, surface.above);
+    return Path(ray, Differential(at.x, at.y), path.throughput, path.depth, path.branch, surface.exclude_back, surface.exclude_front);
 }

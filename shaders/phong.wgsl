@@ -23,13 +23,13 @@ fn is_lit(surface: Surface, to: vec3f) -> bool {
     return (dot(surface.shading_normal, to) > 0.0) & (dot(surface.smooth_normal, to) > 0.0);
 }
 
-// Bit i is set where sample i of the block does not light the surface, which is one of `spot`: no shadow ray needs to be sent
+// Bit i is set where sample i of the block does not light the surface, which is one of `prim`: no shadow ray needs to be sent
 // there.
-fn unlit_samples(spot: Spot, surface: Surface, to: Segments, block: Block) -> u32 {
+fn unlit_mask(prim: HitPrimitive, surface: Surface, to: Segments, block: SampleBlock) -> u32 {
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {
         let d = segment(to, block_sample(block, i));
-        bits |= select(1u << i, 0u, is_lit(surface, d) & face_lets_pass(spot, surface, d));
+        bits |= select(1u << i, 0u, is_lit(surface, d) & face_lets_pass(prim, surface, d));
     }
     return bits;
 }
@@ -42,7 +42,7 @@ fn phong_power(x: f32, material: Material, exponent_bits: u32) -> f32 {
 }
 
 // What the unoccluded samples of a block add to the lobes, in order.
-fn phong_block(surface: Surface, material: Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,
+fn phong_block(surface: Surface, material: Material, to: Segments, block: SampleBlock, hidden: u32, exponent_bits: u32,
                sum: Lobes) -> Lobes {
     var lobes = sum;
     for (var i = 0u; i < block.count; i++) {

@@ -7,6 +7,6 @@ fn intersect_plane(q: Primitive, ray: Ray, limit: f32) -> f32 {
 }
 
 // Whether it cuts the segment o + s d, s in (0, reach), of local space.
-fn plane_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
-    return crosses_plane(o, d, reach);
+fn plane_occludes(o: vec3f, d: vec3f, t_max: f32) -> bool {
+    return crosses_plane(o, d, t_max);
 }

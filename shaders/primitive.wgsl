@@ -1,9 +1,9 @@
 // What is different from one kind of primitives to the next. A kind has a file of its own for how rays meet it; all else
 // is here. `kind` is known when compiled, or is the primitive's own.
 
-// The distance of the nearest hit in (0, limit), else `limit`. `wall` says that the ray starts on the primitive and goes
+// The distance of the nearest hit in (0, limit), else `limit`. `inside_prim` says that the ray starts on the primitive and goes
 // through its inside.
-fn intersect(kind: u32, q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
+fn intersect(kind: u32, q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
     }
@@ -11,35 +11,35 @@ fn intersect(kind: u32, q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
         return intersect_triangle(q, ray, limit);
     }
     if kind == ELLIPSOID {
-        return intersect_ellipsoid(q, wall, ray, limit);
+        return intersect_ellipsoid(q, inside_prim, ray, limit);
     }
     if kind == DISK {
         return intersect_disk(q, ray, limit);
     }
     if kind == CYLINDER {
-        return intersect_cylinder(q, wall, ray, limit);
+        return intersect_cylinder(q, inside_prim, ray, limit);
     }
     return intersect_plane(q, ray, limit);
 }
 
 // Returns whether a primitive cuts the segment o + s d, s in (0, reach), of local space; `levels` are the `solid_levels` of o.
-fn blocks(kind: u32, o: vec3f, d: vec3f, levels: vec2f, reach: f32) -> bool {
+fn occludes(kind: u32, o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     if kind == RECTANGLE {
-        return rectangle_blocks(o, d, reach);
+        return rectangle_occludes(o, d, t_max);
     }
     if kind == TRIANGLE {
-        return triangle_blocks(o, d, reach);
+        return triangle_occludes(o, d, t_max);
     }
     if kind == ELLIPSOID {
-        return ellipsoid_blocks(o, d, levels.x, reach);
+        return ellipsoid_occludes(o, d, levels.x, t_max);
     }
     if kind == DISK {
-        return disk_blocks(o, d, reach);
+        return disk_occludes(o, d, t_max);
     }
     if kind == CYLINDER {
-        return cylinder_blocks(o, d, levels, reach);
+        return cylinder_occludes(o, d, levels, t_max);
     }
-    return plane_blocks(o, d, reach);
+    return plane_occludes(o, d, t_max);
 }
 
 // Returns whether primitives of a kind are the surfaces of convex solids: a ray that leaves one through the inside hits it again.
@@ -52,14 +52,14 @@ fn is_centered(kind: u32) -> bool {
     return (kind == RECTANGLE) | (kind == DISK);
 }
 
-// The levels of a point of local space for `blocks`, below 0 inside of a solid; y is used by cylinders only. `wall` says that the point is on the
+// The levels of a point of local space for `blocks`, below 0 inside of a solid; y is used by cylinders only. `inside_prim` says that the point is on the
 // surface and counts as inside, by the least amount: rays inwards are occluded if they end outside.
-fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, wall: bool) -> vec2f {
+fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, inside_prim: bool) -> vec2f {
     if kind == CYLINDER {
         let levels = cylinder_levels(q, from_anchor);
-        return select(levels, levels_on_surface(levels, -1e-30), wall);
+        return select(levels, levels_on_surface(levels, -1e-30), inside_prim);
     }
-    return vec2f(select(ellipsoid_level(q, from_anchor), -1e-30, wall), 0.0);
+    return vec2f(select(ellipsoid_level(q, from_anchor), -1e-30, inside_prim), 0.0);
 }
 
 // The gradient, at a point of local space, of what is 0 on a primitive: of z, of (x^2 + y^2 + z^2 - 1) / 2, or that of a cylinder.

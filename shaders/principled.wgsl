@@ -6,7 +6,7 @@
 // viewer's side, x the tangent.
 
 // What is there of a material where it is looked at from one direction.
-struct Mixture {
+struct PrincipledLobes {
     diffuse: vec3f,        // share of the light that the ground spreads
     alpha: vec2f,          // of the specular lobe, along x and y
     f0: vec3f,             // what of light it reflects head-on, with what is lost between facets given back
@@ -29,8 +29,8 @@ struct Mixture {
 
 // The lobes that a kernel has are bits of `lobes`, so that it computes no others. `energy` is what tables know of the facets: of those that are
 // rougher along one axis the two parts of `ggx_albedo`, x and y; of rough glass, z, the share of light that it reflects and lets pass at once.
-fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal: vec3f, lobes: u32, energy: vec3f) -> Mixture {
-    var m = Mixture();
+fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal: vec3f, lobes: u32, energy: vec3f) -> PrincipledLobes {
+    var m = PrincipledLobes();
     let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);
     m.alpha = vec2f(rough, rough);
     if (lobes & LOBE_ANISOTROPY) != 0u {
@@ -73,7 +73,7 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
         share = ggx_albedo(m.alpha.y, wo.z);
         var certain = 1.005; // beyond the error of the fit
         if (lobes & LOBE_ANISOTROPY) != 0u {
-            if material.streaks != 0u {
+            if material.aniso_table != 0u {
                 share = energy.xy;
                 certain = 1.0;
             }
@@ -123,7 +123,7 @@ fn luminance(color: vec3f) -> f32 {
     return 0.2126 * color.x + 0.7152 * color.y + 0.0722 * color.z;
 }
 
-fn sheen_chance(m: Mixture) -> f32 {
+fn sheen_chance(m: PrincipledLobes) -> f32 {
     return max(1.0 - (m.chances.x + m.chances.y + m.chances.z + m.chances.w), 0.0);
 }
 
@@ -135,7 +135,7 @@ fn schlick(f0: vec3f, f90: vec3f, cosine: f32) -> vec3f {
 }
 
 // What glass reflects: as its index says, or a sheet's two sides; with another reflectance head-on, or at grazing angles, the same in between.
-fn glass_fresnel(m: Mixture, cosine: f32) -> vec3f {
+fn glass_fresnel(m: PrincipledLobes, cosine: f32) -> vec3f {
     let c = min(max(cosine, 1e-6), 1.0);
     let behind = refracted_cosine(c, m.ratio);
     let once = fresnel(c, behind, m.ratio);
@@ -146,12 +146,12 @@ fn glass_fresnel(m: Mixture, cosine: f32) -> vec3f {
 }
 
 // How likely a facet of glass mirrors.
-fn glass_chance(m: Mixture, cosine: f32) -> f32 {
+fn glass_chance(m: PrincipledLobes, cosine: f32) -> f32 {
     return min(luminance(glass_fresnel(m, cosine)), 1.0);
 }
 
 // Whether light passes in one direction alone: where facets are flat, or what is behind the surface bends nothing.
-fn passes_straight(m: Mixture) -> bool {
+fn passes_straight(m: PrincipledLobes) -> bool {
     return is_flat(m.alpha) | (!m.thin & (abs(m.eta - 1.0) < 1e-3));
 }
 
@@ -187,7 +187,7 @@ fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
 }
 
 // The BSDF times the cosine of wi, of what is no delta.
-fn principled_eval(m: Mixture, wo: vec3f, wi: vec3f, lobes: u32) -> vec3f {
+fn principled_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> vec3f {
     var value = m.diffuse * (max(wi.z, 0.0) * 0.31830988618379067);
     if (lobes & LOBE_SPECULAR) != 0u {
         if (wi.z > 0.0) & !is_flat(m.alpha) {
@@ -214,7 +214,7 @@ fn principled_eval(m: Mixture, wo: vec3f, wi: vec3f, lobes: u32) -> vec3f {
 }
 
 // What is glass, by the facets of `rough_dielectric.wgsl` and `thin.wgsl`.
-fn glass_eval(m: Mixture, wo: vec3f, wi: vec3f) -> vec3f {
+fn glass_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> vec3f {
     let above = wi.z > 0.0;
     if above | m.thin {
         let up = vec3f(wi.x, wi.y, abs(wi.z));
@@ -231,7 +231,7 @@ fn glass_eval(m: Mixture, wo: vec3f, wi: vec3f) -> vec3f {
 }
 
 // How densely its samples lie, per solid angle.
-fn glass_pdf(m: Mixture, wo: vec3f, wi: vec3f) -> f32 {
+fn glass_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> f32 {
     let above = wi.z > 0.0;
     if above | m.thin {
         let half = half_between(wo, vec3f(wi.x, wi.y, abs(wi.z)));
@@ -243,7 +243,7 @@ fn glass_pdf(m: Mixture, wo: vec3f, wi: vec3f) -> f32 {
     return ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta) * (1.0 - chance);
 }
 
-fn coat_eval(m: Mixture, wo: vec3f, wi: vec3f) -> f32 {
+fn coat_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> f32 {
     let o = to_frame_around(m.coat_normal, wo);
     let i = to_frame_around(m.coat_normal, wi);
     let alpha = vec2f(m.coat_alpha);
@@ -261,7 +261,7 @@ fn to_frame_around(n: vec3f, v: vec3f) -> vec3f {
 }
 
 // The density of `principled_sample`, per solid angle, but for deltas.
-fn principled_pdf(m: Mixture, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
+fn principled_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
     var pdf = m.chances.x * (max(wi.z, 0.0) * 0.31830988618379067);
     if (lobes & LOBE_SPECULAR) != 0u {
         if (wi.z > 0.0) & !is_flat(m.alpha) {
@@ -299,7 +299,7 @@ fn nowhere() -> LobeSample {
 }
 
 // A direction wi, by a lobe that `random` chooses.
-fn principled_sample(m: Mixture, wo: vec3f, u: vec2f, random: f32, lobes: u32) -> LobeSample {
+fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes: u32) -> LobeSample {
     let p = disk_sample(u);
     var wi = vec3f(p, sqrt(max(1.0 - p.x * p.x - p.y * p.y, 0.0)));
     var is_delta = false;

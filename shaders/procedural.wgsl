@@ -15,13 +15,13 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let swap = dx.x * dx.x + dx.y * dx.y < dy.x * dy.x + dy.y * dy.y;
     let long = select(dx, dy, swap);
     let short = widened_edge(long, select(dy, dx, swap));
-    let reach = vec2f(abs(long.x) + abs(short.x), abs(long.y) + abs(short.y));
+    let t_max = vec2f(abs(long.x) + abs(short.x), abs(long.y) + abs(short.y));
     let at = vec2f(phase(f.uv.x * scale + shift), phase(f.uv.y * scale + shift));
 
     // A footprint that meets at most one step of a pulse is looked at from there: that keeps the digits of small ones.
     let least = min(on, 1.0 - on);
-    let near_x = reach.x < least;
-    let near_y = reach.y < least;
+    let near_x = t_max.x < least;
+    let near_y = t_max.y < least;
     let offset = vec2f(nearest_step(at.x, on), nearest_step(at.y, on));
     let rise = vec2f(select(0.5, -0.5, offset.x == at.x - on), select(0.5, -0.5, offset.y == at.y - on));
     let wave = vec2f(wave_mean(select(at.x, offset.x, near_x), long.x, short.x, on, near_x),
@@ -30,7 +30,7 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let mean_y = select(select(on + wave.y, 0.5 + rise.y * wave.y, near_y), on, wide_y);
 
     // The mean of the product is the product of the means where one of the two is constant.
-    let apart = wide_x | wide_y | (near_x & (abs(offset.x) >= 0.5 * reach.x)) | (near_y & (abs(offset.y) >= 0.5 * reach.y));
+    let apart = wide_x | wide_y | (near_x & (abs(offset.x) >= 0.5 * t_max.x)) | (near_y & (abs(offset.y) >= 0.5 * t_max.y));
     let crossed = max(min(abs(long.x), abs(long.y)), min(abs(short.x), abs(short.y)));
     var together = 0.0;
     if crossed > MOST_PERIODS {

@@ -46,8 +46,8 @@ fn plane_distance(q: Primitive, ray: Ray) -> f32 {
 }
 
 // Whether the segment o + s d, s in (0, reach), of local space crosses the plane z = 0.
-fn crosses_plane(o: vec3f, d: vec3f, reach: f32) -> bool {
-    return (o.z * d.z < 0.0) & (abs(o.z) < reach * abs(d.z));
+fn crosses_plane(o: vec3f, d: vec3f, t_max: f32) -> bool {
+    return (o.z * d.z < 0.0) & (abs(o.z) < t_max * abs(d.z));
 }
 
 // Where it does so, as x |d.z| and y |d.z|: no division.
@@ -58,8 +58,8 @@ fn scaled_crossing(o: vec3f, d: vec3f) -> vec2f {
 }
 
 // The hit on a primitive by itself, or the one at t of primitive i if that is nearer and not the one that the ray has left.
-fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
-    let nearer = (t < hit.t) & (i != left);
+fn closer(hit: Hit, t: f32, i: u32, origin_prim: u32) -> Hit {
+    let nearer = (t < hit.t) & (i != origin_prim);
     return Hit(select(hit.t, t, nearer), hit.instance, select(hit.primitive, i, nearer), hit.slot, hit.barycentric);
 }
 

@@ -9,7 +9,7 @@ fn intersect_rectangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
 }
 
 // Whether it cuts the segment o + s d, s in (0, reach), of local space.
-fn rectangle_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
+fn rectangle_occludes(o: vec3f, d: vec3f, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
-    return crosses_plane(o, d, reach) & (abs(p.x) <= abs(d.z)) & (abs(p.y) <= abs(d.z));
+    return crosses_plane(o, d, t_max) & (abs(p.x) <= abs(d.z)) & (abs(p.y) <= abs(d.z));
 }

@@ -28,7 +28,7 @@ fn plain_reflection(surface: Surface, material: Material, wi: vec3f) -> Reflecti
 }
 
 // Of any surface.
-fn reflection(spot: Spot, surface: Surface, material: Material, mixture: Mixture, wi: vec3f) -> Reflection {
+fn reflection(prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, wi: vec3f) -> Reflection {
     var result = plain_reflection(surface, material, wi);
     if (MATERIALS & FACET_KINDS) != 0u {
         if has_facets(material) {
@@ -44,7 +44,7 @@ fn reflection(spot: Spot, surface: Surface, material: Material, mixture: Mixture
             result = Reflection(principled_eval(mixture, wo, local, LOBES), principled_pdf(mixture, wo, local, LOBES));
         }
     }
-    result.value = select(vec3f(0.0), result.value, lets_light(spot, surface, material, wi));
+    result.value = select(vec3f(0.0), result.value, direction_allowed(prim, surface, material, wi));
     return result;
 }
 
@@ -141,12 +141,12 @@ fn facets_of(surface: Surface, found: Material) -> Material {
         material.loss = facet_loss(facet_alpha(material), wo);
         if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {
             if material.kind == ROUGH_GLASS {
-                material.loss = 1.0 / glass_kept(material, facet_alpha(material), wo, surface.side) - 1.0;
+                material.loss = 1.0 / single_scatter_albedo_glass(material, facet_alpha(material), wo, surface.side) - 1.0;
             }
         }
         if ANISOTROPIC != 0u {
-            if (material.streaks != 0u) & (material.kind != ROUGH_GLASS) {
-                material.loss = 1.0 / streak_energy(material, facet_alpha(material), wo, 0u) - 1.0;
+            if (material.aniso_table != 0u) & (material.kind != ROUGH_GLASS) {
+                material.loss = 1.0 / single_scatter_albedo_aniso(material, facet_alpha(material), wo, 0u) - 1.0;
             }
         }
     }
@@ -202,7 +202,7 @@ fn local_wo(surface: Surface) -> vec3f {
 }
 
 // A principled material as the viewer sees it.
-fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Mixture {
+fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> PrincipledLobes {
     var coat = vec3f(0.0, 0.0, 1.0);
     if ((LOBES & LOBE_COAT) != 0u) & (NORMAL_MAPS == 1u) {
         coat = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, usable_normal(surface, coat_normal));
@@ -213,20 +213,20 @@ fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Mixtu
 }
 
 // Whether light may come from wi, by what the surface is and what it is taken for: not where the two are at odds about the side.
-fn lets_light(spot: Spot, surface: Surface, material: Material, wi: vec3f) -> bool {
+fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, wi: vec3f) -> bool {
     var lit = is_lit(surface, wi);
-    if (IN_TREE & (1u << INSTANCE)) != 0u {
-        lit &= face_lets_pass(spot, surface, wi);
+    if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
+        lit &= face_lets_pass(prim, surface, wi);
     }
     if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
         let behind = (dot(surface.shading_normal, wi) < 0.0) & (dot(surface.smooth_normal, wi) < 0.0);
-        lit |= lets_through(material) & behind & (dot(surface.normal, wi) < 0.0);
+        lit |= is_transmissive(material) & behind & (dot(surface.normal, wi) < 0.0);
     }
     return lit;
 }
 
 // Whether light comes through a material in many directions.
-fn lets_through(material: Material) -> bool {
+fn is_transmissive(material: Material) -> bool {
     var passes = ((PASSING_KINDS >> material.kind) & 1u) != 0u;
     if (LOBES & LOBE_TRANSMISSION) != 0u {
         passes |= (material.kind == PRINCIPLED) & (material.transmission > 0.0);
@@ -236,22 +236,22 @@ fn lets_through(material: Material) -> bool {
 
 // The normal of a surface that reflects no light from behind it; 0 of others.
 fn lit_normal(surface: Surface, material: Material) -> vec3f {
-    return select(surface.shading_normal, vec3f(0.0), lets_through(material));
+    return select(surface.shading_normal, vec3f(0.0), is_transmissive(material));
 }
 
 // The surface as rays leave it on the other side.
-fn turned_over(surface: Surface) -> Surface {
+fn flipped(surface: Surface) -> Surface {
     var result = surface;
-    result.start = surface.position - (surface.start - surface.position);
-    if (IN_TREE & (1u << INSTANCE)) != 0u {
-        result.start += surface.bulge;
+    result.ray_origin = surface.position - (surface.ray_origin - surface.position);
+    if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
+        result.ray_origin += surface.terminator_offset;
     }
-    result.above = surface.below;
-    result.below = surface.above;
+    result.exclude_front = surface.exclude_back;
+    result.exclude_back = surface.exclude_front;
     return result;
 }
 
 // How strongly light is absorbed behind a surface that is `before`, on the viewer's side.
-fn absorption_behind(before: vec3f, surface: Surface, material: Material) -> vec3f {
+fn absorption_after(before: vec3f, surface: Surface, material: Material) -> vec3f {
     return select(before, select(vec3f(0.0), material.absorption, surface.side > 0.0), has_inside(material));
 }

@@ -1,7 +1,7 @@
 // Shadow rays, from one point to a block of at most 32 samples of one light at a time: what a primitive needs to know
 // of the point and the light is computed once for the block, and no primitive is read inside the loop.
 
-struct Block {
+struct SampleBlock {
     pattern: u32,
     side: u32,
     first: u32,            // of the light's samples
@@ -11,28 +11,28 @@ struct Block {
 }
 
 // Bit i is set where the primitive hides sample i of the block from p. `kind` is the primitive's, known when compiled;
-// `wall` says that p is on a solid seen from inside (`solid_levels`).
-fn shadow_bits(kind: u32, q: Primitive, p: vec3f, wall: bool, light: Light, block: Block) -> u32 {
+// `inside_prim` says that p is on a solid seen from inside (`solid_levels`).
+fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, light: Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
-    let levels = solid_levels(kind, q, from_anchor, wall);
+    let levels = solid_levels(kind, q, from_anchor, inside_prim);
     let to = segments_to_local(q, segments_to_light(light, p));
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {
         let d = segment(to, block_sample(block, i));
-        bits |= select(0u, 1u << i, blocks(kind, o, d, levels, light.reach));
+        bits |= select(0u, 1u << i, occludes(kind, o, d, levels, light.t_max));
     }
     return bits;
 }
 
 // Whether the primitive cuts the segment p + s to, s in (0, reach).
-fn cuts(kind: u32, q: Primitive, p: vec3f, wall: bool, to: vec3f, reach: f32) -> bool {
+fn occludes_segment(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, to: vec3f, t_max: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
-    let levels = solid_levels(kind, q, from_anchor, wall);
-    return blocks(kind, from_anchor - q.middle, vector_to_local(q, to), levels, reach);
+    let levels = solid_levels(kind, q, from_anchor, inside_prim);
+    return occludes(kind, from_anchor - q.middle, vector_to_local(q, to), levels, t_max);
 }
 
-fn block_sample(block: Block, i: u32) -> vec2f {
+fn block_sample(block: SampleBlock, i: u32) -> vec2f {
     return sample_square(block.pattern, block.side, block.first + i, block.group, block.key);
 }
 
@@ -44,7 +44,7 @@ struct Cone {
     inverse_depth: f32,    // 1 / (the least dot product of towards with a ray), or negative if that is not positive
 }
 
-fn cone_to_light(light: Light, p: vec3f) -> Cone {
+fn light_frustum(light: Light, p: vec3f) -> Cone {
     let to = segments_to_light(light, p);
     let length2 = dot(to.towards, to.towards);
     let depth = length2 - abs(dot(to.towards, to.u)) - abs(dot(to.towards, to.v));

@@ -23,7 +23,7 @@ fn inverse_of(x: f32) -> f32 {
 }
 
 // Where the ray enters the box, x, and leaves it, y; it does not pass it if x > y.
-fn box_passage(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
+fn box_interval(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
     let a = (low - s.low_origin) * s.inverse;
     let b = (high - s.high_origin) * s.inverse;
     let near = max(max(min(a.x, b.x), min(a.y, b.y)), min(a.z, b.z));
@@ -32,12 +32,12 @@ fn box_passage(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
 }
 
 // Whether a ray passes a box ahead of its start and no farther than `limit`.
-fn is_passed(passage: vec2f, limit: f32) -> bool {
+fn interval_hits(passage: vec2f, limit: f32) -> bool {
     return (passage.x <= passage.y) & (passage.y >= 0.0) & (passage.x <= limit);
 }
 
 // All rays from one point whose directions lie in a box. Of what any of them passes, they pass all.
-struct Fan {
+struct RayInterval {
     low_origin: vec3f,
     high_origin: vec3f,
     near_low: vec3f,       // the earliest that any ray reaches a lower side, by its distance
@@ -46,18 +46,18 @@ struct Fan {
     far_high: vec3f,
 }
 
-fn fan(origin: vec3f, least: vec3f, most: vec3f, pad: f32) -> Fan {
+fn ray_interval(origin: vec3f, least: vec3f, most: vec3f, pad: f32) -> RayInterval {
     let up = least >= vec3f(0.0);
     let down = most < vec3f(0.0);
     let of_least = vec3f(inverse_of(least.x), inverse_of(least.y), inverse_of(least.z));
     let of_most = vec3f(inverse_of(most.x), inverse_of(most.y), inverse_of(most.z));
     let zero = vec3f(0.0);
-    return Fan(origin + pad, origin - pad, select(of_most, zero, down), select(of_least, zero, up),
+    return RayInterval(origin + pad, origin - pad, select(of_most, zero, down), select(of_least, zero, up),
                select(zero, of_most, down), select(zero, of_least, up));
 }
 
 // When any ray of the fan may enter the box, x, and leave it, y.
-fn fan_passage(low: vec3f, high: vec3f, f: Fan) -> vec2f {
+fn ray_interval_box(low: vec3f, high: vec3f, f: RayInterval) -> vec2f {
     let a = low - f.low_origin;
     let b = high - f.high_origin;
     let by_low = a * f.near_low;

@@ -6,11 +6,11 @@ struct Surface {
     smooth_normal: vec3f,  // the same, but on a mesh between the normals of the vertices: light that is behind it lights nothing
     shading_normal: vec3f, // what light is reflected and refracted by: a normal map's, else the smooth one
     wo: vec3f,             // unit vector to the viewer
-    start: vec3f,          // where rays that leave it begin: a little above it
-    bulge: vec3f,          // from there to where shadow rays begin, on a mesh that stands for a smooth surface
+    ray_origin: vec3f,     // where rays that leave it begin: a little above it
+    terminator_offset: vec3f, // from there to where shadow rays begin, on a mesh that stands for a smooth surface
     side: f32,             // 1 where the normal is the outward one, -1 where it is the opposite
-    above: vec2u,          // the instance and primitive if no ray that leaves it on the viewer's side can meet it again
-    below: vec2u,          // the same for rays that leave it on the other side; else NOWHERE
+    exclude_front: vec2u,  // the instance and primitive if no ray that leaves it on the viewer's side can meet it again
+    exclude_back: vec2u,   // the same for rays that leave it on the other side; else NOWHERE
     uv: vec2f,             // texture coordinates
     du: vec3f,             // the position's derivatives by them, which span the tangent frame
     dv: vec3f,

@@ -139,9 +139,9 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
     let across = xx - m.y * slope; // the square of the half width of the row through the centre
     let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
     let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
-    let reach = sqrt(yy);
-    let first_row = -i32(floor(reach - y));
-    let last_row = i32(floor(y + reach));
+    let t_max = sqrt(yy);
+    let first_row = -i32(floor(t_max - y));
+    let last_row = i32(floor(y + t_max));
     var base = vec3f(0.0);
     var sum = vec3f(0.0);
     var total = 0.0;
@@ -191,45 +191,45 @@ fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
 }
 
 // What a surface looks like: its material and its shading normal as its textures make them.
-struct Appearance {
+struct EvaluatedMaterial {
     material: Material,
     normal: vec3f,
     coat_normal: vec3f,    // of a clear coat
 }
 
 // `lookups` is how many the material has at most.
-fn appearance(spot: Spot, hit: Hit, material: Material, surface: Surface, at: Arrival, lookups: u32) -> Appearance {
-    var look = Appearance(material, surface.shading_normal, surface.shading_normal);
+fn evaluate_material(prim: HitPrimitive, hit: Hit, material: Material, surface: Surface, at: HitDifferential, lookups: u32) -> EvaluatedMaterial {
+    var shading = EvaluatedMaterial(material, surface.shading_normal, surface.shading_normal);
     if lookups == 0u {
-        return look;
+        return shading;
     }
-    let footprint = footprint_of(spot, hit, surface, at);
+    let footprint = footprint_of(prim, hit, surface, at);
     for (var i = 0u; i < lookups; i++) {
         if i < material.lookups.y {
             let lookup = load_lookup(material.lookups.x + i);
             let t = load_texture(lookup.texture);
-            let color = texture_color(t, footprint_in_set(footprint, spot, hit, at, lookup.uv_set));
+            let color = texture_color(t, footprint_in_set(footprint, prim, hit, at, lookup.uv_set));
             let purposes = lookup.purposes;
-            look.material.ambient = select(look.material.ambient, color, (purposes & FOR_AMBIENT) != 0u);
-            look.material.diffuse = select(look.material.diffuse, color, (purposes & FOR_DIFFUSE) != 0u);
-            look.material.specular = select(look.material.specular, color, (purposes & FOR_SPECULAR) != 0u);
-            look.material.tint = select(look.material.tint, color, (purposes & FOR_TINT) != 0u);
-            look.material.emission = select(look.material.emission, color, (purposes & FOR_EMISSION) != 0u);
-            look.material.roughness = select(look.material.roughness, channel_of(color, lookup, ROUGHNESS_CHANNEL), (purposes & FOR_ROUGHNESS) != 0u);
+            shading.material.ambient = select(shading.material.ambient, color, (purposes & FOR_AMBIENT) != 0u);
+            shading.material.diffuse = select(shading.material.diffuse, color, (purposes & FOR_DIFFUSE) != 0u);
+            shading.material.specular = select(shading.material.specular, color, (purposes & FOR_SPECULAR) != 0u);
+            shading.material.tint = select(shading.material.tint, color, (purposes & FOR_TINT) != 0u);
+            shading.material.emission = select(shading.material.emission, color, (purposes & FOR_EMISSION) != 0u);
+            shading.material.roughness = select(shading.material.roughness, channel_of(color, lookup, ROUGHNESS_CHANNEL), (purposes & FOR_ROUGHNESS) != 0u);
             if (MATERIALS & (1u << PRINCIPLED)) != 0u {
-                look.material = with_principled(look.material, color, lookup);
+                shading.material = with_principled(shading.material, color, lookup);
                 if (LOBES & LOBE_COAT) != 0u {
                     if (purposes & FOR_COAT_NORMAL) != 0u {
-                        look.coat_normal = mapped_normal(surface, t, color);
+                        shading.coat_normal = mapped_normal(surface, t, color);
                     }
                 }
             }
             if NORMAL_MAPS == 1u {
                 if (purposes & FOR_NORMAL) != 0u {
-                    look.normal = mapped_normal(surface, t, color);
+                    shading.normal = mapped_normal(surface, t, color);
                 }
             }
         }
     }
-    return look;
+    return shading;
 }

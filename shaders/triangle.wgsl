@@ -12,7 +12,7 @@ fn intersect_triangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
 }
 
 // Whether it cuts the segment o + s d, s in (0, reach), of local space.
-fn triangle_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
+fn triangle_occludes(o: vec3f, d: vec3f, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
-    return crosses_plane(o, d, reach) & (p.x >= 0.0) & (p.y >= 0.0) & (p.x + p.y <= abs(d.z));
+    return crosses_plane(o, d, t_max) & (p.x >= 0.0) & (p.y >= 0.0) & (p.x + p.y <= abs(d.z));
 }

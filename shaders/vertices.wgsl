@@ -37,8 +37,8 @@ fn load_further_uv(i: Instance, vertex: u32, uv_set: u32) -> vec2f {
 }
 
 // What was hit, with a set of texture coordinates in place of the first: 0 where the mesh has none such.
-fn spot_in_set(spot: Spot, hit: Hit, uv_set: u32) -> Spot {
-    var face = spot;
+fn spot_in_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
+    var face = prim;
     if is_on_mesh(hit) {
         let i = load_instance(hit.instance - 1u);
         face.uv_0 = vec2f(0.0);
@@ -55,25 +55,25 @@ fn spot_in_set(spot: Spot, hit: Hit, uv_set: u32) -> Spot {
 }
 
 // Where a texture is looked up: in its own set of texture coordinates, where `first` is the place in the first one.
-fn uv_in_set(first: vec2f, spot: Spot, hit: Hit, uv_set: u32) -> vec2f {
+fn uv_in_set(first: vec2f, prim: HitPrimitive, hit: Hit, uv_set: u32) -> vec2f {
     if UV_SETS == 0u {
         return first;
     }
     if uv_set == 0u {
         return first;
     }
-    return face_uv(spot_in_set(spot, hit, uv_set), hit.barycentric);
+    return face_uv(spot_in_set(prim, hit, uv_set), hit.barycentric);
 }
 
 // The same of a footprint.
-fn footprint_in_set(first: Footprint, spot: Spot, hit: Hit, at: Arrival, uv_set: u32) -> Footprint {
+fn footprint_in_set(first: Footprint, prim: HitPrimitive, hit: Hit, at: HitDifferential, uv_set: u32) -> Footprint {
     if UV_SETS == 0u {
         return first;
     }
     if uv_set == 0u {
         return first;
     }
-    let face = spot_in_set(spot, hit, uv_set);
+    let face = spot_in_set(prim, hit, uv_set);
     let uv = face_uv(face, hit.barycentric);
     return Footprint(uv, face_uv_derivative(face, at.x.position), face_uv_derivative(face, at.y.position));
 }

@@ -5,7 +5,7 @@ use glam::{UVec2, Vec3};
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use wgray_render::cpu::ray::vector_to_local;
-use wgray_render::cpu::shadow::{Block, cone_to_light, may_block, shadow_bits};
+use wgray_render::cpu::shadow::{SampleBlock, light_frustum, may_block, occlusion_mask};
 use wgray_render::records::{ENVIRONMENT, Packed, RANDOM, Sphere};
 
 use crate::random::Random;
@@ -30,17 +30,17 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
     {
         for _ in 0..200 {
             let near = scene.bounds[random.below(scene.bounds.len() as u32) as usize];
-            let reach = random.pick(&[0.5, 1.0, 4.0, 30.0]) * near.radius;
-            if reach > 1e9 {
+            let t_max = random.pick(&[0.5, 1.0, 4.0, 30.0]) * near.radius;
+            if t_max > 1e9 {
                 continue; // around a plane
             }
-            let p = near.center + Vec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0) as f32)) * reach;
+            let p = near.center + Vec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0) as f32)) * t_max;
             let light = &scene.lighting.lights[random.below(scene.lighting.lights.len() as u32) as usize];
             if light.kind == ENVIRONMENT {
                 continue; // all around
             }
-            let cone = cone_to_light(light, p);
-            let block = Block {
+            let cone = light_frustum(light, p);
+            let block = SampleBlock {
                 pattern: RANDOM,
                 side: 32,
                 first: 0,
@@ -52,7 +52,7 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
             for (q, sphere) in primitives.filter(|(q, _)| vector_to_local(q, p - q.anchor).length() < 200.0) {
                 if !may_block(&bound(*sphere), &cone) {
                     left_out += 1;
-                    wrong += usize::from(shadow_bits(q.kind, q, p, false, light, block) != 0);
+                    wrong += usize::from(occlusion_mask(q.kind, q, p, false, light, block) != 0);
                 }
             }
         }

@@ -6,7 +6,7 @@ use wgray::scene::Description;
 use wgray_render::cpu::camera::camera_ray;
 use wgray_render::cpu::geometry::closest_hit;
 use wgray_render::cpu::surface::surface_at;
-use wgray_render::records::{NO_INDEX, NOWHERE};
+use wgray_render::records::{NO_INDEX, NO_PRIMITIVE};
 
 use crate::oracle::{Flaw, Oracle};
 use crate::pictures::{differing, exact_ways, means, reference, render};
@@ -230,15 +230,15 @@ fn rays_start_a_little_above_their_surface() {
             for _ in 0..2000 {
                 let at = glam::Vec2::new((random.unit() * 48.0) as f32, (random.unit() * 36.0) as f32);
                 let ray = camera_ray(&scene.camera, at);
-                let hit = closest_hit(&scene, ray, NOWHERE, NOWHERE);
+                let hit = closest_hit(&scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
                 if hit.primitive == NO_INDEX {
                     continue;
                 }
                 let epsilon = scene.environment.shadow_epsilon;
                 let surface = surface_at(&scene.primitives[0], hit.primitive, ray, hit.t, epsilon);
-                let height = surface.start.as_dvec3().distance(center) - radius * size;
+                let height = surface.ray_origin.as_dvec3().distance(center) - radius * size;
                 let position = surface.position.as_dvec3();
-                let offset = (surface.start - surface.position).length();
+                let offset = (surface.ray_origin - surface.position).length();
                 assert!(height > 0.0, "radius {radius}, size {size}: {height:e} of {offset:e}");
                 highest = highest.max(height / position.abs().max_element().max(distance * size));
             }

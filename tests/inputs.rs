@@ -5,23 +5,23 @@
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
 use wgray_render::bvh::{Aabb, build};
-use wgray_render::cpu::differential::{Arrival, Derivative, Differential};
+use wgray_render::cpu::differential::{Derivative, Differential, HitDifferential};
 use wgray_render::cpu::diffuse::Angles;
 use wgray_render::cpu::footprint::Footprint;
 use wgray_render::cpu::light::Segments;
-use wgray_render::cpu::mesh::{Spot, face_primitive, shear_of};
+use wgray_render::cpu::mesh::{HitPrimitive, face_primitive, shear_of};
 use wgray_render::cpu::path::Path;
 use wgray_render::cpu::phong::Lobes;
 use wgray_render::cpu::primitive::Tangents;
-use wgray_render::cpu::principled::{Mixture, principled_mixture};
+use wgray_render::cpu::principled::{PrincipledLobes, principled_mixture};
 use wgray_render::cpu::ray::{Hit, Ray};
-use wgray_render::cpu::shadow::{Block, cone_to_light};
-use wgray_render::cpu::slab::{fan, slabs};
+use wgray_render::cpu::shadow::{SampleBlock, light_frustum};
+use wgray_render::cpu::slab::{ray_interval, slabs};
 use wgray_render::cpu::surface::Surface;
 use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type};
 use wgray_render::records::{
-    CYLINDER, Camera, ELLIPSOID, INFINITE_T, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material, NO_INDEX,
-    NOWHERE, Node, PAD, Primitive, SMALLEST_ALPHA, Sphere, Texture,
+    BOX_PAD, CYLINDER, Camera, ELLIPSOID, INFINITE_T, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material,
+    NO_INDEX, NO_PRIMITIVE, Node, Primitive, SMALLEST_ALPHA, Sphere, Texture,
 };
 
 use crate::kernel::{Function, scalars};
@@ -192,7 +192,7 @@ impl Face {
         [self.corners[1] - self.corners[0], self.corners[2] - self.corners[0]]
     }
 
-    fn spot(&self, random: &Random) -> Spot {
+    fn spot(&self, random: &Random) -> HitPrimitive {
         let i = &self.instance;
         let columns = [i.u, i.v, i.w].map(Vec3::as_dvec3);
         let to_world = DMat3::from_cols(columns[0], columns[1], columns[2]);
@@ -211,7 +211,7 @@ impl Face {
         });
         let uv = || Vec2::new(random.unit() as f32, random.unit() as f32);
         let uv_0 = uv();
-        Spot {
+        HitPrimitive {
             primitive: face_primitive(i, self.corners[0].as_vec3(), edge_1, edge_2, random.below(4)),
             edge_1,
             edge_2,
@@ -246,7 +246,7 @@ impl Face {
 
     fn pad(&self) -> f32 {
         let farthest = self.origin.abs().max_element() as f32 + self.instance.size;
-        PAD * farthest
+        BOX_PAD * farthest
     }
 
     /// A vector of its space, by an argument's name.
@@ -287,9 +287,9 @@ fn point_of(corners: &[DVec3; 3], barycentric: DVec2) -> DVec3 {
 /// Functions of rays in a mesh's space, whose arguments a face has.
 const OF_FACES: &[&str] = &[
     "slabs",
-    "box_passage",
-    "fan",
-    "fan_passage",
+    "box_interval",
+    "ray_interval",
+    "ray_interval_box",
     "octant_of",
     "shear_of",
     "permuted",
@@ -356,7 +356,7 @@ impl Situation {
                 target + (target - start)
             }
             .as_vec3(),
-            reach: if directional { 1e10 } else { 1.0 - 1e-5 },
+            t_max: if directional { 1e10 } else { 1.0 - 1e-5 },
             u: (vector(random) * size).as_vec3(),
             finite: if directional { 0.0 } else { 1.0 },
             v: (vector(random) * size).as_vec3(),
@@ -416,18 +416,18 @@ impl Situation {
                 }
                 .write(words);
             }
-            "Block" => block(random).write(words),
+            "SampleBlock" => block(random).write(words),
             "Path" => self.path(random).write(words),
             "Derivative" => derivative(random).write(words),
             "Differential" => differential(random).write(words),
-            "Arrival" => arrival(random).write(words),
+            "HitDifferential" => arrival(random).write(words),
             "Footprint" => footprint(random).write(words),
             "Texture" => texture(random).write(words),
             "i32" => words.push((random.pick(&[random.below(20), random.below(40_000)]) as i32 - 20) as u32),
             "Sphere" => self.sphere(random).write(words),
-            "Cone" => cone_to_light(&self.light, self.start.as_vec3()).write(words),
+            "Cone" => light_frustum(&self.light, self.start.as_vec3()).write(words),
             "Material" => material(random).write(words),
-            "Mixture" => mixture(random).write(words),
+            "PrincipledLobes" => mixture(random).write(words),
             "Angles" => Angles {
                 wi: random.between(-0.2, 1.0) as f32,
                 wo: random.unit() as f32,
@@ -442,15 +442,15 @@ impl Situation {
             .write(words),
             "Instance" => self.face.instance.write(words),
             "Node" => self.face.node(random).write(words),
-            "Spot" => self.face.spot(random).write(words),
+            "HitPrimitive" => self.face.spot(random).write(words),
             "Slabs" => {
                 let (origin, direction) = (self.face.origin.as_vec3(), self.face.direction.as_vec3());
                 slabs(origin, direction, self.face.pad()).write(words);
             }
             "Shear" => shear_of(self.face.direction.as_vec3()).write(words),
-            "Fan" => {
+            "RayInterval" => {
                 let argument = |name| self.face.vector(name).unwrap_or_default();
-                fan(argument("origin"), argument("least"), argument("most"), self.face.pad()).write(words);
+                ray_interval(argument("origin"), argument("least"), argument("most"), self.face.pad()).write(words);
             }
             "vec3<f32>" if OF_FACES.contains(&function) && self.face.vector(name).is_some() => {
                 self.face.vector(name).unwrap_or_default().write(words);
@@ -517,11 +517,11 @@ impl Situation {
             smooth_normal: random.pick(&[normal, vector(random).normalize().as_vec3()]),
             shading_normal: random.pick(&[normal, vector(random).normalize().as_vec3()]),
             wo,
-            start: position + normal * 1e-5,
+            ray_origin: position + normal * 1e-5,
             side: random.pick(&[1.0, -1.0]),
-            bulge: vector(random).as_vec3() * 1e-3,
-            above: random.pick(&[NOWHERE, UVec2::new(0, 3), UVec2::new(2, 3)]),
-            below: random.pick(&[NOWHERE, UVec2::new(0, 3), UVec2::new(2, 3)]),
+            terminator_offset: vector(random).as_vec3() * 1e-3,
+            exclude_front: random.pick(&[NO_PRIMITIVE, UVec2::new(0, 3), UVec2::new(2, 3)]),
+            exclude_back: random.pick(&[NO_PRIMITIVE, UVec2::new(0, 3), UVec2::new(2, 3)]),
             uv: self.local.truncate().as_vec2(),
             du: vector(random).as_vec3(),
             dv: vector(random).as_vec3(),
@@ -535,8 +535,8 @@ impl Situation {
             throughput: color(random),
             depth: random.below(10),
             branch: random.below(4),
-            left: random.pick(&[NOWHERE, UVec2::new(0, 3)]),
-            wall: random.pick(&[NOWHERE, UVec2::new(0, 3)]),
+            origin_prim: random.pick(&[NO_PRIMITIVE, UVec2::new(0, 3)]),
+            inside_prim: random.pick(&[NO_PRIMITIVE, UVec2::new(0, 3)]),
         }
     }
 
@@ -619,7 +619,7 @@ impl Situation {
             "limit" => random.pick(&[INFINITE_T, INFINITE_T, self.t() as f32, (2.0 * self.t()) as f32]),
             "t" => random.pick(&[self.t() as f32, INFINITE_T]),
             "start" => (self.local_start.length_squared() - 1.0) as f32,
-            "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
+            "t_max" => random.pick(&[self.light.t_max, 1.0 - 1e-5, 1e10, 1.0]),
             "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" | "on" => random.unit() as f32,
             "alpha" => alpha(random).x,
             "roughness" => random.between(f64::from(LEAST_SHEEN), 1.0) as f32,
@@ -689,9 +689,9 @@ fn differential(random: &Random) -> Differential {
     }
 }
 
-fn arrival(random: &Random) -> Arrival {
+fn arrival(random: &Random) -> HitDifferential {
     let Differential { x, y } = differential(random);
-    Arrival {
+    HitDifferential {
         x,
         y,
         normal_x: derivative(random).position,
@@ -733,8 +733,8 @@ fn texture(random: &Random) -> Texture {
     }
 }
 
-fn block(random: &Random) -> Block {
-    Block {
+fn block(random: &Random) -> SampleBlock {
+    SampleBlock {
         pattern: whole("block_sample", "pattern", random),
         side: whole("block_sample", "side", random),
         first: 32 * random.below(4),
@@ -785,7 +785,7 @@ fn material(random: &Random) -> Material {
 }
 
 /// A principled material as it is seen from somewhere.
-fn mixture(random: &Random) -> Mixture {
+fn mixture(random: &Random) -> PrincipledLobes {
     let material = Material {
         ior: random.between(1.0, 3.0) as f32,
         ..material(random)

@@ -4,14 +4,14 @@
 
 use glam::{UVec2, Vec3, Vec4};
 use wgray_render::cpu::camera::camera_ray;
-use wgray_render::cpu::geometry::{closest_hit, hidden_samples, material_of, spot_of, surface_of};
+use wgray_render::cpu::geometry::{closest_hit, fetch_hit_primitive, material_of, occluded_samples, surface_of};
 use wgray_render::cpu::light::{segment, segments_to_light};
 use wgray_render::cpu::math::{dot, normalize};
 use wgray_render::cpu::ray::Ray;
 use wgray_render::cpu::rng::unit_float;
 use wgray_render::cpu::sampling::{decision_bits, sample_key, sample_square};
-use wgray_render::cpu::shadow::Block;
-use wgray_render::records::{NO_INDEX, NOWHERE, Packed, RANDOM};
+use wgray_render::cpu::shadow::SampleBlock;
+use wgray_render::records::{NO_INDEX, NO_PRIMITIVE, Packed, RANDOM};
 
 use crate::pictures::{Way, differing, exact_ways, reference, render_with};
 use crate::{scenes, sources};
@@ -20,21 +20,21 @@ const FILE: &str = "integrators/phong.wgsl";
 
 const WGSL: &str = "
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
-    let hit = closest_hit(ray, NOWHERE, NOWHERE);
+    let hit = closest_hit(ray, NO_PRIMITIVE, NO_PRIMITIVE);
     if hit.primitive == NO_INDEX {
         return environment.background;
     }
-    let spot = spot_of(hit);
+    let spot = fetch_hit_primitive(hit);
     let surface = surface_of(spot, hit, ray);
     let bits = decision_bits(pixel, camera.seed, sample, 1u, 77u);
     let random = vec3f(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
     let up = normalize(surface.shading_normal + random);
-    let next = closest_hit(Ray(surface.start, up), surface.above, surface.below);
+    let next = closest_hit(Ray(surface.ray_origin, up), surface.exclude_front, surface.exclude_back);
     var sum = vec3f(select(0.0, 0.5, next.primitive == NO_INDEX));
     for (var i = 0u; i < light_counts().y; i++) {
         let light = load_light(i);
-        let block = Block(RANDOM, 1u, 0u, 1u, sample, sample_key(pixel, camera.seed, 1u + light.number));
-        let seen = (hidden_samples(surface, light, block, 0u) & 1u) == 0u;
+        let block = SampleBlock(RANDOM, 1u, 0u, 1u, sample, sample_key(pixel, camera.seed, 1u + light.number));
+        let seen = (occluded_samples(surface, light, block, 0u) & 1u) == 0u;
         let to = segment(segments_to_light(light, surface.position), sample_square(RANDOM, 1u, 0u, sample, block.key));
         sum += light.color * select(0.0, abs(dot(normalize(to), surface.normal)), seen);
     }
@@ -44,23 +44,23 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
 
 /// The same in Rust.
 fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
-    let hit = closest_hit(scene, ray, NOWHERE, NOWHERE);
+    let hit = closest_hit(scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
     if hit.primitive == NO_INDEX {
         return scene.environment.background;
     }
-    let spot = spot_of(scene, hit);
+    let spot = fetch_hit_primitive(scene, hit);
     let surface = surface_of(scene, &spot, hit, ray);
     let bits = decision_bits(pixel, scene.camera.seed, sample, 1, 77);
     let random = Vec3::new(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
     let up = Ray {
-        origin: surface.start,
+        origin: surface.ray_origin,
         direction: normalize(surface.shading_normal + random),
     };
-    let next = closest_hit(scene, up, surface.above, surface.below);
+    let next = closest_hit(scene, up, surface.exclude_front, surface.exclude_back);
     let mut sum = Vec3::splat(if next.primitive == NO_INDEX { 0.5 } else { 0.0 });
     for light in &scene.lighting.lights {
         let key = sample_key(pixel, scene.camera.seed, 1 + light.number);
-        let block = Block {
+        let block = SampleBlock {
             pattern: RANDOM,
             side: 1,
             first: 0,
@@ -68,7 +68,7 @@ fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
             group: sample,
             key,
         };
-        let seen = hidden_samples(scene, &surface, light, block, 0) & 1 == 0;
+        let seen = occluded_samples(scene, &surface, light, block, 0) & 1 == 0;
         let at = sample_square(RANDOM, 1, 0, sample, key);
         let to = segment(segments_to_light(light, surface.position), at);
         let cosine = dot(normalize(to), surface.normal).abs();

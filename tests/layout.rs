@@ -5,8 +5,8 @@ use wgray_render::gpu::compose::{KERNELS, Source, built_in};
 use wgray_render::gpu::naga::proc::Layouter;
 use wgray_render::gpu::naga::{Expression, Literal, Module, TypeInner};
 use wgray_render::records::{
-    Camera, Counts, Emitter, Environment, FirstHit, Instance, Item, Light, LightNode, Lookup, Material, Node,
-    Primitive, Record, Specialization, Sphere, Texture, Work,
+    Camera, Counts, DispatchParams, Emitter, Environment, FirstHit, Instance, Item, Light, LightNode, Lookup, Material,
+    Node, Primitive, Record, Specialization, Sphere, Texture,
 };
 
 use wgray::scene::Integrator;
@@ -65,7 +65,7 @@ fn records_have_the_same_layout() {
         size::<Item>(),
         size::<Instance>(),
         size::<FirstHit>(),
-        size::<Work>(),
+        size::<DispatchParams>(),
     ];
     let declared = wgray_render::records::declarations().matches("struct ").count();
     assert_eq!(sizes.len(), declared, "records that are not compared");
@@ -104,7 +104,10 @@ fn constants_have_their_values() {
         }
     };
     assert_eq!(value("INFINITE_T"), f32::MAX.to_bits());
-    assert_eq!(value("EVIDENCE"), wgray_render::records::EVIDENCE.to_bits());
+    assert_eq!(
+        value("EFFECTIVE_SAMPLES_PER_DOUBLING"),
+        wgray_render::records::EFFECTIVE_SAMPLES_PER_DOUBLING.to_bits()
+    );
     assert_eq!(value("NO_INDEX"), u32::MAX);
     assert_eq!(value("PLANE"), wgray_render::records::PLANE);
     assert_eq!(value("FOR_NORMAL"), wgray_render::records::FOR_NORMAL);

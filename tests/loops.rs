@@ -1,5 +1,5 @@
 //! No picture is cut short. Mesa 22.3's software Vulkan ends all loops of an invocation once they have gone round 65,535
-//! times together, without a word; `shaders/receipt.wgsl` tells. Each test holds on drivers without such a limit too.
+//! times together, without a word; `shaders/completion.wgsl` tells. Each test holds on drivers without such a limit too.
 
 use wgray::error::RenderError;
 use wgray::scene::{AdaptiveDescription, Description, Pattern, PlaneDescription, ShapeDescription, SphereDescription};
@@ -108,8 +108,8 @@ fn driver_cuts_loops() -> bool {
 
 /// Shaders that sign whatever happened.
 fn without_check(shaders: &Shaders) -> Shaders {
-    let text = edited(shaders.text("receipt.wgsl"), "atomicStore(&receipt.cut, 1u);", "");
-    with(shaders, "receipt.wgsl", &text)
+    let text = edited(shaders.text("completion.wgsl"), "atomicStore(&completion.cut, 1u);", "");
+    with(shaders, "completion.wgsl", &text)
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
         }
     }
     // A kernel that does not sign is not believed, whatever the driver.
-    let unsigned = edited_shaders("receipt.wgsl", "atomicAdd(&receipt.ended, 1u);", "");
+    let unsigned = edited_shaders("completion.wgsl", "atomicAdd(&completion.ended, 1u);", "");
     let device = adapter::device().expect("a device");
     let options = wgray_render::gpu::Options {
         exact: None,

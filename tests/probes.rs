@@ -2,26 +2,33 @@
 
 use glam::{UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray_render::cpu::adaptive::{
-    display_slope_squared, display_variance, look_with, mean_of, moments_with, samples_wanted, squared_deviation,
-    variance_of_mean, whole_look,
+    display_slope_squared, display_variance, mean_of, moments_with, pilot_add, pilot_finish, samples_wanted,
+    squared_deviation, variance_of_mean,
+};
+use wgray_render::cpu::bvh_node::{
+    children_hit, children_in_interval, far_side, four_in_fan, four_passed, in_order, larger, leaf_items, octant_of,
+    passed_bits, smaller, step_length, steps,
 };
 use wgray_render::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
 use wgray_render::cpu::cylinder::{
-    cap_side, cylinder_bitangent, cylinder_blocks, cylinder_gradient, cylinder_gradient_derivative, cylinder_height,
-    cylinder_interval, cylinder_levels, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder,
+    cap_side, cylinder_bitangent, cylinder_gradient, cylinder_gradient_derivative, cylinder_height, cylinder_interval,
+    cylinder_levels, cylinder_occludes, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder,
     is_on_cap, levels_on_surface,
 };
-use wgray_render::cpu::dielectric::{Passage, dielectric_sample, eta_of, refracts_inwards, transmittance};
+use wgray_render::cpu::dielectric::{DielectricSample, dielectric_sample, eta_of, refracts_inwards, transmittance};
 use wgray_render::cpu::differential::{
-    Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
-    refracted_derivative, refracted_differential, transferred,
+    Derivative, Differential, HitDifferential, arrival, normal_derivative, reflected_derivative,
+    reflected_differential, refracted_derivative, refracted_differential, transferred,
 };
 use wgray_render::cpu::diffuse::{
     Angles, angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval, rough_share,
 };
-use wgray_render::cpu::disk::{disk_blocks, intersect_disk};
+use wgray_render::cpu::disk::{disk_occludes, intersect_disk};
 use wgray_render::cpu::ellipsoid::{
-    ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid, longitude,
+    ellipsoid_discriminant, ellipsoid_level, ellipsoid_occludes, intersect_ellipsoid, longitude,
+};
+use wgray_render::cpu::equirect::{
+    EnvironmentCell, cap_above, cell_towards, column_after, direction_in_cell, normal_bin,
 };
 use wgray_render::cpu::filter::{filter_bin, filter_offset};
 use wgray_render::cpu::footprint::{
@@ -45,36 +52,33 @@ use wgray_render::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, max4, min, normalize, positive_zero, power, power_whole, sine,
 };
 use wgray_render::cpu::mesh::{
-    Crossing, Shear, Spot, color_between, face_arrival, face_bulge, face_first_hit, face_footprint, face_frame,
-    face_lets_pass, face_normal, face_normal_derivative, face_primitive, face_surface, face_tangents, face_uv,
-    face_uv_derivative, highest, lift, lowest, mesh_pad, normal_from_mesh, permuted, point_to_mesh, shear_of, sheared,
-    spot_by_itself, triangle_crossing, turned_to, vector_from_mesh, vector_to_mesh,
+    Crossing, HitPrimitive, Shear, color_between, face_bulge, face_first_hit, face_footprint, face_frame,
+    face_hit_differential, face_lets_pass, face_normal, face_normal_derivative, face_primitive, face_surface,
+    face_tangents, face_uv, face_uv_derivative, highest, lift, lowest, mesh_pad, normal_from_mesh, permuted,
+    point_to_mesh, shear_of, sheared, standalone_hit_primitive, triangle_crossing, turned_to, vector_from_mesh,
+    vector_to_mesh,
 };
 use wgray_render::cpu::metal::{conductor_fresnel, metal_eval, metal_factor, metal_fresnel, metal_pdf, metal_sample};
 use wgray_render::cpu::modified_phong::{
     PhongFactors, modified_phong_eval, modified_phong_pdf, modified_phong_sample, phong_factors, phong_lobe,
 };
-use wgray_render::cpu::node::{
-    children_in_fan, children_passed, far_side, four_in_fan, four_passed, in_order, larger, leaf_items, octant_of,
-    passed_bits, smaller, step_length, steps,
-};
 use wgray_render::cpu::normal_map::mapped_normal;
 use wgray_render::cpu::panorama::{panorama_angles, panorama_differential, panorama_ray};
 use wgray_render::cpu::path::{
-    Path, Scattered, glass_path, is_specular, is_usable, mirrored_path, passed_path, reflected_path, refracted_path,
-    usable_normal,
+    Path, SpecularSplit, glass_path, is_specular, is_usable, mirrored_path, pass_through_path, reflected_path,
+    refracted_path, usable_normal,
 };
-use wgray_render::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_samples};
-use wgray_render::cpu::plane::{intersect_plane, plane_blocks};
+use wgray_render::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_mask};
+use wgray_render::cpu::plane::{intersect_plane, plane_occludes};
 use wgray_render::cpu::primitive::{
-    Tangents, blocks, intersect, is_centered, is_solid, local_tangents, primitive_gradient, primitive_height,
+    Tangents, intersect, is_centered, is_solid, local_tangents, occludes, primitive_gradient, primitive_height,
     primitive_normal, primitive_uv, solid_gradient, solid_gradient_derivative, solid_levels, uv_derivative,
 };
 use wgray_render::cpu::principled::{
-    Mixture, bounded_color, coat_eval, facets_eval, glass_chance, glass_eval, glass_fresnel, glass_pdf, half_between,
-    is_flat, luminance, mirrored_pdf, passes_straight, principled_eval, principled_mixture, principled_pdf,
-    principled_sample, refracting_density, refracting_half, schlick, sheen_albedo, sheen_chance, sheen_lobe,
-    to_frame_around,
+    PrincipledLobes, bounded_color, coat_eval, facets_eval, glass_chance, glass_eval, glass_fresnel, glass_pdf,
+    half_between, is_flat, luminance, mirrored_pdf, passes_straight, principled_eval, principled_mixture,
+    principled_pdf, principled_sample, refracting_density, refracting_half, schlick, sheen_albedo, sheen_chance,
+    sheen_lobe, to_frame_around,
 };
 use wgray_render::cpu::procedural::{
     along_edge, around_footprint, far_product, nearest_step, phase, procedural_share, sine_ratio, wave_integral,
@@ -84,7 +88,7 @@ use wgray_render::cpu::ray::{
     Hit, Ray, by_itself, closer, crosses_plane, nearer_hit, no_hit, plane_distance, point_to_local, scaled_crossing,
     vector_to_local, vector_to_world,
 };
-use wgray_render::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
+use wgray_render::cpu::rectangle::{intersect_rectangle, rectangle_occludes};
 use wgray_render::cpu::rng::{hash4, unit_float};
 use wgray_render::cpu::rough_dielectric::{
     dielectric_gain, refracting_normal, rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample,
@@ -95,16 +99,19 @@ use wgray_render::cpu::sampling::{
 use wgray_render::cpu::sequence::{
     halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_bits, sobol_reversed, sobol_sample,
 };
-use wgray_render::cpu::shadow::{Block, Cone, block_sample, cone_to_light, cuts, may_block, shadow_bits};
-use wgray_render::cpu::slab::{Fan, Slabs, box_passage, fan, fan_passage, inverse_of, is_passed, slabs};
+use wgray_render::cpu::shadow::{
+    Cone, SampleBlock, block_sample, light_frustum, may_block, occludes_segment, occlusion_mask,
+};
+use wgray_render::cpu::slab::{
+    RayInterval, Slabs, box_interval, interval_hits, inverse_of, ray_interval, ray_interval_box, slabs,
+};
 use wgray_render::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use wgray_render::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
-use wgray_render::cpu::surroundings::{MapCell, cap_above, cell_towards, column_after, direction_in_cell, normal_bin};
 use wgray_render::cpu::texel::{
     gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index,
 };
 use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, turned_up};
-use wgray_render::cpu::triangle::{intersect_triangle, triangle_blocks};
+use wgray_render::cpu::triangle::{intersect_triangle, triangle_occludes};
 use wgray_render::cpu::warp::{
     cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around,
 };
@@ -191,8 +198,8 @@ probes! {
     filter_offset(u: f32, bin: u32, bins: u32, low: f32, high: f32) -> f32;
     moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
     squared_deviation(sum: Vec4, sample: Vec4) -> Vec3;
-    look_with(look: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
-    whole_look(look: Vec4, sum: Vec4, moments: Vec4) -> Vec4;
+    pilot_add(look: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
+    pilot_finish(look: Vec4, sum: Vec4, moments: Vec4) -> Vec4;
     samples_wanted(looks: Vec4, first: u32, squared_error: f32, most: u32) -> u32;
     mean_of(sum: Vec4) -> Vec3;
     variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;
@@ -201,25 +208,25 @@ probes! {
     point_to_local(q: &Primitive, p: Vec3) -> Vec3;
     vector_to_local(q: &Primitive, v: Vec3) -> Vec3;
     plane_distance(q: &Primitive, ray: Ray) -> f32;
-    crosses_plane(o: Vec3, d: Vec3, reach: f32) -> bool;
+    crosses_plane(o: Vec3, d: Vec3, t_max: f32) -> bool;
     scaled_crossing(o: Vec3, d: Vec3) -> Vec2;
     closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit;
     intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
-    rectangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    rectangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool;
     intersect_disk(q: &Primitive, ray: Ray, limit: f32) -> f32;
-    disk_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    disk_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool;
     intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
-    triangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    triangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool;
     ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32;
     ellipsoid_discriminant(o: Vec3, d: Vec3, start: f32) -> f32;
-    intersect_ellipsoid(q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32;
-    ellipsoid_blocks(o: Vec3, d: Vec3, start: f32, reach: f32) -> bool;
+    intersect_ellipsoid(q: &Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32;
+    ellipsoid_occludes(o: Vec3, d: Vec3, start: f32, t_max: f32) -> bool;
     longitude(local: Vec3) -> f32;
     cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2;
     levels_on_surface(levels: Vec2, on: f32) -> Vec2;
     cylinder_interval(o: Vec3, d: Vec3, levels: Vec2) -> Vec2;
     intersect_cylinder(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32;
-    cylinder_blocks(o: Vec3, d: Vec3, levels: Vec2, reach: f32) -> bool;
+    cylinder_occludes(o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool;
     is_on_cap(local: Vec3) -> bool;
     cap_side(local: Vec3) -> f32;
     cylinder_gradient(local: Vec3) -> Vec3;
@@ -230,14 +237,14 @@ probes! {
     cylinder_tangent(local: Vec3) -> Vec3;
     cylinder_bitangent(local: Vec3) -> Vec3;
     intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32;
-    plane_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    plane_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool;
     camera_ray(camera: &Camera, at: Vec2) -> Ray;
     primitive_gradient(q: &Primitive, local: Vec3) -> Vec3;
     primitive_normal(q: &Primitive, local: Vec3) -> Vec3;
     largest(v: Vec3) -> f32;
     surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface;
     with_coordinates(surface: Surface, q: &Primitive) -> Surface;
-    intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32;
+    intersect(kind: u32, q: &Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32;
     is_solid(kind: u32) -> bool;
     is_centered(kind: u32) -> bool;
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
@@ -251,21 +258,21 @@ probes! {
     light_child(shares: Vec4, random: f32) -> u32;
     segments_to_local(q: &Primitive, to: Segments) -> Segments;
     segment(to: Segments, at: Vec2) -> Vec3;
-    shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32;
-    block_sample(block: Block, i: u32) -> Vec2;
-    cuts(kind: u32, q: &Primitive, p: Vec3, wall: bool, to: Vec3, reach: f32) -> bool;
-    blocks(kind: u32, o: Vec3, d: Vec3, levels: Vec2, reach: f32) -> bool;
-    solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, wall: bool) -> Vec2;
+    occlusion_mask(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, light: &Light, block: SampleBlock) -> u32;
+    block_sample(block: SampleBlock, i: u32) -> Vec2;
+    occludes_segment(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, to: Vec3, t_max: f32) -> bool;
+    occludes(kind: u32, o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool;
+    solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, inside_prim: bool) -> Vec2;
     solid_gradient(kind: u32, local: Vec3) -> Vec3;
     solid_gradient_derivative(kind: u32, local: Vec3, d: Vec3) -> Vec3;
     primitive_height(q: &Primitive, from_anchor: Vec3) -> f32;
-    cone_to_light(light: &Light, p: Vec3) -> Cone;
+    light_frustum(light: &Light, p: Vec3) -> Cone;
     may_block(sphere: &Sphere, cone: &Cone) -> bool;
     phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
     is_lit(surface: &Surface, to: Vec3) -> bool;
-    unlit_samples(spot: &Spot, surface: &Surface, to: Segments, block: Block) -> u32;
-    phong_block(surface: &Surface, material: &Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,
+    unlit_mask(prim: &HitPrimitive, surface: &Surface, to: Segments, block: SampleBlock) -> u32;
+    phong_block(surface: &Surface, material: &Material, to: Segments, block: SampleBlock, hidden: u32, exponent_bits: u32,
                 sum: Lobes) -> Lobes;
     camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
     camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative;
@@ -281,20 +288,20 @@ probes! {
     normal_derivative(q: &Primitive, local: Vec3, dp: Vec3) -> Vec3;
     reflected_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3) -> Derivative;
     refracted_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3, eta: f32, cosine: f32) -> Derivative;
-    arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival;
-    reflected_differential(at: Arrival, d: Vec3, n: Vec3) -> Differential;
-    refracted_differential(at: Arrival, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential;
+    arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential;
+    reflected_differential(at: HitDifferential, d: Vec3, n: Vec3) -> Differential;
+    refracted_differential(at: HitDifferential, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential;
     reflected_direction(d: Vec3, n: Vec3) -> Vec3;
     refracted_direction(d: Vec3, n: Vec3, eta: f32, cosine_i: f32, cosine_t: f32) -> Vec3;
     refracted_cosine(cosine_i: f32, eta: f32) -> f32;
     fresnel(cosine_i: f32, cosine_t: f32, eta: f32) -> f32;
-    passed_path(path: Path, surface: Surface, at: Arrival) -> Path;
-    mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered;
+    pass_through_path(path: Path, surface: Surface, at: HitDifferential) -> Path;
+    mirrored_path(path: Path, surface: Surface, at: HitDifferential, material: &Material) -> SpecularSplit;
     usable_normal(surface: Surface, normal: Vec3) -> Vec3;
     is_usable(surface: Surface, normal: Vec3) -> bool;
-    glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered;
-    reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3) -> Path;
-    refracted_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3, eta: f32, cosine_i: f32,
+    glass_path(path: Path, surface: Surface, at: HitDifferential, material: &Material, random: f32) -> SpecularSplit;
+    reflected_path(path: Path, surface: Surface, at: HitDifferential, throughput: Vec3) -> Path;
+    refracted_path(path: Path, surface: Surface, at: HitDifferential, throughput: Vec3, eta: f32, cosine_i: f32,
                    cosine_t: f32) -> Path;
     is_specular(material: &Material) -> bool;
     angles_at(normal: Vec3, wo: Vec3, wi: Vec3) -> Angles;
@@ -311,30 +318,30 @@ probes! {
     transmittance(absorption: Vec3, distance: f32) -> Vec3;
     eta_of(surface: &Surface, material: &Material) -> f32;
     refracts_inwards(surface: &Surface, material: &Material, normal: Vec3) -> bool;
-    dielectric_sample(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Passage;
+    dielectric_sample(path: Path, surface: Surface, at: HitDifferential, material: &Material, random: f32) -> DielectricSample;
     principled_mixture(
         material: &Material, wo: Vec3, outside: bool, coat_normal: Vec3, lobes: u32, energy: Vec3,
-    ) -> Mixture;
+    ) -> PrincipledLobes;
     bounded_color(color: Vec3) -> Vec3;
-    glass_fresnel(m: &Mixture, cosine: f32) -> Vec3;
-    glass_chance(m: &Mixture, cosine: f32) -> f32;
+    glass_fresnel(m: &PrincipledLobes, cosine: f32) -> Vec3;
+    glass_chance(m: &PrincipledLobes, cosine: f32) -> f32;
     luminance(color: Vec3) -> f32;
-    sheen_chance(m: &Mixture) -> f32;
+    sheen_chance(m: &PrincipledLobes) -> f32;
     schlick(f0: Vec3, f90: Vec3, cosine: f32) -> Vec3;
-    passes_straight(m: &Mixture) -> bool;
+    passes_straight(m: &PrincipledLobes) -> bool;
     is_flat(alpha: Vec2) -> bool;
     facets_eval(alpha: Vec2, wo: Vec3, wi: Vec3, half: Vec3) -> f32;
     half_between(wo: Vec3, wi: Vec3) -> Vec3;
     refracting_half(wo: Vec3, wi: Vec3, eta: f32) -> Vec3;
     refracting_density(wo: Vec3, wi: Vec3, half: Vec3, eta: f32) -> f32;
-    principled_eval(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3;
-    glass_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3;
-    glass_pdf(m: &Mixture, wo: Vec3, wi: Vec3) -> f32;
-    coat_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> f32;
+    principled_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3;
+    glass_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> Vec3;
+    glass_pdf(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> f32;
+    coat_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> f32;
     to_frame_around(n: Vec3, v: Vec3) -> Vec3;
-    principled_pdf(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> f32;
+    principled_pdf(m: &PrincipledLobes, wo: Vec3, wi: Vec3, lobes: u32) -> f32;
     mirrored_pdf(alpha: Vec2, wo: Vec3, half: Vec3) -> f32;
-    principled_sample(m: &Mixture, wo: Vec3, u: Vec2, random: f32, lobes: u32) -> LobeSample;
+    principled_sample(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lobes: u32) -> LobeSample;
     sheen_lobe(alpha: f32, wo: Vec3, wi: Vec3) -> f32;
     sheen_albedo(roughness: f32, cosine: f32) -> f32;
     ggx_d(alpha: Vec2, m: Vec3) -> f32;
@@ -386,7 +393,7 @@ probes! {
     cylinder_share(q: &Primitive, p: Vec3) -> f32;
     power_heuristic(own: f32, other: f32) -> f32;
     whole_below(bits: u32, count: u32) -> u32;
-    cell_towards(d: Vec3, width: u32, height: u32) -> MapCell;
+    cell_towards(d: Vec3, width: u32, height: u32) -> EnvironmentCell;
     column_after(column: u32, width: u32) -> u32;
     cap_above(row: u32, height: u32) -> f32;
     normal_bin(normal: Vec3) -> u32;
@@ -423,19 +430,19 @@ probes! {
     with_positive_zeros(v: Vec3) -> Vec3;
     slabs(origin: Vec3, direction: Vec3, pad: f32) -> Slabs;
     inverse_of(x: f32) -> f32;
-    box_passage(low: Vec3, high: Vec3, s: Slabs) -> Vec2;
-    is_passed(passage: Vec2, limit: f32) -> bool;
-    fan(origin: Vec3, least: Vec3, most: Vec3, pad: f32) -> Fan;
-    fan_passage(low: Vec3, high: Vec3, f: Fan) -> Vec2;
+    box_interval(low: Vec3, high: Vec3, s: Slabs) -> Vec2;
+    interval_hits(passage: Vec2, limit: f32) -> bool;
+    ray_interval(origin: Vec3, least: Vec3, most: Vec3, pad: f32) -> RayInterval;
+    ray_interval_box(low: Vec3, high: Vec3, f: RayInterval) -> Vec2;
     steps(word: u32) -> Vec4;
     step_length(node: &Node, axis: u32) -> f32;
     larger(a: Vec4, b: Vec4) -> Vec4;
     smaller(a: Vec4, b: Vec4) -> Vec4;
     passed_bits(near: Vec4, far: Vec4, limit: f32) -> u32;
-    children_passed(node: &Node, s: Slabs, limit: f32) -> u32;
+    children_hit(node: &Node, s: Slabs, limit: f32) -> u32;
     four_passed(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -> u32;
-    children_in_fan(node: &Node, f: Fan, limit: f32) -> u32;
-    four_in_fan(node: &Node, low: UVec3, high: UVec3, f: Fan, limit: f32) -> u32;
+    children_in_interval(node: &Node, f: RayInterval, limit: f32) -> u32;
+    four_in_fan(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: f32) -> u32;
     far_side(low: Vec4, high: Vec4, far_low: f32, far_high: f32) -> Vec4;
     in_order(bits: u32, octant: u32) -> u32;
     octant_of(direction: Vec3) -> u32;
@@ -451,23 +458,23 @@ probes! {
     vector_from_mesh(i: &Instance, v: Vec3) -> Vec3;
     normal_from_mesh(i: &Instance, n: Vec3) -> Vec3;
     mesh_pad(i: &Instance, origin: Vec3) -> f32;
-    spot_by_itself(q: &Primitive) -> Spot;
+    standalone_hit_primitive(q: &Primitive) -> HitPrimitive;
     face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, material: u32) -> Primitive;
-    face_lets_pass(face: &Spot, surface: &Surface, to: Vec3) -> bool;
+    face_lets_pass(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool;
     turned_to(v: Vec3, side: Vec3) -> Vec3;
-    face_surface(face: &Spot, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface;
-    face_uv(face: &Spot, b: Vec2) -> Vec2;
+    face_surface(face: &HitPrimitive, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface;
+    face_uv(face: &HitPrimitive, b: Vec2) -> Vec2;
     color_between(c0: Vec4, c1: Vec4, c2: Vec4, b: Vec2) -> Vec4;
-    face_normal(face: &Spot, b: Vec2) -> Vec3;
-    face_bulge(face: &Spot, b: Vec2, side: f32) -> Vec3;
+    face_normal(face: &HitPrimitive, b: Vec2) -> Vec3;
+    face_bulge(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3;
     lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3;
-    face_tangents(face: &Spot) -> Tangents;
-    face_frame(face: &Spot, b: Vec2) -> Tangents;
-    face_uv_derivative(face: &Spot, d: Vec3) -> Vec2;
-    face_normal_derivative(face: &Spot, b: Vec2, d: Vec3) -> Vec3;
-    face_arrival(face: &Spot, b: Vec2, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival;
-    face_footprint(face: &Spot, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint;
-    face_first_hit(face: &Spot, hit: Hit) -> FirstHit;
+    face_tangents(face: &HitPrimitive) -> Tangents;
+    face_frame(face: &HitPrimitive, b: Vec2) -> Tangents;
+    face_uv_derivative(face: &HitPrimitive, d: Vec3) -> Vec2;
+    face_normal_derivative(face: &HitPrimitive, b: Vec2, d: Vec3) -> Vec3;
+    face_hit_differential(face: &HitPrimitive, b: Vec2, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential;
+    face_footprint(face: &HitPrimitive, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint;
+    face_first_hit(face: &HitPrimitive, hit: Hit) -> FirstHit;
 }
 
 /// Shared functions that are not probed, and why.

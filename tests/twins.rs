@@ -27,7 +27,7 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
         "the CPU takes a sample whole, in pixel.rs: nothing runs in step there",
     ),
     (
-        "tree.wgsl",
+        "bvh.wgsl",
         "the CPU walks trees in its own way (tree.rs, walk), to the same hits, as tests/meshes proves",
     ),
     (
@@ -54,18 +54,18 @@ const NO_TWIN: &[&str] = &[
 /// Functions and records that only one side has, or that differ, and why: file, name, reason.
 const ONE_SIDED: &[(&str, &str, &str)] = &[
     (
-        "traverse.wgsl",
+        "linear_primitives.wgsl",
         "closest_primitive",
         "in WGSL it is in buffers.wgsl, as it reads the scene",
     ),
     (
-        "traverse.wgsl",
-        "hidden_by_primitives",
+        "linear_primitives.wgsl",
+        "occluded_by_primitives",
         "in WGSL it is in buffers.wgsl, as it reads the scene",
     ),
     (
-        "traverse.wgsl",
-        "is_hidden_by_primitives",
+        "linear_primitives.wgsl",
+        "is_occluded_by_primitives",
         "in WGSL it is in buffers.wgsl, as it reads the scene",
     ),
     (
@@ -74,8 +74,8 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
         "Rust's own: in WGSL kernels go from sample to sample",
     ),
     (
-        "traverse.wgsl",
-        "hidden_by",
+        "linear_primitives.wgsl",
+        "occluded_by",
         "Rust has a range of indices where WGSL has two numbers",
     ),
     ("geometry.wgsl", "instance_of", "Rust's own, for a record in a list"),
@@ -180,12 +180,12 @@ fn a_twin_that_drifted_is_found() {
         ),
         ("another type", "ray.rs", "t: f32, i: u32", "t: f32, i: i32"),
         ("another result", "rng.rs", "(bits: u32) -> f32", "(bits: u32) -> f64"),
-        ("a renamed function", "plane.rs", "fn plane_blocks", "fn plane_block"),
+        ("a renamed function", "plane.rs", "fn plane_occludes", "fn plane_block"),
         (
             "one more function",
             "plane.rs",
-            "pub fn plane_blocks",
-            "fn more() {}\npub fn plane_blocks",
+            "pub fn plane_occludes",
+            "fn more() {}\npub fn plane_occludes",
         ),
         ("a renamed field", "light.rs", "pub towards: Vec3", "pub toward: Vec3"),
         (
@@ -362,7 +362,7 @@ fn an_operation_that_devices_may_compute_differently_is_found() {
     for to in [
         "    var sum = mix(environment.ambient, material.ambient, 0.5);\n",
         "    var sum = fma(environment.ambient, material.ambient, surface.normal);\n",
-        "    var sum = mat3x3f(surface.normal, surface.wo, surface.start) * material.ambient;\n",
+        "    var sum = mat3x3f(surface.normal, surface.wo, surface.ray_origin) * material.ambient;\n",
         "    var sum = environment.ambient % material.ambient;\n",
         "    var sum = ceil(material.ambient);\n",
         "    var sum = clamp(material.ambient, vec3f(0.0), vec3f(1.0));\n",

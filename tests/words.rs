@@ -1,24 +1,24 @@
 //! Values as the 32-bit words of their scalars, in the order of their fields: how they travel to a kernel and back.
 
 use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
-use wgray_render::cpu::dielectric::Passage;
-use wgray_render::cpu::differential::{Arrival, Derivative, Differential};
+use wgray_render::cpu::dielectric::DielectricSample;
+use wgray_render::cpu::differential::{Derivative, Differential, HitDifferential};
 use wgray_render::cpu::diffuse::Angles;
+use wgray_render::cpu::equirect::EnvironmentCell;
 use wgray_render::cpu::footprint::{Ellipse, Footprint};
 use wgray_render::cpu::light::Segments;
 use wgray_render::cpu::light_sample::{CylinderPart, CylinderPoint};
 use wgray_render::cpu::lobe::LobeSample;
-use wgray_render::cpu::mesh::{Crossing, Shear, Spot};
+use wgray_render::cpu::mesh::{Crossing, HitPrimitive, Shear};
 use wgray_render::cpu::modified_phong::PhongFactors;
-use wgray_render::cpu::path::{Path, Scattered};
+use wgray_render::cpu::path::{Path, SpecularSplit};
 use wgray_render::cpu::phong::Lobes;
 use wgray_render::cpu::primitive::Tangents;
-use wgray_render::cpu::principled::Mixture;
+use wgray_render::cpu::principled::PrincipledLobes;
 use wgray_render::cpu::ray::{Hit, Ray};
-use wgray_render::cpu::shadow::{Block, Cone};
-use wgray_render::cpu::slab::{Fan, Slabs};
+use wgray_render::cpu::shadow::{Cone, SampleBlock};
+use wgray_render::cpu::slab::{RayInterval, Slabs};
 use wgray_render::cpu::surface::Surface;
-use wgray_render::cpu::surroundings::MapCell;
 use wgray_render::records::{
     Camera, Environment, FirstHit, Instance, Light, LightNode, Material, Node, Primitive, Sphere, Texture,
 };
@@ -101,35 +101,35 @@ macro_rules! records {
 records! {
     Ray { origin, direction }
     Hit { t, instance, primitive, slot, barycentric }
-    Surface { position, normal, smooth_normal, shading_normal, wo, start, bulge, side, above, below, uv, du, dv }
+    Surface { position, normal, smooth_normal, shading_normal, wo, ray_origin, terminator_offset, side, exclude_front, exclude_back, uv, du, dv }
     Derivative { position, direction }
     Differential { x, y }
-    Arrival { x, y, normal_x, normal_y }
+    HitDifferential { x, y, normal_x, normal_y }
     Footprint { uv, dx, dy }
     Ellipse { m, major, minor }
-    MapCell { column, row, x, y }
+    EnvironmentCell { column, row, x, y }
     Tangents { u, v }
     CylinderPart { arc, middle, side, end, start }
     CylinderPoint { to, normal }
-    Path { ray, differential, throughput, depth, branch, left, wall }
-    Scattered { onward, other, splits }
-    Passage { path, passes, eta }
+    Path { ray, differential, throughput, depth, branch, origin_prim, inside_prim }
+    SpecularSplit { primary, secondary, splits }
+    DielectricSample { path, passes, eta }
     Angles { wi, wo, between }
     LobeSample { wi, weight, pdf, eta }
-    Mixture {
+    PrincipledLobes {
         diffuse, alpha, f0, f90, glass, passed, glass_f0, glass_f90, head_on, ratio, eta, thin, coat, coat_alpha,
         coat_normal, sheen, sheen_alpha, chances,
     }
     PhongFactors { diffuse, specular, diffuse_share }
     Segments { towards, u, v }
     Lobes { diffuse, specular }
-    Block { pattern, side, first, count, group, key }
+    SampleBlock { pattern, side, first, count, group, key }
     Cone { apex, to, length2, inverse_depth }
     Slabs { low_origin, high_origin, inverse }
-    Fan { low_origin, high_origin, near_low, near_high, far_low, far_high }
+    RayInterval { low_origin, high_origin, near_low, near_high, far_low, far_high }
     Shear { axis, slope, scale }
     Crossing { met, t, barycentric }
-    Spot {
+    HitPrimitive {
         primitive, edge_1, edge_2, uv_0, uv_1, uv_2, normal_0, normal_1, normal_2, tangents_0, tangents_1,
         tangents_2, anchor, condition,
     }
@@ -163,7 +163,7 @@ by_reference![
     Environment,
     Primitive,
     Material,
-    Mixture,
+    PrincipledLobes,
     Light,
     LightNode,
     Sphere,
@@ -172,5 +172,5 @@ by_reference![
     Texture,
     Node,
     Instance,
-    Spot
+    HitPrimitive
 ];

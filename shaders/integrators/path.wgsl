@@ -13,24 +13,24 @@ struct PathState {
     weight: f32,           // of the sample
     ended: bool,
     layers: Layers,        // of the sample, where layers are wanted
-    described: bool,       // whether they have the albedo
-    start: vec3f,          // where the path was last scattered, if a tree chooses lights
-    start_normal: vec3f,   // the normal there, or 0 where light may come from both sides; also for an environment map
-    way: f32,              // from the last bounce to the ray's start, past surfaces that are not there, or that the camera does not see
-    passed: u32,           // how many of these there were
+    albedo_recorded: bool,       // whether they have the albedo
+    prev_position: vec3f,  // where the path was last scattered, if a tree chooses lights
+    prev_normal: vec3f,   // the normal there, or 0 where light may come from both sides; also for an environment map
+    skipped_distance: f32, // from the last bounce to the ray's start, past surfaces that are not there, or that the camera does not see
+    skips: u32,            // how many of these there were
 }
 
 // The sample's path at the camera.
 fn begin_path(pixel: vec2u, sample: u32) -> PathState {
     let start = camera_sample(pixel, sample);
-    var path = Path(start.ray, start.differential, vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
-    var way = 0.0;
-    if HIDDEN != 0u {
-        path = seen_path(path);
-        way = dot(path.ray.origin - start.ray.origin, path.ray.direction);
+    var path = Path(start.ray, start.differential, vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);
+    var skipped_distance = 0.0;
+    if CAMERA_INVISIBLE != 0u {
+        path = skip_camera_invisible(path);
+        skipped_distance = dot(path.ray.origin - start.ray.origin, path.ray.direction);
     }
     return PathState(path, vec3f(0.0), 0.0, 1.0, vec3f(0.0), sample, start.weight, false, Layers(), false,
-                     vec3f(0.0), vec3f(0.0), way, 0u);
+                     vec3f(0.0), vec3f(0.0), skipped_distance, 0u);
 }
 
 // The path after one more surface. What comes of a path that ends here is computed and not taken, where that is short: software
@@ -38,35 +38,35 @@ fn begin_path(pixel: vec2u, sample: u32) -> PathState {
 fn advance(before: PathState, pixel: vec2u) -> PathState {
     var state = before;
     let path = before.path;
-    let hit = closest_hit(path.ray, path.left, path.wall);
+    let hit = closest_hit(path.ray, path.origin_prim, path.inside_prim);
     let met = hit.primitive != NO_INDEX;
-    let shown = ((ALPHA == 0u) & ((SURROUNDINGS & UNSEEN_AROUND) == 0u)) | (path.depth > 0u);
+    let shown = ((ALPHA == 0u) & ((ENVIRONMENT_FLAGS & ENVIRONMENT_INVISIBLE) == 0u)) | (path.depth > 0u);
     var arriving = environment.radiance;
-    if (SURROUNDINGS & IMAGE_AROUND) != 0u {
+    if (ENVIRONMENT_FLAGS & ENVIRONMENT_MAP) != 0u {
         if !met {
-            arriving = light_from_afar(path.ray.direction, state.pdf, state.start_normal);
+            arriving = environment_mis(path.ray.direction, state.pdf, state.prev_normal);
         }
     }
-    if (SURROUNDINGS & BACKGROUND) != 0u {
+    if (ENVIRONMENT_FLAGS & BACKGROUND) != 0u {
         arriving = select(arriving, environment.background, path.depth == 0u);
     }
-    state = with_radiance(state, path.throughput * arriving, !met & shown, path.depth);
-    if (IN_TREE != 0u) | (LOOKUPS != 0u) {
+    state = add_radiance(state, path.throughput * arriving, !met & shown, path.depth);
+    if (TLAS_KINDS != 0u) | (LOOKUPS != 0u) {
         if !met {
             state.ended = true;
             return state;
         }
     }
-    let spot = spot_of(hit);
-    var surface = surface_of(spot, hit, path.ray);
-    let at = arrival_of(spot, hit, surface, path.ray, path.differential);
-    var look = appearance(spot, hit, material_of(spot), surface, at, LOOKUPS);
+    let prim = fetch_hit_primitive(hit);
+    var surface = surface_of(prim, hit, path.ray);
+    let at = hit_differential(prim, hit, surface, path.ray, path.differential);
+    var shading = evaluate_material(prim, hit, material_of(prim), surface, at, LOOKUPS);
     if VERTEX_COLORS != 0u {
-        look.material = with_vertex_colors(look.material, hit);
+        shading.material = with_vertex_colors(shading.material, hit);
     }
-    var material = bounded(look.material);
-    if SEES_THROUGH != 0u {
-        if met & !is_there(material, pixel, state.sample, path.depth, ONWARD, hit, surface.side) {
+    var material = bounded(shading.material);
+    if ALPHA_SURFACES != 0u {
+        if met & !alpha_accepts(material, pixel, state.sample, path.depth, RAY_BSDF, hit, surface.side) {
             return past(state, surface, at, hit.t);
         }
     }
@@ -74,25 +74,25 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         // What may not be there says nothing of what is behind it. What is there tells of the whole way to it.
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
         let absorption = select(state.absorption, material.absorption, inside);
-        state.path.throughput *= transmittance(absorption, hit.t + state.way);
+        state.path.throughput *= transmittance(absorption, hit.t + state.skipped_distance);
     }
-    if SHINES != 0u {
-        state = with_emission(state, spot, hit, surface, material, met);
+    if EMISSIVE != 0u {
+        state = add_emission(state, prim, hit, surface, material, met);
     }
-    surface.shading_normal = shaded_normal(surface, material, look.normal);
-    state.way = 0.0;
-    var mixture = Mixture();
+    surface.shading_normal = shaded_normal(surface, material, shading.normal);
+    state.skipped_distance = 0.0;
+    var mixture = PrincipledLobes();
     if (MATERIALS & (1u << PRINCIPLED)) != 0u {
         if material.kind == PRINCIPLED {
             let frame = facet_frame(surface, material);
             surface.du = frame.u;
             surface.dv = frame.v;
-            mixture = mixture_at(surface, material, look.coat_normal);
+            mixture = mixture_at(surface, material, shading.coat_normal);
         }
     }
     if LAYERS != 0u {
         if met {
-            state = described(state, surface, material);
+            state = record_first_hit_layers(state, surface, material);
         }
     }
     let goes_on = met & (path.depth < BOUNCES) & (material.kind != EMITTER);
@@ -106,13 +106,13 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     if DELTA_KINDS != 0u {
         specular = is_delta(material);
         if specular {
-            state = scattered_specularly(state, surface, at, material, unit_float(choices.x));
+            state = sample_delta_bsdf(state, surface, at, material, unit_float(choices.x));
         }
     }
     if (MATERIALS & ~SPECULAR_KINDS) != 0u {
         if !specular {
-            if (IN_TREE & (1u << INSTANCE)) != 0u {
-                surface.start += surface.bulge;
+            if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
+                surface.ray_origin += surface.terminator_offset;
             }
             if (MATERIALS & FACET_KINDS) != 0u {
                 if has_facets(material) {
@@ -127,15 +127,15 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
                 if EMITTERS > 1u {
                     bits = decision_set(other_key.xy, state.sample);
                 }
-                var chosen = Chosen(chosen_emitter(bits), 0.0);
+                var chosen = EmitterSelection(select_emitter(bits), 0.0);
                 if LIGHT_TREE != 0u {
                     let normal = lit_normal(surface, material);
-                    chosen = chosen_light(chosen.emitter, surface.start, normal, other_key.xy, state.sample);
+                    chosen = light_tree_select(chosen.emitter, surface.ray_origin, normal, other_key.xy, state.sample);
                 }
                 let u = decision(key.xy, state.sample);
-                state = with_light(state, spot, surface, material, mixture, chosen, u, goes_on, pixel);
+                state = add_direct_light(state, prim, surface, material, mixture, chosen, u, goes_on, pixel);
             }
-            state = scattered(state, spot, surface, material, mixture, decision(key.zw, state.sample), unit_float(choices.x));
+            state = sample_bsdf(state, prim, surface, material, mixture, decision(key.zw, state.sample), unit_float(choices.x));
         }
     }
     if RR_DEPTH < BOUNCES {
@@ -174,11 +174,11 @@ fn decision(key: vec2u, sample: u32) -> vec2f {
 }
 
 // With light that came by so many bounces, if it is `taken`.
-fn with_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> PathState {
+fn add_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> PathState {
     var state = before;
     var radiance = select(vec3f(0.0), found, taken);
-    if MOST_INDIRECT != 0u {
-        let scale = bitcast<f32>(MOST_INDIRECT) / max(largest(found), 1e-30);
+    if MAX_INDIRECT != 0u {
+        let scale = bitcast<f32>(MAX_INDIRECT) / max(largest(found), 1e-30);
         radiance *= select(1.0, min(scale, 1.0), bounces > 1u);
     }
     state.radiance += radiance;
@@ -191,62 +191,62 @@ fn with_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> 
 }
 
 // With what the surface that was met, if any was, radiates itself.
-fn with_emission(state: PathState, spot: Spot, hit: Hit, surface: Surface, material: Material, met: bool) -> PathState {
+fn add_emission(state: PathState, prim: HitPrimitive, hit: Hit, surface: Surface, material: Material, met: bool) -> PathState {
     let one_sided = material.kind == EMITTER;
     let shines = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
     var ray = state.path.ray;
     var seen = hit;
-    if SEES_THROUGH != 0u {
-        ray.origin -= ray.direction * state.way;
-        seen.t += state.way;
+    if ALPHA_SURFACES != 0u {
+        ray.origin -= ray.direction * state.skipped_distance;
+        seen.t += state.skipped_distance;
     }
     var weighs = (state.pdf > 0.0) & (EMITTERS != 0u);
     var density = material.density;
     if LIGHT_TREE != 0u {
-        density = met_density(hit, met & shines & weighs, state.start, state.start_normal);
+        density = light_tree_pdf(hit, met & shines & weighs, state.prev_position, state.prev_normal);
         weighs &= density > 0.0;
     }
-    let weighed = power_heuristic(state.pdf, emitter_pdf(spot, seen, density, ray, surface.normal));
+    let weighed = power_heuristic(state.pdf, emitter_pdf(prim, seen, density, ray, surface.normal));
     let weight = select(1.0, weighed, weighs);
-    return with_radiance(state, state.path.throughput * material.emission * weight, met & shines, state.path.depth);
+    return add_radiance(state, state.path.throughput * material.emission * weight, met & shines, state.path.depth);
 }
 
 // The path beyond a surface that is not there for it.
-fn past(before: PathState, surface: Surface, at: Arrival, t: f32) -> PathState {
+fn past(before: PathState, surface: Surface, at: HitDifferential, t: f32) -> PathState {
     var state = before;
-    state.path = passed_path(before.path, surface, at);
-    if HIDDEN != 0u {
+    state.path = pass_through_path(before.path, surface, at);
+    if CAMERA_INVISIBLE != 0u {
         if before.path.depth == 0u {
             let start = state.path.ray;
-            state.path = seen_path(state.path);
-            state.way += dot(state.path.ray.origin - start.origin, start.direction);
+            state.path = skip_camera_invisible(state.path);
+            state.skipped_distance += dot(state.path.ray.origin - start.origin, start.direction);
         }
     }
-    state.way += t;
-    state.passed += 1u;
-    state.ended |= state.passed > MOST_PASSED;
+    state.skipped_distance += t;
+    state.skips += 1u;
+    state.ended |= state.skips > MAX_ALPHA_SKIPS;
     return state;
 }
 
 // What layers tell of the first surface, and of the first that neither mirrors nor refracts.
-fn described(before: PathState, surface: Surface, material: Material) -> PathState {
+fn record_first_hit_layers(before: PathState, surface: Surface, material: Material) -> PathState {
     var state = before;
     if state.path.depth == 0u {
         state.layers.emission.w = 1.0;
         state.layers.normal = vec4f(surface.shading_normal * surface.side, 0.0);
     }
-    if !state.described & !is_delta(material) {
+    if !state.albedo_recorded & !is_delta(material) {
         state.layers.albedo = vec4f(state.path.throughput * albedo(material), 0.0);
-        state.described = true;
+        state.albedo_recorded = true;
     }
     return state;
 }
 
 // The path mirrored or refracted.
-fn scattered_specularly(before: PathState, surface: Surface, at: Arrival, material: Material, random: f32) -> PathState {
+fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, material: Material, random: f32) -> PathState {
     var state = before;
     state.pdf = 0.0;
-    var path = mirrored_path(before.path, surface, at, material).onward;
+    var path = mirrored_path(before.path, surface, at, material).primary;
     if (DELTA_KINDS & (1u << METAL)) != 0u {
         if material.kind == METAL {
             path.throughput = before.path.throughput * metal_fresnel(material, dot(surface.wo, surface.shading_normal));
@@ -278,38 +278,38 @@ fn scattered_specularly(before: PathState, surface: Surface, at: Arrival, materi
 }
 
 // With the light of one sample of what was chosen, if that is `wanted`.
-fn with_light(state: PathState, spot: Spot, surface: Surface, material: Material, mixture: Mixture, chosen: Chosen, u: vec2f,
+fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, chosen: EmitterSelection, u: vec2f,
               wanted: bool, pixel: vec2u) -> PathState {
-    let light = sample_emitter(chosen, surface.start, lit_normal(surface, material), u);
-    let reflected = reflection(spot, surface, material, mixture, normalize(light.to));
+    let light = sample_emitter(chosen, surface.ray_origin, lit_normal(surface, material), u);
+    let reflected = reflection(prim, surface, material, mixture, normalize(light.to));
     var found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
     var from_side = surface;
     var to = light.to;
     var absorption = state.absorption;
     if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
-        if lets_through(material) & (dot(surface.normal, to) < 0.0) {
-            from_side = turned_over(surface);
-            to = light.to + select(vec3f(0.0), surface.start - from_side.start, light.reach < 2.0);
-            absorption = absorption_behind(absorption, surface, material);
+        if is_transmissive(material) & (dot(surface.normal, to) < 0.0) {
+            from_side = flipped(surface);
+            to = light.to + select(vec3f(0.0), surface.ray_origin - from_side.ray_origin, light.t_max < 2.0);
+            absorption = absorption_after(absorption, surface, material);
         }
     }
     if ABSORPTION != 0u {
-        found *= transmittance(absorption, light.reach * sqrt(dot(light.to, light.to)));
+        found *= transmittance(absorption, light.t_max * sqrt(dot(light.to, light.to)));
     }
     found *= select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta);
     let most = largest(found);
     let dark = !wanted | !(most > 0.0) | !(most < INFINITE_T);
-    if SEES_THROUGH != 0u {
+    if ALPHA_SURFACES != 0u {
         let bounce = state.path.depth + 1u;
-        let veiled = is_veiled(dark, from_side, to, light.reach, light.primitive, pixel, state.sample, bounce);
-        return with_radiance(state, found, !veiled, bounce);
+        let veiled = is_occluded_alpha(dark, from_side, to, light.t_max, light.primitive, pixel, state.sample, bounce);
+        return add_radiance(state, found, !veiled, bounce);
     }
-    let hidden = is_hidden(dark, from_side, to, light.reach, light.primitive);
-    return with_radiance(state, found, !hidden, state.path.depth + 1u);
+    let hidden = is_occluded(dark, from_side, to, light.t_max, light.primitive);
+    return add_radiance(state, found, !hidden, state.path.depth + 1u);
 }
 
 // The path in a direction that is chosen by how the surface reflects.
-fn scattered(before: PathState, spot: Spot, surface: Surface, material: Material, mixture: Mixture, u: vec2f,
+fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, u: vec2f,
              random: f32) -> PathState {
     var state = before;
     var wi = diffuse_sample(surface.shading_normal, u);
@@ -319,48 +319,48 @@ fn scattered(before: PathState, spot: Spot, surface: Surface, material: Material
         }
     }
     let reflected = plain_reflection(surface, material, wi);
-    let value = select(vec3f(0.0), reflected.value, lets_light(spot, surface, material, wi));
+    let value = select(vec3f(0.0), reflected.value, direction_allowed(prim, surface, material, wi));
     let factor = value * select(0.0, 1.0 / reflected.pdf, reflected.pdf > 0.0);
     let throughput = before.path.throughput * factor;
-    state.path = Path(Ray(surface.start, wi), Differential(), throughput, before.path.depth + 1u, 0u, surface.above, surface.below);
+    state.path = Path(Ray(surface.ray_origin, wi), Differential(), throughput, before.path.depth + 1u, 0u, surface.exclude_front, surface.exclude_back);
     state.pdf = reflected.pdf;
     if (MATERIALS & FACET_KINDS) != 0u {
         if has_facets(material) {
             let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
-            state = scattered_by_lobe(before, spot, surface, material, facet_sample(material, wo, u, random));
+            state = apply_lobe_sample(before, prim, surface, material, facet_sample(material, wo, u, random));
         }
     }
     if (MATERIALS & (1u << PRINCIPLED)) != 0u {
         if material.kind == PRINCIPLED {
             let found = principled_sample(mixture, local_wo(surface), u, random, LOBES);
-            state = scattered_by_lobe(before, spot, surface, material, found);
+            state = apply_lobe_sample(before, prim, surface, material, found);
         }
     }
     if LIGHT_TREE != 0u {
-        state.start = surface.start;
+        state.prev_position = surface.ray_origin;
     }
-    if (LIGHT_TREE != 0u) | ((SURROUNDINGS & IMAGE_AROUND) != 0u) {
-        state.start_normal = lit_normal(surface, material);
+    if (LIGHT_TREE != 0u) | ((ENVIRONMENT_FLAGS & ENVIRONMENT_MAP) != 0u) {
+        state.prev_normal = lit_normal(surface, material);
     }
     return state;
 }
 
 // The same, by a lobe in the frame of the surface, perhaps through it.
-fn scattered_by_lobe(before: PathState, spot: Spot, surface: Surface, material: Material, found: LobeSample) -> PathState {
+fn apply_lobe_sample(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, found: LobeSample) -> PathState {
     var state = before;
     let frame = Tangents(surface.du, surface.dv);
     let wi = normalize(vector_from_lobe(frame, surface.shading_normal, found.wi));
-    let weight = select(vec3f(0.0), found.weight, lets_light(spot, surface, material, wi));
+    let weight = select(vec3f(0.0), found.weight, direction_allowed(prim, surface, material, wi));
     var from_side = surface;
     if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
         if found.wi.z < 0.0 {
-            from_side = turned_over(surface);
+            from_side = flipped(surface);
             state.eta2 = before.eta2 * found.eta * found.eta;
-            state.absorption = absorption_behind(before.absorption, surface, material);
+            state.absorption = absorption_after(before.absorption, surface, material);
         }
     }
-    state.path = Path(Ray(from_side.start, wi), Differential(), before.path.throughput * weight, before.path.depth + 1u, 0u,
-                      from_side.above, from_side.below);
+    state.path = Path(Ray(from_side.ray_origin, wi), Differential(), before.path.throughput * weight, before.path.depth + 1u, 0u,
+                      from_side.exclude_front, from_side.exclude_back);
     state.pdf = found.pdf;
     return state;
 }

@@ -4,46 +4,46 @@
 // path as far as its end, and the branches that wait are fewer than LEAVES. A path that meets a mirror or glass after
 // BOUNCES bounces is cut off: there it sees the background.
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
-    var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
-    if HIDDEN != 0u {
-        path = seen_path(path);
+    var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);
+    if CAMERA_INVISIBLE != 0u {
+        path = skip_camera_invisible(path);
     }
     if BOUNCES == 0u {
-        let hit = closest_hit(path.ray, path.left, path.wall);
+        let hit = closest_hit(path.ray, path.origin_prim, path.inside_prim);
         if hit.primitive == NO_INDEX {
             return environment.background;
         }
-        return radiance_from(spot_of(hit), hit, path, pixel, sample);
+        return radiance_from(fetch_hit_primitive(hit), hit, path, pixel, sample);
     }
     var sum = vec3f(0.0);
-    var pending: array<Path, SPLITS>;
+    var pending: array<Path, MAX_SPLIT_DEPTH>;
     var waiting = 0u;
-    for (var leaf = 0u; leaf < LEAVES; leaf++) {
+    for (var leaf = 0u; leaf < MAX_PATH_LEAVES; leaf++) {
         var hit = no_hit();
-        var spot: Spot;
+        var prim: HitPrimitive;
         while path.depth <= BOUNCES {
-            hit = closest_hit(path.ray, path.left, path.wall);
+            hit = closest_hit(path.ray, path.origin_prim, path.inside_prim);
             if hit.primitive == NO_INDEX {
                 break;
             }
-            spot = spot_of(hit);
-            if !is_specular(material_of(spot)) {
+            prim = fetch_hit_primitive(hit);
+            if !is_specular(material_of(prim)) {
                 break;
             }
             if path.depth == BOUNCES {
                 hit.primitive = NO_INDEX;
                 break;
             }
-            let scattered = scatter(spot, hit, path, pixel, sample);
-            path = scattered.onward;
+            let scattered = scatter(prim, hit, path, pixel, sample);
+            path = scattered.primary;
             if scattered.splits {
-                pending[waiting] = scattered.other;
+                pending[waiting] = scattered.secondary;
                 waiting++;
             }
         }
         var seen = environment.background;
         if hit.primitive != NO_INDEX {
-            seen = radiance_from(spot, hit, path, pixel, sample);
+            seen = radiance_from(prim, hit, path, pixel, sample);
         }
         sum += path.throughput * seen;
         if waiting == 0u {
@@ -55,39 +55,39 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
     return sum;
 }
 
-fn scatter(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
-    var surface = surface_of(spot, hit, path.ray);
-    let at = arrival_of(spot, hit, surface, path.ray, path.differential);
-    let look = appearance(spot, hit, material_of(spot), surface, at, SPECULAR_LOOKUPS);
-    let material = look.material;
-    surface.shading_normal = usable_normal(surface, look.normal);
+fn scatter(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> SpecularSplit {
+    var surface = surface_of(prim, hit, path.ray);
+    let at = hit_differential(prim, hit, surface, path.ray, path.differential);
+    let shading = evaluate_material(prim, hit, material_of(prim), surface, at, SPECULAR_LOOKUPS);
+    let material = shading.material;
+    surface.shading_normal = usable_normal(surface, shading.normal);
     if material.kind == MIRROR {
         return mirrored_path(path, surface, at, material);
     }
-    let bits = decision_bits(pixel, camera.seed, sample, path.depth * LEAVES + path.branch, NO_INDEX);
+    let bits = decision_bits(pixel, camera.seed, sample, path.depth * MAX_PATH_LEAVES + path.branch, NO_INDEX);
     return glass_path(path, surface, at, material, unit_float(bits.x));
 }
 
 // The radiance of what a path ends at.
-fn radiance_from(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
-    let plain = material_of(spot);
+fn radiance_from(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
+    let plain = material_of(prim);
     if plain.kind == EMITTER {
         return plain.emission;
     }
-    var surface = surface_of(spot, hit, path.ray);
-    let at = arrival_of(spot, hit, surface, path.ray, path.differential);
-    let look = appearance(spot, hit, plain, surface, at, LOOKUPS);
-    let material = look.material;
-    surface.shading_normal = look.normal;
-    if (IN_TREE & (1u << INSTANCE)) != 0u {
-        surface.start += surface.bulge;
+    var surface = surface_of(prim, hit, path.ray);
+    let at = hit_differential(prim, hit, surface, path.ray, path.differential);
+    let shading = evaluate_material(prim, hit, plain, surface, at, LOOKUPS);
+    let material = shading.material;
+    surface.shading_normal = shading.normal;
+    if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
+        surface.ray_origin += surface.terminator_offset;
     }
     var sum = environment.ambient * material.ambient;
     let lights = light_counts();
     if (LIGHTS & 1u) != 0u {
         for (var i = 0u; i < lights.x; i++) {
             let light = load_light(i);
-            let lobes = lobes_of_light(spot, surface, material, light, LIGHT_PATTERN, LIGHT_SIDE, LIGHT_SAMPLES, pixel, sample);
+            let lobes = lobes_of_light(prim, surface, material, light, LIGHT_PATTERN, LIGHT_SIDE, LIGHT_SAMPLES, pixel, sample);
             sum += phong_radiance(material, light, lobes, environment.light_weight);
         }
     }
@@ -99,7 +99,7 @@ fn radiance_from(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) ->
                     light.color *= spot_falloff(light, light.center - surface.position);
                 }
             }
-            let lobes = lobes_of_light(spot, surface, material, light, GRID, 1u, 1u, pixel, sample);
+            let lobes = lobes_of_light(prim, surface, material, light, GRID, 1u, 1u, pixel, sample);
             sum += phong_radiance(material, light, lobes, 1.0);
         }
     }
@@ -107,18 +107,18 @@ fn radiance_from(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) ->
 }
 
 // Phong's lobes, summed over all samples of a light.
-fn lobes_of_light(spot: Spot, surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
+fn lobes_of_light(prim: HitPrimitive, surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
                   pixel: vec2u, sample: u32) -> Lobes {
     let to = segments_to_light(light, surface.position);
     let key = sample_key(pixel, camera.seed, 1u + light.number);
     var lobes = Lobes(0.0, 0.0);
-    for (var first = 0u; first < count; first += BLOCK) {
-        let block = Block(pattern, side, first, select(BLOCK, count - first, count - first < BLOCK), sample, key);
+    for (var first = 0u; first < count; first += SAMPLE_BLOCK) {
+        let block = SampleBlock(pattern, side, first, select(SAMPLE_BLOCK, count - first, count - first < SAMPLE_BLOCK), sample, key);
         var unlit = 0u;
-        if IN_TREE != 0u {
-            unlit = unlit_samples(spot, surface, to, block);
+        if TLAS_KINDS != 0u {
+            unlit = unlit_mask(prim, surface, to, block);
         }
-        let hidden = hidden_samples(surface, light, block, unlit);
+        let hidden = occluded_samples(surface, light, block, unlit);
         lobes = phong_block(surface, material, to, block, hidden, EXPONENT_BITS, lobes);
     }
     return lobes;

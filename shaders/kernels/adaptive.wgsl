@@ -5,32 +5,32 @@
 
 @compute @workgroup_size(8, 8)
 fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
-    if id.x >= work.size.x || id.y >= work.size.y {
+    if id.x >= params.size.x || id.y >= params.size.y {
         return;
     }
-    let pixel = work.origin + id.xy;
-    let place = pixel - work.film_origin;
-    let index = place.y * work.film_size.x + place.x;
-    let pixels = work.film_size.x * work.film_size.y;
+    let pixel = params.origin + id.xy;
+    let place = pixel - params.film_origin;
+    let index = place.y * params.film_size.x + place.x;
+    let pixels = params.film_size.x * params.film_size.y;
     var sum = film[index];
     var moments = film[pixels + index];
-    var look = film[2u * pixels + index];
-    var end = work.samples.y;
-    let looks = work.samples.x < FIRST_LOOK;
+    var shading = film[2u * pixels + index];
+    var end = params.samples.y;
+    let looks = params.samples.x < PILOT_SAMPLES;
     if !looks {
-        end = samples_wanted(looks_around(place), FIRST_LOOK, bitcast<f32>(SQUARED_ERROR), end);
+        end = samples_wanted(neighbor_pilot_sum(place), PILOT_SAMPLES, bitcast<f32>(SQUARED_ERROR), end);
     }
     var layers = Layers();
     if LAYERS != 0u {
         layers = stored_layers(index, 3u);
     }
-    var sample = work.samples.x;
+    var sample = params.samples.x;
     var path = begin_path(pixel, sample);
     while sample < end {
         path = advance(path, pixel);
         if path.ended {
             let value = path_value(path);
-            look = look_with(look, sum, value);
+            shading = pilot_add(shading, sum, value);
             moments = moments_with(moments, sum, value);
             sum += value;
             if LAYERS != 0u {
@@ -46,15 +46,15 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     }
     film[pixels + index] = moments;
     if looks {
-        film[2u * pixels + index] = whole_look(look, sum, moments);
+        film[2u * pixels + index] = pilot_finish(shading, sum, moments);
     }
-    sign(local);
+    report_completion(local);
 }
 
 // The sum of the first looks at a pixel's four neighbours, as far as they are in the picture.
-fn looks_around(place: vec2u) -> vec4f {
-    let width = work.film_size.x;
-    let index = 2u * width * work.film_size.y + place.y * width + place.x;
+fn neighbor_pilot_sum(place: vec2u) -> vec4f {
+    let width = params.film_size.x;
+    let index = 2u * width * params.film_size.y + place.y * width + place.x;
     var sum = vec4f(0.0);
     if place.y > 0u {
         sum += film[index - width];
@@ -65,7 +65,7 @@ fn looks_around(place: vec2u) -> vec4f {
     if place.x + 1u < width {
         sum += film[index + 1u];
     }
-    if place.y + 1u < work.film_size.y {
+    if place.y + 1u < params.film_size.y {
         sum += film[index + width];
     }
     return sum;

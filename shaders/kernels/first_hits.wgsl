@@ -4,11 +4,11 @@
 
 @compute @workgroup_size(8, 8)
 fn first_hits(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
-    if id.x >= work.size.x || id.y >= work.size.y {
+    if id.x >= params.size.x || id.y >= params.size.y {
         return;
     }
-    let pixel = work.origin + id.xy;
-    let place = pixel - work.film_origin;
-    hits[place.y * work.film_size.x + place.x] = pixel_first_hit(pixel);
-    sign(local);
+    let pixel = params.origin + id.xy;
+    let place = pixel - params.film_origin;
+    hits[place.y * params.film_size.x + place.x] = pixel_first_hit(pixel);
+    report_completion(local);
 }

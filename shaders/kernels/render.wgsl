@@ -4,20 +4,20 @@
 
 @compute @workgroup_size(8, 8)
 fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
-    if id.x >= work.size.x || id.y >= work.size.y {
+    if id.x >= params.size.x || id.y >= params.size.y {
         return;
     }
-    let pixel = work.origin + id.xy;
-    let place = pixel - work.film_origin;
-    let index = place.y * work.film_size.x + place.x;
+    let pixel = params.origin + id.xy;
+    let place = pixel - params.film_origin;
+    let index = place.y * params.film_size.x + place.x;
     var sum = film[index];
     var layers = Layers();
     if LAYERS != 0u {
         layers = stored_layers(index, 1u);
     }
-    var sample = work.samples.x;
+    var sample = params.samples.x;
     var path = begin_path(pixel, sample);
-    while sample < work.samples.y {
+    while sample < params.samples.y {
         path = advance(path, pixel);
         if path.ended {
             sum += path_value(path);
@@ -32,5 +32,5 @@ fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
     if LAYERS != 0u {
         store_layers(layers, index, 1u);
     }
-    sign(local);
+    report_completion(local);
 }

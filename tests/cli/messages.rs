@@ -11,11 +11,11 @@ mod unix {
     }
 
     /// Streams that take nothing: full, closed, or with a reader who has gone.
-    const NOWHERE: [&str; 3] = ["2>/dev/full", "2>&-", "2>&1 >&3 3>&- | true"];
+    const NO_PRIMITIVE: [&str; 3] = ["2>/dev/full", "2>&-", "2>&1 >&3 3>&- | true"];
 
     #[test]
     fn a_render_is_done_whatever_became_of_standard_error() {
-        for nowhere in NOWHERE {
+        for nowhere in NO_PRIMITIVE {
             for options in [
                 "--progress plain --size 64x64",
                 "--verbose",
@@ -42,7 +42,7 @@ mod unix {
     fn exit_codes_stay_whatever_became_of_standard_error() {
         let place = Place::new();
         place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
-        for nowhere in NOWHERE {
+        for nowhere in NO_PRIMITIVE {
             for (command, code) in [
                 ("check bad.toml", 3),
                 ("render bad.toml", 3),

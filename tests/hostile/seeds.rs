@@ -59,7 +59,7 @@ material = 'm'
 center = [0, 0, 0]
 radius = 1
 ";
-const SURROUNDINGS: &str = "
+const ENVIRONMENT_FLAGS: &str = "
 [environment]
 file = 'FILE'
 [materials.m]
@@ -269,8 +269,8 @@ pub fn all(folder: &Path) -> Vec<Kind> {
         picture("webp", ImageFormat::WebP, TEXTURE),
         kind("ktx2", ktx2("etc1s-5x7-alpha-levels"), How::Named(TEXTURE)),
         kind("ktx2", ktx2("zstandard-48x20"), How::Named(TEXTURE)),
-        picture("exr", ImageFormat::OpenExr, SURROUNDINGS),
-        picture("hdr", ImageFormat::Hdr, SURROUNDINGS),
+        picture("exr", ImageFormat::OpenExr, ENVIRONMENT_FLAGS),
+        picture("hdr", ImageFormat::Hdr, ENVIRONMENT_FLAGS),
         Kind {
             codes: &[2],
             ..kind("checkpoint", checkpoint, How::Checkpoint)

@@ -5,13 +5,13 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
-use wgray_render::cpu::differential::Arrival;
-use wgray_render::cpu::geometry::{material_of, spot_of, surface_of};
-use wgray_render::cpu::mesh::{Spot, face_frame, face_tangents, face_uv};
+use wgray_render::cpu::differential::HitDifferential;
+use wgray_render::cpu::geometry::{fetch_hit_primitive, material_of, surface_of};
+use wgray_render::cpu::mesh::{HitPrimitive, face_frame, face_tangents, face_uv};
 use wgray_render::cpu::normal_map::mapped_normal;
 use wgray_render::cpu::primitive::Tangents;
 use wgray_render::cpu::ray::{Hit, Ray};
-use wgray_render::cpu::texture::appearance;
+use wgray_render::cpu::texture::evaluate_material;
 use wgray_render::records::{NO_INDEX, Packed};
 
 use super::forms::{HEAD, Sheet, scene};
@@ -81,7 +81,7 @@ fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> 
     let mut worst = [0.0; 2];
     for slot in 0..packed.bvh.meshes[0].triangles.len() {
         for b in PLACES {
-            let spot = spot_of(packed, hit(packed, slot, b));
+            let spot = fetch_hit_primitive(packed, hit(packed, slot, b));
             let uv = face_uv(&spot, b);
             let Some(exact) = surface(f64::from(uv.x), f64::from(uv.y)) else {
                 continue;
@@ -139,7 +139,7 @@ fn tangents_are_those_of_the_surface() {
 /// The normal that the map gives at a point of a triangle: as it is, and by the triangle's own tangents.
 fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     let hit = hit(packed, slot, b);
-    let spot = spot_of(packed, hit);
+    let spot = fetch_hit_primitive(packed, hit);
     let q = &spot.primitive;
     let ray = Ray {
         origin: q.anchor + q.z * 3.0,
@@ -147,7 +147,7 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     };
     let surface = surface_of(packed, &spot, hit, ray);
     let material = material_of(packed, &spot);
-    let found = appearance(packed, &spot, hit, material, surface, Arrival::default(), 1).normal;
+    let found = evaluate_material(packed, &spot, hit, material, surface, HitDifferential::default(), 1).normal;
     let Tangents { u, v } = face_tangents(&spot);
     let by_triangle = wgray_render::cpu::surface::Surface {
         du: u,
@@ -260,7 +260,7 @@ fn mirrored_texture_coordinates_are_not_averaged_with_others() {
     assert_eq!(mesh.tangents.len(), mesh.vertices.len());
     for slot in 0..mesh.triangles.len() {
         for b in PLACES {
-            let spot = spot_of(&packed, hit(&packed, slot, b));
+            let spot = fetch_hit_primitive(&packed, hit(&packed, slot, b));
             let at = spot.primitive.anchor + spot.edge_1 * b.x + spot.edge_2 * b.y;
             let middle = spot.primitive.anchor + (spot.edge_1 + spot.edge_2) / 3.0;
             // To the right u grows along x, to the left against it; v grows along y.
@@ -325,7 +325,7 @@ fn only_smooth_meshes_with_normal_maps_have_tangents() {
     for packed in [flat, scene(&text, folder.path())] {
         assert!(packed.bvh.meshes[0].tangents.is_empty());
         assert_eq!(packed.bvh.instances[0].tangents, NO_INDEX);
-        let spot: Spot = spot_of(&packed, hit(&packed, 0, Vec2::ZERO));
+        let spot: HitPrimitive = fetch_hit_primitive(&packed, hit(&packed, 0, Vec2::ZERO));
         assert_eq!(spot.tangents_0, Tangents::default());
         assert_eq!(face_frame(&spot, Vec2::ZERO), face_tangents(&spot));
     }
@@ -355,7 +355,7 @@ fn odd_texture_coordinates_give_usable_tangents() {
                 assert!(
                     (normal.length() - 1.0).abs() < 1e-5,
                     "{number}: {slot}, {b}: {normal}, {:?}",
-                    spot_of(&packed, hit(&packed, slot, b))
+                    fetch_hit_primitive(&packed, hit(&packed, slot, b))
                 );
             }
         }

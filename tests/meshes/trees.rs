@@ -7,17 +7,18 @@ use glam::{UVec2, Vec3, Vec4Swizzles as _};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use wgray_render::bvh::{self, Aabb};
-use wgray_render::cpu::geometry::{closest_hit, hidden_samples};
+use wgray_render::cpu::geometry::{closest_hit, occluded_samples};
 use wgray_render::cpu::light::{segment, segments_to_light};
+use wgray_render::cpu::linear_primitives::{closest_primitive, occluded_by_primitives};
 use wgray_render::cpu::mesh::{highest, lowest, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
 use wgray_render::cpu::primitive::intersect;
 use wgray_render::cpu::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
-use wgray_render::cpu::shadow::{Block, block_sample, shadow_bits};
-use wgray_render::cpu::slab::{box_passage, is_passed, slabs};
+use wgray_render::cpu::shadow::{SampleBlock, block_sample, occlusion_mask};
+use wgray_render::cpu::slab::{box_interval, interval_hits, slabs};
 use wgray_render::cpu::surface::{Surface, largest};
-use wgray_render::cpu::traverse::{closest_primitive, hidden_by_primitives};
 use wgray_render::records::{
-    BLOCK, CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Item, Light, NO_INDEX, NO_SHADOW, NOWHERE, Packed, RANDOM,
+    CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Item, Light, NO_INDEX, NO_PRIMITIVE, NO_SHADOW, Packed, RANDOM,
+    SAMPLE_BLOCK,
 };
 
 use super::forms::{Form, HEAD, scene};
@@ -41,8 +42,8 @@ fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
     let mut hit = closest_primitive(scene, ray, by_itself(left), by_itself(wall));
     let world = slabs(ray.origin, ray.direction, room(scene, ray.origin));
     for item in &scene.bvh.items {
-        let passage = box_passage(item.low, item.high, world);
-        if !is_passed(passage, INFINITE_T) {
+        let passage = box_interval(item.low, item.high, world);
+        if !interval_hits(passage, INFINITE_T) {
             continue;
         }
         let kind = item.kind & 0xff;
@@ -84,18 +85,18 @@ fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
 }
 
 /// Which samples of a light anything hides, by the rule.
-fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32 {
-    let mut bits = hidden_by_primitives(scene, surface, light, block);
-    let origin = surface.start;
+fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
+    let mut bits = occluded_by_primitives(scene, surface, light, block);
+    let origin = surface.ray_origin;
     let to = segments_to_light(light, origin);
     for item in scene.bvh.items.iter().filter(|item| item.kind & CASTS_SHADOW != 0) {
         for sample in 0..block.count {
             let at = block_sample(block, sample);
             let world = slabs(origin, segment(to, at), room(scene, origin));
-            if !is_passed(box_passage(item.low, item.high, world), light.reach) {
+            if !interval_hits(box_interval(item.low, item.high, world), light.t_max) {
                 continue;
             }
-            let is_hidden = if item.kind & 0xff == INSTANCE {
+            let is_occluded = if item.kind & 0xff == INSTANCE {
                 let i = &scene.bvh.instances[item.index as usize];
                 let start = point_to_mesh(i, origin);
                 let [towards, u, v] = [to.towards, to.u, to.v].map(|v| vector_to_mesh(i, v));
@@ -107,15 +108,18 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32
                     let casts = scene.bvh.group_words[(i.materials + group) as usize] & NO_SHADOW == 0;
                     let [v0, v1, v2] = corners(scene, i, slot);
                     let crossing = triangle_crossing(v0, v1, v2, start, shear_of(direction), s);
-                    let own = surface.above == UVec2::new(item.index + 1, triangle.w);
-                    casts && !own && crossing.met && crossing.t > 0.0 && crossing.t < light.reach
+                    let own = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);
+                    casts && !own && crossing.met && crossing.t > 0.0 && crossing.t < light.t_max
                 })
             } else {
-                let (own, wall) = (by_itself(surface.above), item.index == by_itself(surface.below));
+                let (own, wall) = (
+                    by_itself(surface.exclude_front),
+                    item.index == by_itself(surface.exclude_back),
+                );
                 let q = &scene.primitives[item.index as usize];
-                item.index != own && shadow_bits(item.kind & 0xff, q, origin, wall, light, block) >> sample & 1 == 1
+                item.index != own && occlusion_mask(item.kind & 0xff, q, origin, wall, light, block) >> sample & 1 == 1
             };
-            bits |= u32::from(is_hidden) << sample;
+            bits |= u32::from(is_occluded) << sample;
         }
     }
     bits
@@ -169,7 +173,7 @@ impl<'a> Aims<'a> {
             } else {
                 item.low + (item.high - item.low) * self.number()
             };
-            return (at, NOWHERE);
+            return (at, NO_PRIMITIVE);
         }
         let i = &scene.bvh.instances[item.index as usize];
         let slot = random.below(scene.bvh.meshes[i.mesh as usize].triangles.len() as u32) as usize;
@@ -193,7 +197,7 @@ impl<'a> Aims<'a> {
         let (start, own) = if self.random.once_in(3) {
             self.target()
         } else {
-            (self.anywhere(), NOWHERE)
+            (self.anywhere(), NO_PRIMITIVE)
         };
         let (target, _) = self.target();
         let direction = match self.random.below(8) {
@@ -202,7 +206,7 @@ impl<'a> Aims<'a> {
             2 => Vec3::new(target.x - start.x, target.y - start.y, 0.0).normalize_or(Vec3::X),
             _ => (target - start).normalize_or(Vec3::X),
         };
-        let left = if self.random.once_in(2) { own } else { NOWHERE };
+        let left = if self.random.once_in(2) { own } else { NO_PRIMITIVE };
         (
             Ray {
                 origin: start,
@@ -212,11 +216,11 @@ impl<'a> Aims<'a> {
         )
     }
 
-    fn shadow(&self) -> (Surface, Light, Block) {
+    fn shadow(&self) -> (Surface, Light, SampleBlock) {
         let (start, own) = if self.random.once_in(2) {
             self.target()
         } else {
-            (self.anywhere(), NOWHERE)
+            (self.anywhere(), NO_PRIMITIVE)
         };
         let (end, _) = self.target();
         let size = (self.high - self.low).max_element() * self.random.pick(&[0.0, 0.1, 1.0]);
@@ -225,17 +229,17 @@ impl<'a> Aims<'a> {
         light.primitive = NO_INDEX;
         (light.u, light.v) = (edge(), edge());
         if self.random.once_in(4) {
-            (light.center, light.finite, light.reach) = ((end - start).normalize_or(Vec3::Z), 0.0, 1e10);
+            (light.center, light.finite, light.t_max) = ((end - start).normalize_or(Vec3::Z), 0.0, 1e10);
         } else {
             light.center = start + (end - start) * self.random.pick(&[0.5, 1.0, 2.0]);
-            (light.finite, light.reach) = (1.0, 1.0 - 1e-5);
+            (light.finite, light.t_max) = (1.0, 1.0 - 1e-5);
         }
         let mut surface = nothing();
-        surface.start = start;
-        (surface.above, surface.below) = (own, own);
+        surface.ray_origin = start;
+        (surface.exclude_front, surface.exclude_back) = (own, own);
         let key = UVec2::new(self.random.bits() as u32, self.random.bits() as u32);
-        let count = self.random.pick(&[1, 7, BLOCK]);
-        let block = Block {
+        let count = self.random.pick(&[1, 7, SAMPLE_BLOCK]);
+        let block = SampleBlock {
             pattern: RANDOM,
             side: 1,
             first: 0,
@@ -255,11 +259,11 @@ fn nothing() -> Surface {
         smooth_normal: Vec3::Z,
         shading_normal: Vec3::Z,
         wo: Vec3::Z,
-        start: zero,
-        bulge: zero,
+        ray_origin: zero,
+        terminator_offset: zero,
         side: 1.0,
-        above: NOWHERE,
-        below: NOWHERE,
+        exclude_front: NO_PRIMITIVE,
+        exclude_back: NO_PRIMITIVE,
         uv: zero.truncate(),
         du: zero,
         dv: zero,
@@ -280,15 +284,15 @@ fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
     let [mut hits, mut shadows, mut met, mut dark] = [0; 4];
     for _ in 0..rays {
         let (ray, left) = aims.ray();
-        let rule = nearest(scene, ray, left, NOWHERE);
-        let found = closest_hit(scene, ray, left, NOWHERE);
+        let rule = nearest(scene, ray, left, NO_PRIMITIVE);
+        let found = closest_hit(scene, ray, left, NO_PRIMITIVE);
         hits += u32::from(bits(rule) != bits(found) || rule.slot != found.slot);
         met += u32::from(rule.primitive != NO_INDEX);
         let (surface, light, block) = aims.shadow();
         let rule = hidden(scene, &surface, &light, block);
         // Of samples that light nothing trees are not asked.
         let unlit = random.pick(&[0, random.pick(&[0x5555_5555, 0xffff_0000, 1])]) & u32::MAX >> (32 - block.count);
-        shadows += u32::from(rule | unlit != hidden_samples(scene, &surface, &light, block, unlit));
+        shadows += u32::from(rule | unlit != occluded_samples(scene, &surface, &light, block, unlit));
         dark += u32::from(rule != 0);
     }
     [hits, shadows, met, dark]
@@ -479,10 +483,10 @@ fn differing_between(a: &Packed, b: &Packed, rays: u32) -> [u32; 2] {
     let [mut hits, mut shadows] = [0; 2];
     for _ in 0..rays {
         let (ray, left) = aims.ray();
-        let found = [a, b].map(|scene| bits(closest_hit(scene, ray, left, NOWHERE)));
+        let found = [a, b].map(|scene| bits(closest_hit(scene, ray, left, NO_PRIMITIVE)));
         hits += u32::from(found[0] != found[1]);
         let (surface, light, block) = aims.shadow();
-        let found = [a, b].map(|scene| hidden_samples(scene, &surface, &light, block, 0));
+        let found = [a, b].map(|scene| occluded_samples(scene, &surface, &light, block, 0));
         shadows += u32::from(found[0] != found[1]);
     }
     [hits, shadows]

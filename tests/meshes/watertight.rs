@@ -3,11 +3,11 @@
 
 use glam::{DMat3, DVec3, UVec2, Vec3, Vec4Swizzles as _};
 use rayon::prelude::*;
-use wgray_render::cpu::geometry::{closest_hit, hidden_samples};
+use wgray_render::cpu::geometry::{closest_hit, occluded_samples};
 use wgray_render::cpu::ray::Ray;
-use wgray_render::cpu::shadow::Block;
+use wgray_render::cpu::shadow::SampleBlock;
 use wgray_render::cpu::surface::Surface;
-use wgray_render::records::{CASTS_SHADOW, GRID, INFINITE_T, Instance, Light, NO_INDEX, NOWHERE, Packed};
+use wgray_render::records::{CASTS_SHADOW, GRID, INFINITE_T, Instance, Light, NO_INDEX, NO_PRIMITIVE, Packed};
 
 use super::forms::{Form, HEAD, scene};
 use crate::random::Random;
@@ -127,14 +127,14 @@ fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -
     let to_target = (target - origin.as_dvec3()).dot(d) / d.length_squared();
     let slack = 30.0 * solid.rounding / d.length();
     let limit = if inside { to_target * 1.05 + slack } else { to_center };
-    let hit = closest_hit(scene, ray, NOWHERE, NOWHERE);
+    let hit = closest_hit(scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
     let casts = scene.bvh.items.iter().any(|item| item.kind & CASTS_SHADOW != 0);
     let times = if inside { 2.0 } else { 1.0 + to_center / to_target };
-    !(f64::from(hit.t) <= limit) || casts && !is_hidden(scene, origin, direction, times)
+    !(f64::from(hit.t) <= limit) || casts && !is_occluded(scene, origin, direction, times)
 }
 
 /// Whether a point light is hidden from the origin, so many times as far as the direction reaches.
-fn is_hidden(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool {
+fn is_occluded(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool {
     let zero = Vec3::ZERO;
     let surface = Surface {
         position: origin,
@@ -142,11 +142,11 @@ fn is_hidden(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool 
         smooth_normal: Vec3::Z,
         shading_normal: Vec3::Z,
         wo: Vec3::Z,
-        start: origin,
-        bulge: zero,
+        ray_origin: origin,
+        terminator_offset: zero,
         side: 1.0,
-        above: NOWHERE,
-        below: NOWHERE,
+        exclude_front: NO_PRIMITIVE,
+        exclude_back: NO_PRIMITIVE,
         uv: zero.truncate(),
         du: zero,
         dv: zero,
@@ -154,11 +154,11 @@ fn is_hidden(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool 
     let light = Light {
         center: (origin.as_dvec3() + direction.as_dvec3() * times).as_vec3(),
         finite: 1.0,
-        reach: 1.0 - 1e-5,
+        t_max: 1.0 - 1e-5,
         primitive: NO_INDEX,
         ..bytemuck::Zeroable::zeroed()
     };
-    let block = Block {
+    let block = SampleBlock {
         pattern: GRID,
         side: 1,
         first: 0,
@@ -166,7 +166,7 @@ fn is_hidden(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool 
         group: 0,
         key: UVec2::ZERO,
     };
-    hidden_samples(scene, &surface, &light, block, 0) == 1
+    occluded_samples(scene, &surface, &light, block, 0) == 1
 }
 
 fn convex() -> [(&'static str, Form); 4] {
@@ -299,7 +299,7 @@ fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
         let faces = [key(a), key(b)].into_iter().flat_map(|corner| &around[&corner]);
         let d = direction.as_dvec3().normalize();
         if faces.map(|n| n.dot(d)).all(|cosine| cosine < -0.2) {
-            let hit = closest_hit(scene, Ray { origin, direction }, NOWHERE, NOWHERE);
+            let hit = closest_hit(scene, Ray { origin, direction }, NO_PRIMITIVE, NO_PRIMITIVE);
             let limit = 1.0 + 1e-4 + 30.0 * solid.rounding / f64::from(direction.length());
             outside.0 += 1;
             outside.1 += u32::from(!(f64::from(hit.t) <= limit));
@@ -314,17 +314,17 @@ fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
                 origin: start,
                 direction: inwards.as_vec3(),
             },
-            NOWHERE,
-            NOWHERE,
+            NO_PRIMITIVE,
+            NO_PRIMITIVE,
         );
         if across.t == INFINITE_T || f64::from(across.t) < 0.01 * size {
             continue;
         }
         let origin = (middle + inwards * 0.25 * f64::from(across.t)).as_vec3();
         let direction = (solid.target(&random) - origin.as_dvec3()).as_vec3();
-        let hit = closest_hit(scene, Ray { origin, direction }, NOWHERE, NOWHERE);
+        let hit = closest_hit(scene, Ray { origin, direction }, NO_PRIMITIVE, NO_PRIMITIVE);
         inside.0 += 1;
-        inside.1 += u32::from(hit.t == INFINITE_T || !is_hidden(scene, origin, direction, 1e3));
+        inside.1 += u32::from(hit.t == INFINITE_T || !is_occluded(scene, origin, direction, 1e3));
     }
     [outside, inside]
 }

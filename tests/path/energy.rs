@@ -7,13 +7,15 @@ use glam::{DVec3, Vec2, Vec3};
 use wgray_render::cpu::energy::principled_energy;
 use wgray_render::cpu::lobe::facet_alpha;
 use wgray_render::cpu::metal::metal_eval;
-use wgray_render::cpu::principled::{Mixture, principled_eval, principled_mixture, principled_pdf, principled_sample};
+use wgray_render::cpu::principled::{
+    PrincipledLobes, principled_eval, principled_mixture, principled_pdf, principled_sample,
+};
 use wgray_render::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf};
 use wgray_render::cpu::scattering::facets_of;
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::cpu::surface::Surface;
 use wgray_render::cpu::thin::{thin_eval, thin_pdf};
-use wgray_render::records::{METAL, Material, NOWHERE, Packed, ROUGH_GLASS};
+use wgray_render::records::{METAL, Material, NO_PRIMITIVE, Packed, ROUGH_GLASS};
 
 use crate::pictures::{both, render};
 
@@ -57,11 +59,11 @@ fn seen(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Material {
         smooth_normal: Vec3::Z,
         shading_normal: Vec3::Z,
         wo,
-        start: Vec3::ZERO,
-        bulge: Vec3::ZERO,
+        ray_origin: Vec3::ZERO,
+        terminator_offset: Vec3::ZERO,
         side,
-        above: NOWHERE,
-        below: NOWHERE,
+        exclude_front: NO_PRIMITIVE,
+        exclude_back: NO_PRIMITIVE,
         uv: Vec2::ZERO,
         du: Vec3::X,
         dv: Vec3::Y,
@@ -69,7 +71,7 @@ fn seen(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Material {
     facets_of(packed, &surface, *material)
 }
 
-fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Mixture {
+fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> PrincipledLobes {
     let energy = principled_energy(packed, material, wo, side);
     principled_mixture(material, wo, side > 0.0, Vec3::Z, ALL, energy)
 }
@@ -170,7 +172,7 @@ fn streaks_stay_white() {
     let lost = 1.0 - given(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
     assert!(lost > 0.1, "{lost}");
     let plain = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7, energy_compensation = false");
-    assert_eq!(plain.materials[0].streaks, 0);
+    assert_eq!(plain.materials[0].aniso_table, 0);
     let same = 1.0 - given(&plain, &plain.materials[0], direction(0.4, 0.7), 1.0, true);
     assert!((same - lost).abs() < 1e-9, "{same} {lost}");
 }

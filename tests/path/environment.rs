@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec2, Vec3};
 use wgray::scene::{Assets, Description, Image, Texels};
-use wgray_render::cpu::environment::{arriving_from, sample_environment};
+use wgray_render::cpu::environment::{environment_eval, sample_environment};
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::pack::pack;
 use wgray_render::records::{ENVIRONMENT, Packed};
@@ -421,7 +421,7 @@ fn samples(packed: &Packed, normal: Vec3, count: u32) -> impl Iterator<Item = Ve
     (0..count).map(move |i| {
         let u = sobol_sample(i, UVec2::new(5, 6));
         let sample = sample_environment(packed, light, normal, u);
-        let again = arriving_from(packed, sample.to, normal);
+        let again = environment_eval(packed, sample.to, normal);
         assert_eq!((sample.radiance, sample.pdf), (again.radiance, again.pdf));
         sample.to
     })
@@ -462,7 +462,7 @@ fn directions_are_as_frequent_as_their_density_says() {
             for column in 0..2 * fine {
                 let azimuth = PI - TAU * (f64::from(column) + 0.5) / f64::from(2 * fine);
                 let direction = DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine).as_vec3();
-                let pdf = f64::from(arriving_from(&packed, direction, normal).pdf);
+                let pdf = f64::from(environment_eval(&packed, direction, normal).pdf);
                 let share = pdf * sine * PI / f64::from(fine) * TAU / f64::from(2 * fine) * f64::from(COUNT);
                 let at = bin(direction);
                 expected[0][at] += share;
@@ -536,7 +536,7 @@ fn an_unoccluded_wall_has_little_noise() {
 
 #[test]
 fn a_direction_and_its_cell_are_each_others() {
-    use wgray_render::cpu::surroundings::{cell_towards, direction_in_cell};
+    use wgray_render::cpu::equirect::{cell_towards, direction_in_cell};
     for (width, height) in [(1, 1), (2, 1), (3, 2), (16, 8), (8192, 4096)] {
         for column in [0, width / 3, width / 2, width - 1] {
             for row in [0, 1, height / 3, height / 2, height - 1, height] {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use glam::UVec2;
-use wgray_render::cpu::emitter::chosen_emitter;
+use wgray_render::cpu::emitter::select_emitter;
 use wgray_render::cpu::rng::hash4;
 
 use super::{mean, scene};
@@ -30,7 +30,7 @@ fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
     let calls = 400_000;
     for i in 0..calls {
         let bits = hash4(glam::UVec4::new(i, 1, 2, 3));
-        let emitter = chosen_emitter(&packed, UVec2::new(bits.x, bits.y));
+        let emitter = select_emitter(&packed, UVec2::new(bits.x, bits.y));
         counts[emitter.index as usize] += 1.0;
     }
     let total = f64::from(16 * 17 / 2);

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use glam::{UVec2, UVec4, Vec3};
 use wgray::scene::{Description, PointLightDescription};
-use wgray_render::cpu::light_choice::{chosen_light, met_density};
+use wgray_render::cpu::light_choice::{light_tree_pdf, light_tree_select};
 use wgray_render::cpu::ray::Hit;
 use wgray_render::cpu::rng::hash4;
 use wgray_render::records::{NO_INDEX, Packed};
@@ -90,7 +90,7 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
             let mut densities = vec![0.0_f32; leaves.len()];
             for i in 0..calls {
                 let key = hash4(UVec4::new(i, 7, 8, 9));
-                let chosen = chosen_light(&packed, of_tree, p, n, UVec2::new(key.x, key.y), i % 64);
+                let chosen = light_tree_select(&packed, of_tree, p, n, UVec2::new(key.x, key.y), i % 64);
                 let place =
                     |leaf: &Leaf| (leaf.instance, leaf.index) == (chosen.emitter.instance, chosen.emitter.index);
                 let leaf = leaves.iter().position(place).expect("a leaf");
@@ -112,9 +112,9 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
                         slot: 0,
                         barycentric: glam::Vec2::ZERO,
                     };
-                    let met = met_density(&packed, hit, true, p, n);
+                    let met = light_tree_pdf(&packed, hit, true, p, n);
                     assert!((met - densities[i]).abs() < 1e-5 * met, "{met} for {}", densities[i]);
-                    assert_eq!(met_density(&packed, hit, false, p, n), 0.0);
+                    assert_eq!(light_tree_pdf(&packed, hit, false, p, n), 0.0);
                 }
                 let expected = f64::from(densities[i] / leaf.density) * f64::from(calls);
                 if expected > 5.0 {

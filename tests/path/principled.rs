@@ -6,7 +6,9 @@ use std::f64::consts::{PI, TAU};
 use bytemuck::Zeroable;
 use glam::{DVec3, UVec2, UVec4, Vec2, Vec3};
 use wgray_render::cpu::diffuse::{angles_at, diffuse_eval};
-use wgray_render::cpu::principled::{Mixture, principled_eval, principled_mixture, principled_pdf, principled_sample};
+use wgray_render::cpu::principled::{
+    PrincipledLobes, principled_eval, principled_mixture, principled_pdf, principled_sample,
+};
 use wgray_render::cpu::rng::{hash4, unit_float};
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::records::{DIFFUSE, Material, PRINCIPLED};
@@ -38,10 +40,13 @@ fn viewers() -> [Vec3; 5] {
 }
 
 /// As it is seen from outside, where tables of its facets know what `tests/path/energy.rs` tests.
-fn mixture(material: &Material, wo: Vec3) -> Mixture {
+fn mixture(material: &Material, wo: Vec3) -> PrincipledLobes {
     // As if nothing were lost of a lobe that is rougher along one axis, so that nothing is given back.
-    let streaks = u32::from(material.anisotropy > 0.0);
-    let material = Material { streaks, ..*material };
+    let aniso_table = u32::from(material.anisotropy > 0.0);
+    let material = Material {
+        aniso_table,
+        ..*material
+    };
     principled_mixture(&material, wo, true, Vec3::Z, ALL, Vec3::new(0.95, 0.05, 1.0))
 }
 
@@ -206,7 +211,7 @@ fn samples_are_worth_what_is_reflected() {
 }
 
 /// Pearson's chi-square of sampled directions against the density, by cells of equal parts of height and longitude.
-fn chi_square(m: &Mixture, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
+fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 100_000;
     const HEIGHTS: usize = 24;
     const LONGITUDES: usize = 24;

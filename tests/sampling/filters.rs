@@ -6,7 +6,7 @@ use wgray_render::cpu::pixel::filtered;
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::film::mean;
 use wgray_render::pack::filter::{height, table};
-use wgray_render::records::{BINS, Packed};
+use wgray_render::records::{FILTER_BINS_MAX, Packed};
 
 use super::cornell;
 use crate::pictures::{Way, differing, exact_ways, render};
@@ -84,8 +84,11 @@ fn tables_have_the_moments_of_their_filters() {
     for kind in KINDS {
         for radius in [0.3, 1.0, 2.5] {
             let table = table(checked(kind, radius));
-            assert_eq!(table.len(), BINS as usize);
-            assert_eq!((table[0].x, table[BINS as usize - 1].y), (0.0, radius as f32));
+            assert_eq!(table.len(), FILTER_BINS_MAX as usize);
+            assert_eq!(
+                (table[0].x, table[FILTER_BINS_MAX as usize - 1].y),
+                (0.0, radius as f32)
+            );
             assert!(table.iter().all(|bin| bin.x < bin.y), "{kind:?}");
             assert!(table.windows(2).all(|bin| bin[0].y == bin[1].x), "{kind:?}");
             assert!(table.iter().all(|bin| (0.9..1.1).contains(&bin.z.abs())), "{kind:?}");
@@ -143,7 +146,7 @@ fn the_pixel_as_a_filter_costs_nothing_and_a_table_of_it_is_the_same() {
     );
     let mut by_table = filtered_scene(PixelFilterKind::Box, 0.51);
     by_table.sampling.filter_table = table(checked(PixelFilterKind::Box, 0.5));
-    assert_eq!(by_table.specialization.filter_bins, BINS);
+    assert_eq!(by_table.specialization.filter_bins, FILTER_BINS_MAX);
     for i in 0..1000 {
         let u = sobol_sample(i, [5, 6].into());
         let (plain, by_table) = (filtered(&plain, u), filtered(&by_table, u));

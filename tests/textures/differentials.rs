@@ -4,14 +4,16 @@ use std::path::Path as File;
 
 use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
 use wgray_render::cpu::camera::{camera_differential, camera_ray};
-use wgray_render::cpu::differential::{Arrival, reflected_derivative};
+use wgray_render::cpu::differential::{HitDifferential, reflected_derivative};
 use wgray_render::cpu::footprint::surface_footprint;
-use wgray_render::cpu::geometry::{arrival_of, closest_hit, footprint_of, material_of, spot_of, surface_of};
+use wgray_render::cpu::geometry::{
+    closest_hit, fetch_hit_primitive, footprint_of, hit_differential, material_of, surface_of,
+};
 use wgray_render::cpu::integrators::phong::scatter;
 use wgray_render::cpu::path::Path;
 use wgray_render::cpu::path::is_specular;
 use wgray_render::cpu::surface::{Surface, with_coordinates};
-use wgray_render::records::{NO_INDEX, NOWHERE, Packed, Primitive};
+use wgray_render::records::{NO_INDEX, NO_PRIMITIVE, Packed, Primitive};
 
 use super::scene;
 use crate::meshes::forms::Sheet;
@@ -126,7 +128,7 @@ impl Exact<'_> {
 }
 
 /// Where a path ends, with its differential there.
-fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, Arrival, u32)> {
+fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, HitDifferential, u32)> {
     let differential = camera_differential(&scene.camera, at, 1.0);
     let ray = camera_ray(&scene.camera, at);
     let mut path = Path {
@@ -135,21 +137,21 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, Arrival, u32)
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
-        left: NOWHERE,
-        wall: NOWHERE,
+        origin_prim: NO_PRIMITIVE,
+        inside_prim: NO_PRIMITIVE,
     };
     loop {
-        let hit = closest_hit(scene, path.ray, path.left, path.wall);
+        let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
         if hit.primitive == NO_INDEX {
             return None;
         }
-        let spot = spot_of(scene, hit);
+        let spot = fetch_hit_primitive(scene, hit);
         if is_specular(material_of(scene, &spot)) {
-            path = scatter(scene, &spot, hit, path, UVec2::ZERO, 0).onward;
+            path = scatter(scene, &spot, hit, path, UVec2::ZERO, 0).primary;
             continue;
         }
         let surface = with_coordinates(surface_of(scene, &spot, hit, path.ray), &spot.primitive);
-        let at = arrival_of(scene, &spot, hit, surface, path.ray, path.differential);
+        let at = hit_differential(scene, &spot, hit, surface, path.ray, path.differential);
         return Some((spot.primitive, surface, at, path.depth));
     }
 }
@@ -274,10 +276,10 @@ fn a_curved_mirror_needs_its_curvature() {
     let at = Vec2::new(33.0, 22.0);
     let differential = camera_differential(&scene.camera, at, 1.0);
     let ray = camera_ray(&scene.camera, at);
-    let hit = closest_hit(&scene, ray, NOWHERE, NOWHERE);
-    let spot = spot_of(&scene, hit);
+    let hit = closest_hit(&scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
+    let spot = fetch_hit_primitive(&scene, hit);
     let surface = surface_of(&scene, &spot, hit, ray);
-    let arrival = arrival_of(&scene, &spot, hit, surface, ray, differential);
+    let arrival = hit_differential(&scene, &spot, hit, surface, ray, differential);
     let mirrored = |at: DVec2| {
         let (o, d) = exact.camera(at);
         let (center, m) = Exact::rows();
@@ -387,17 +389,17 @@ fn points_of_a_mesh_change_as_on_neighbouring_rays() {
         for (x, y) in (0..48).flat_map(|y| (0..64).map(move |x| (x, y))) {
             let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
             let ray = camera_ray(&packed.camera, at);
-            let hit = closest_hit(&packed, ray, NOWHERE, NOWHERE);
+            let hit = closest_hit(&packed, ray, NO_PRIMITIVE, NO_PRIMITIVE);
             if hit.primitive == NO_INDEX {
                 continue;
             }
-            let spot = spot_of(&packed, hit);
+            let spot = fetch_hit_primitive(&packed, hit);
             let surface = surface_of(&packed, &spot, hit, ray);
             if ray.direction.dot(surface.normal).abs() < 0.1 {
                 continue;
             }
             let differential = camera_differential(&packed.camera, at, 1.0);
-            let arrival = arrival_of(&packed, &spot, hit, surface, ray, differential);
+            let arrival = hit_differential(&packed, &spot, hit, surface, ray, differential);
             let footprint = footprint_of(&spot, hit, surface, arrival);
             let point = |at: DVec2| {
                 let (o, d) = exact.camera(at);

@@ -1,13 +1,13 @@
 //! Normal maps: where their normals point.
 
 use glam::Vec3;
-use wgray_render::cpu::differential::Arrival;
-use wgray_render::cpu::geometry::{material_of, spot_of, surface_of};
+use wgray_render::cpu::differential::HitDifferential;
+use wgray_render::cpu::geometry::{fetch_hit_primitive, material_of, surface_of};
 use wgray_render::cpu::path::usable_normal;
 use wgray_render::cpu::phong::phong_lobes;
 use wgray_render::cpu::ray::{Hit, Ray, no_hit};
 use wgray_render::cpu::surface::surface_at;
-use wgray_render::cpu::texture::appearance;
+use wgray_render::cpu::texture::evaluate_material;
 use wgray_render::records::Packed;
 
 use super::{scene, write_exr};
@@ -62,10 +62,10 @@ fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 
         primitive: primitive as u32,
         ..no_hit()
     };
-    let spot = spot_of(scene, hit);
+    let spot = fetch_hit_primitive(scene, hit);
     let surface = surface_of(scene, &spot, hit, ray);
     let plain = material_of(scene, &spot);
-    appearance(scene, &spot, hit, plain, surface, Arrival::default(), 1).normal
+    evaluate_material(scene, &spot, hit, plain, surface, HitDifferential::default(), 1).normal
 }
 
 fn near(a: Vec3, b: Vec3) -> bool {

@@ -136,7 +136,9 @@ impl Painter {
                     .as_ref()
                     .is_some_and(|shaders| **shaders != Shaders::built_in());
                 let way_out = match edited {
-                    true => "; shorten the loops, and call `sign(local)` for every pixel at the end of each kernel",
+                    true => {
+                        "; shorten the loops, and call `report_completion(local)` for every pixel at the end of each kernel"
+                    }
                     false => "",
                 };
                 Diagnostic::plain(if edited { "shader" } else { "scene" }, format!("{error}{way_out}"))

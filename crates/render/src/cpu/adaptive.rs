@@ -5,7 +5,7 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 
 use super::math::{max, min, power};
 use crate::film;
-use crate::records::EVIDENCE;
+use crate::records::EFFECTIVE_SAMPLES_PER_DOUBLING;
 
 pub fn moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
     moments + squared_deviation(sum, sample).extend(1.0)
@@ -45,13 +45,13 @@ pub fn display_slope_squared(value: f32) -> f32 {
     slope * slope
 }
 
-pub fn look_with(look: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
+pub fn pilot_add(look: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
     let deviation = squared_deviation(sum, sample);
     let total = deviation.x + deviation.y + deviation.z;
     Vec4::new(look.x, look.y + total, look.z + total * total, look.w)
 }
 
-pub fn whole_look(look: Vec4, sum: Vec4, moments: Vec4) -> Vec4 {
+pub fn pilot_finish(look: Vec4, sum: Vec4, moments: Vec4) -> Vec4 {
     Vec4::new(display_variance(sum, moments), look.y, look.z, 1.0)
 }
 
@@ -64,7 +64,8 @@ pub fn samples_wanted(looks: Vec4, first: u32, squared_error: f32, most: u32) ->
     let mut count = first;
     while count < most {
         let enough = variance <= squared_error * count as f32;
-        let evident = looks.y * looks.y >= looks.z * (EVIDENCE * ((2 * count / first) as f32 - 1.0));
+        let evident =
+            looks.y * looks.y >= looks.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * ((2 * count / first) as f32 - 1.0));
         if enough | !evident {
             break;
         }

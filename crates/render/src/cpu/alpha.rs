@@ -3,21 +3,21 @@
 use glam::{UVec2, UVec4, Vec2, Vec3};
 
 use super::footprint::Footprint;
-use super::geometry::{closest_hit, material_of, spot_of, surface_of};
+use super::geometry::{closest_hit, fetch_hit_primitive, material_of, surface_of};
 use super::math::{dot, min};
-use super::mesh::Spot;
+use super::mesh::HitPrimitive;
 use super::ray::{Hit, Ray};
 use super::rng::{hash4, unit_float};
 use super::surface::Surface;
 use super::texture::{channel_of, texture_color};
 use super::vertices::{uv_in_set, with_vertex_colors};
-use crate::records::{FOR_OPACITY, MASK, MOST_PASSED, Material, NO_INDEX, OPACITY_CHANNEL, OPAQUE, Packed};
+use crate::records::{FOR_OPACITY, MASK, MAX_ALPHA_SKIPS, Material, NO_INDEX, OPACITY_CHANNEL, OPAQUE, Packed};
 
-pub const ONWARD: u32 = 0;
-pub const TO_LIGHT: u32 = 1;
+pub const RAY_BSDF: u32 = 0;
+pub const RAY_SHADOW: u32 = 1;
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
-pub fn is_there(
+pub fn alpha_accepts(
     scene: &Packed,
     material: &Material,
     pixel: UVec2,
@@ -41,13 +41,13 @@ pub fn is_there(
     unit_float(bits.x) < material.opacity
 }
 
-pub fn with_opacity_at(scene: &Packed, before: &Material, spot: &Spot, hit: Hit, uv: Vec2) -> Material {
+pub fn with_opacity_at(scene: &Packed, before: &Material, prim: &HitPrimitive, hit: Hit, uv: Vec2) -> Material {
     let mut material = *before;
     for i in 0..material.lookups.y {
         let lookup = &scene.textures.lookups[(material.lookups.x + i) as usize];
         if lookup.purposes & FOR_OPACITY != 0 {
             let footprint = Footprint {
-                uv: uv_in_set(scene, uv, spot, hit, lookup.uv_set),
+                uv: uv_in_set(scene, uv, prim, hit, lookup.uv_set),
                 dx: Vec2::ZERO,
                 dy: Vec2::ZERO,
             };
@@ -61,8 +61,8 @@ pub fn with_opacity_at(scene: &Packed, before: &Material, spot: &Spot, hit: Hit,
     material
 }
 
-pub fn presence_at(scene: &Packed, before: &Material, spot: &Spot, hit: Hit, uv: Vec2) -> f32 {
-    let material = with_opacity_at(scene, before, spot, hit, uv);
+pub fn opacity_at(scene: &Packed, before: &Material, prim: &HitPrimitive, hit: Hit, uv: Vec2) -> f32 {
+    let material = with_opacity_at(scene, before, prim, hit, uv);
     match material.alpha_mode {
         OPAQUE => 1.0,
         MASK if material.opacity >= material.cutoff => 1.0,
@@ -72,13 +72,13 @@ pub fn presence_at(scene: &Packed, before: &Material, spot: &Spot, hit: Hit, uv:
 }
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
-pub fn is_veiled(
+pub fn is_occluded_alpha(
     scene: &Packed,
     before: bool,
     surface: &Surface,
     to: Vec3,
-    reach: f32,
-    goal: u32,
+    t_max: f32,
+    target_prim: u32,
     pixel: UVec2,
     sample: u32,
     bounce: u32,
@@ -88,28 +88,28 @@ pub fn is_veiled(
     }
     let way = dot(to, to).sqrt();
     let mut ray = Ray {
-        origin: surface.start,
+        origin: surface.ray_origin,
         direction: to * (1.0 / way),
     };
-    let mut left = surface.above;
-    let mut wall = surface.below;
-    let mut rest = way * reach;
-    for _ in 0..=MOST_PASSED {
-        let hit = closest_hit(scene, ray, left, wall);
+    let mut origin_prim = surface.exclude_front;
+    let mut inside_prim = surface.exclude_back;
+    let mut rest = way * t_max;
+    for _ in 0..=MAX_ALPHA_SKIPS {
+        let hit = closest_hit(scene, ray, origin_prim, inside_prim);
         if (hit.primitive == NO_INDEX) | !matches!(hit.t.partial_cmp(&rest), Some(std::cmp::Ordering::Less)) {
             return false;
         }
-        let spot = spot_of(scene, hit);
-        let met = surface_of(scene, &spot, hit, ray);
-        let material = with_opacity_at(scene, material_of(scene, &spot), &spot, hit, met.uv);
-        let is_goal = (hit.instance == 0) & (hit.primitive == goal);
-        if !is_goal & is_there(scene, &material, pixel, sample, bounce, TO_LIGHT, hit, met.side) {
+        let prim = fetch_hit_primitive(scene, hit);
+        let met = surface_of(scene, &prim, hit, ray);
+        let material = with_opacity_at(scene, material_of(scene, &prim), &prim, hit, met.uv);
+        let is_goal = (hit.instance == 0) & (hit.primitive == target_prim);
+        if !is_goal & alpha_accepts(scene, &material, pixel, sample, bounce, RAY_SHADOW, hit, met.side) {
             return true;
         }
         rest -= hit.t;
-        ray.origin = met.position - (met.start - met.position);
-        left = met.below;
-        wall = met.above;
+        ray.origin = met.position - (met.ray_origin - met.position);
+        origin_prim = met.exclude_back;
+        inside_prim = met.exclude_front;
     }
     true
 }
@@ -118,13 +118,13 @@ pub fn first_seen(scene: &Packed, ray: Ray, met: Hit) -> Hit {
     let mut hit = met;
     let mut onward = ray;
     let mut way = 0.0;
-    for _ in 0..MOST_PASSED {
+    for _ in 0..MAX_ALPHA_SKIPS {
         if hit.primitive == NO_INDEX {
             break;
         }
-        let spot = spot_of(scene, hit);
-        let surface = surface_of(scene, &spot, hit, onward);
-        let material = with_opacity_at(scene, material_of(scene, &spot), &spot, hit, surface.uv);
+        let prim = fetch_hit_primitive(scene, hit);
+        let surface = surface_of(scene, &prim, hit, onward);
+        let material = with_opacity_at(scene, material_of(scene, &prim), &prim, hit, surface.uv);
         let least = if material.alpha_mode == MASK {
             material.cutoff
         } else {
@@ -134,8 +134,8 @@ pub fn first_seen(scene: &Packed, ray: Ray, met: Hit) -> Hit {
             break;
         }
         way += hit.t;
-        onward.origin = surface.position - (surface.start - surface.position);
-        hit = closest_hit(scene, onward, surface.below, surface.above);
+        onward.origin = surface.position - (surface.ray_origin - surface.position);
+        hit = closest_hit(scene, onward, surface.exclude_back, surface.exclude_front);
     }
     hit.t += way;
     hit

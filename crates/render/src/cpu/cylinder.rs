@@ -79,10 +79,10 @@ pub fn intersect_cylinder(q: &Primitive, from_inside: bool, ray: Ray, limit: f32
     }
 }
 
-pub fn cylinder_blocks(o: Vec3, d: Vec3, levels: Vec2, reach: f32) -> bool {
+pub fn cylinder_occludes(o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool {
     let inside = cylinder_interval(o, d, levels);
-    let enters = (inside.x > 0.0) & (inside.x < reach);
-    let leaves = (inside.y > 0.0) & (inside.y < reach);
+    let enters = (inside.x > 0.0) & (inside.x < t_max);
+    let leaves = (inside.y > 0.0) & (inside.y < t_max);
     (inside.x < inside.y) & (enters | leaves)
 }
 
@@ -270,7 +270,7 @@ mod tests {
         let q = cylinder(DVec3::ZERO, 1.0, 2.0);
         let cut = |p: [f32; 3], to: [f32; 3], from_inside| {
             let levels = solid_levels(CYLINDER, &q, vector_to_local(&q, Vec3::from(p) - q.anchor), from_inside);
-            cylinder_blocks(p.into(), to.into(), levels, 1.0)
+            cylinder_occludes(p.into(), to.into(), levels, 1.0)
         };
         assert!(cut([-3.0, 0.0, 0.0], [6.0, 0.0, 0.0], false), "through");
         assert!(cut([-3.0, 0.0, 0.0], [3.0, 0.0, 0.0], false), "into");

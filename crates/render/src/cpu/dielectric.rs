@@ -4,7 +4,7 @@ use std::f32::consts::LOG2_E;
 
 use glam::Vec3;
 
-use super::differential::Arrival;
+use super::differential::HitDifferential;
 use super::math::{dot, exp2, max};
 use super::path::{Path, reflected_path, refracted_path};
 use super::specular::{fresnel, refracted_cosine, refracted_direction};
@@ -33,25 +33,31 @@ pub fn refracts_inwards(surface: &Surface, material: &Material, normal: Vec3) ->
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Passage {
+pub struct DielectricSample {
     pub path: Path,
     pub passes: bool,
     pub eta: f32,
 }
 
-pub fn dielectric_sample(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Passage {
+pub fn dielectric_sample(
+    path: Path,
+    surface: Surface,
+    at: HitDifferential,
+    material: &Material,
+    random: f32,
+) -> DielectricSample {
     let eta = eta_of(&surface, material);
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
     let cosine_t = refracted_cosine(cosine_i, eta);
     if random < fresnel(cosine_i, cosine_t, eta) {
-        return Passage {
+        return DielectricSample {
             path: reflected_path(path, surface, at, path.throughput),
             passes: false,
             eta: 1.0,
         };
     }
     let throughput = path.throughput * material.tint * (eta * eta);
-    Passage {
+    DielectricSample {
         path: refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t),
         passes: true,
         eta,

@@ -63,20 +63,20 @@ pub fn refracted_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3, 
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Arrival {
+pub struct HitDifferential {
     pub x: Derivative,
     pub y: Derivative,
     pub normal_x: Vec3,
     pub normal_y: Vec3,
 }
 
-pub fn arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival {
+pub fn arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential {
     let local = point_to_local(q, surface.position);
     let x = transferred(differential.x, ray, t, surface.normal);
     let y = transferred(differential.y, ray, t, surface.normal);
     let normal_x = normal_derivative(q, local, x.position) * surface.side;
     let normal_y = normal_derivative(q, local, y.position) * surface.side;
-    Arrival {
+    HitDifferential {
         x,
         y,
         normal_x,
@@ -84,14 +84,14 @@ pub fn arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surf
     }
 }
 
-pub fn reflected_differential(at: Arrival, d: Vec3, n: Vec3) -> Differential {
+pub fn reflected_differential(at: HitDifferential, d: Vec3, n: Vec3) -> Differential {
     Differential {
         x: reflected_derivative(at.x, d, n, at.normal_x),
         y: reflected_derivative(at.y, d, n, at.normal_y),
     }
 }
 
-pub fn refracted_differential(at: Arrival, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential {
+pub fn refracted_differential(at: HitDifferential, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential {
     Differential {
         x: refracted_derivative(at.x, d, n, at.normal_x, eta, cosine),
         y: refracted_derivative(at.y, d, n, at.normal_y, eta, cosine),

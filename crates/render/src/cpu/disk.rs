@@ -18,9 +18,9 @@ pub fn intersect_disk(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     }
 }
 
-pub fn disk_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
+pub fn disk_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
-    crosses_plane(o, d, reach) & (p.x * p.x + p.y * p.y <= d.z * d.z)
+    crosses_plane(o, d, t_max) & (p.x * p.x + p.y * p.y <= d.z * d.z)
 }
 
 #[cfg(test)]
@@ -54,11 +54,11 @@ mod tests {
 
     #[test]
     fn segments_are_blocked_where_they_cross() {
-        let blocks = |x: f32, y: f32, reach| disk_blocks(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), reach);
-        assert!(blocks(0.0, 0.0, 1.0) && blocks(0.7, -0.7, 1.0) && blocks(-1.0, 0.0, 1.0));
-        assert!(!blocks(0.72, 0.72, 1.0) && !blocks(1.01, 0.0, 1.0));
-        assert!(!blocks(0.0, 0.0, 0.3), "ends before");
-        let slanted = |x: f32| disk_blocks(Vec3::new(x, 0.0, 1.0), Vec3::new(2.0, 0.0, -2.0), 1.0);
+        let occludes = |x: f32, y: f32, t_max| disk_occludes(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), t_max);
+        assert!(occludes(0.0, 0.0, 1.0) && occludes(0.7, -0.7, 1.0) && occludes(-1.0, 0.0, 1.0));
+        assert!(!occludes(0.72, 0.72, 1.0) && !occludes(1.01, 0.0, 1.0));
+        assert!(!occludes(0.0, 0.0, 0.3), "ends before");
+        let slanted = |x: f32| disk_occludes(Vec3::new(x, 0.0, 1.0), Vec3::new(2.0, 0.0, -2.0), 1.0);
         assert!(slanted(-0.1) && !slanted(0.1), "crosses at x + 1");
     }
 }

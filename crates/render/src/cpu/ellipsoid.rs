@@ -28,13 +28,17 @@ pub fn longitude(local: Vec3) -> f32 {
     if turn < 0.0 { turn + 1.0 } else { turn }
 }
 
-pub fn intersect_ellipsoid(q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
+pub fn intersect_ellipsoid(q: &Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let o = from_anchor - q.middle;
     let d = vector_to_local(q, ray.direction);
     let a = dot(d, d);
     let b = dot(o, d);
-    let start = if wall { 0.0 } else { ellipsoid_level(q, from_anchor) };
+    let start = if inside_prim {
+        0.0
+    } else {
+        ellipsoid_level(q, from_anchor)
+    };
     let discriminant = ellipsoid_discriminant(o, d, start);
     let root = max(discriminant, 0.0).sqrt();
     let sum = if b < 0.0 { root - b } else { -b - root };
@@ -49,11 +53,11 @@ pub fn intersect_ellipsoid(q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f
     }
 }
 
-pub fn ellipsoid_blocks(o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
+pub fn ellipsoid_occludes(o: Vec3, d: Vec3, start: f32, t_max: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);
-    let end = start + reach * (2.0 * b + reach * a);
-    let passes = (b < 0.0) & (-b < reach * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
+    let end = start + t_max * (2.0 * b + t_max * a);
+    let passes = (b < 0.0) & (-b < t_max * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
     ((start < 0.0) != (end < 0.0)) | ((start > 0.0) & passes)
 }
 
@@ -171,18 +175,24 @@ mod tests {
 
     #[test]
     fn segments_are_blocked_by_the_surface_they_cut() {
-        let blocks = |o: [f32; 3], d: [f32; 3], reach| {
+        let occludes = |o: [f32; 3], d: [f32; 3], t_max| {
             let o = Vec3::from(o);
-            ellipsoid_blocks(o, d.into(), dot(o, o) - 1.0, reach)
+            ellipsoid_occludes(o, d.into(), dot(o, o) - 1.0, t_max)
         };
-        assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "through");
-        assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.5), "into");
-        assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.7), "into, past the middle");
-        assert!(blocks([-1.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.2), "from the surface into");
-        assert!(blocks([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "out of");
-        assert!(!blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.24), "ends before");
-        assert!(!blocks([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.24), "stays inside");
-        assert!(!blocks([-2.0, 0.0, 1.001], [4.0, 0.0, 0.0], 1.0), "passes by");
-        assert!(!blocks([2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "leads away");
+        assert!(occludes([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "through");
+        assert!(occludes([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.5), "into");
+        assert!(
+            occludes([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.7),
+            "into, past the middle"
+        );
+        assert!(
+            occludes([-1.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.2),
+            "from the surface into"
+        );
+        assert!(occludes([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "out of");
+        assert!(!occludes([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.24), "ends before");
+        assert!(!occludes([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.24), "stays inside");
+        assert!(!occludes([-2.0, 0.0, 1.001], [4.0, 0.0, 0.0], 1.0), "passes by");
+        assert!(!occludes([2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "leads away");
     }
 }

@@ -2,17 +2,17 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
-use super::alpha::presence_at;
+use super::alpha::opacity_at;
 use super::environment::sample_environment;
 use super::footprint::Footprint;
-use super::geometry::{material_of, spot_of};
+use super::geometry::{fetch_hit_primitive, material_of};
 use super::light::spot_falloff;
-use super::light_choice::Chosen;
+use super::light_choice::EmitterSelection;
 use super::light_sample::{
     cylinder_sample, cylinder_share, ellipsoid_area, ellipsoid_pdf, ellipsoid_sample, solid_angle_pdf, whole_below,
 };
 use super::math::{dot, normalize};
-use super::mesh::{Spot, face_uv, spot_by_itself};
+use super::mesh::{HitPrimitive, face_uv, standalone_hit_primitive};
 use super::primitive::primitive_uv;
 use super::ray::{Hit, Ray, point_to_local};
 use super::rng::unit_float;
@@ -30,11 +30,11 @@ pub struct LightSample {
     pub radiance: Vec3,
     pub pdf: f32,
     pub is_delta: bool,
-    pub reach: f32,
+    pub t_max: f32,
     pub primitive: u32,
 }
 
-pub fn chosen_emitter(scene: &Packed, bits: UVec2) -> Emitter {
+pub fn select_emitter(scene: &Packed, bits: UVec2) -> Emitter {
     if scene.lighting.emitters.len() == 1 {
         return scene.lighting.emitters[0];
     }
@@ -47,7 +47,7 @@ pub fn chosen_emitter(scene: &Packed, bits: UVec2) -> Emitter {
     }
 }
 
-pub fn sample_emitter(scene: &Packed, chosen: Chosen, p: Vec3, normal: Vec3, u: Vec2) -> LightSample {
+pub fn sample_emitter(scene: &Packed, chosen: EmitterSelection, p: Vec3, normal: Vec3, u: Vec2) -> LightSample {
     let emitter = chosen.emitter;
     if emitter.instance != 0 {
         return sample_face(scene, chosen, p, u);
@@ -98,20 +98,20 @@ pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSam
         let q = &scene.primitives[light.primitive as usize];
         let uv = primitive_uv(q, point_to_local(q, p + to));
         let (material, hit) = (&scene.materials[q.material as usize], hit_on_primitive(light.primitive));
-        radiance = emission_at(scene, material, &spot_by_itself(q), hit, uv);
+        radiance = emission_at(scene, material, &standalone_hit_primitive(q), hit, uv);
     }
     if scene.specialization.sees_through != 0 && !is_delta {
         let q = &scene.primitives[light.primitive as usize];
         let uv = primitive_uv(q, point_to_local(q, p + to));
         let (material, hit) = (&scene.materials[q.material as usize], hit_on_primitive(light.primitive));
-        radiance *= presence_at(scene, material, &spot_by_itself(q), hit, uv);
+        radiance *= opacity_at(scene, material, &standalone_hit_primitive(q), hit, uv);
     }
     LightSample {
         to,
         radiance: if behind { Vec3::ZERO } else { radiance },
         pdf,
         is_delta,
-        reach: light.reach,
+        t_max: light.t_max,
         primitive: light.primitive,
     }
 }
@@ -126,7 +126,7 @@ pub fn hit_on_primitive(primitive: u32) -> Hit {
     }
 }
 
-pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSample {
+pub fn sample_face(scene: &Packed, chosen: EmitterSelection, p: Vec3, u: Vec2) -> LightSample {
     let emitter = chosen.emitter;
     let b = triangle_sample(u);
     let hit = Hit {
@@ -136,7 +136,7 @@ pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSam
         slot: emitter.index,
         barycentric: b,
     };
-    let face = spot_of(scene, hit);
+    let face = fetch_hit_primitive(scene, hit);
     let material = material_of(scene, &face);
     let to = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
     let mut radiance = material.emission;
@@ -148,7 +148,7 @@ pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSam
         radiance *= Vec3::new(color.x, color.y, color.z);
     }
     if scene.specialization.sees_through != 0 {
-        radiance *= presence_at(scene, material, &face, hit, face_uv(&face, b));
+        radiance *= opacity_at(scene, material, &face, hit, face_uv(&face, b));
     }
     let density = if scene.specialization.light_tree != 0 {
         chosen.density
@@ -160,19 +160,19 @@ pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSam
         radiance,
         pdf: solid_angle_pdf(density, to, face.primitive.z),
         is_delta: false,
-        reach: scene.environment.reach,
+        t_max: scene.environment.t_max,
         primitive: NO_INDEX,
     }
 }
 
-pub fn emission_at(scene: &Packed, material: &Material, spot: &Spot, hit: Hit, uv: Vec2) -> Vec3 {
+pub fn emission_at(scene: &Packed, material: &Material, prim: &HitPrimitive, hit: Hit, uv: Vec2) -> Vec3 {
     let mut emission = material.emission;
     for i in 0..material.lookups.y {
         let lookup = &scene.textures.lookups[(material.lookups.x + i) as usize];
         if lookup.purposes & FOR_EMISSION != 0 {
             let texture = &scene.textures.records[lookup.texture as usize];
             let footprint = Footprint {
-                uv: uv_in_set(scene, uv, spot, hit, lookup.uv_set),
+                uv: uv_in_set(scene, uv, prim, hit, lookup.uv_set),
                 dx: Vec2::ZERO,
                 dy: Vec2::ZERO,
             };
@@ -182,8 +182,8 @@ pub fn emission_at(scene: &Packed, material: &Material, spot: &Spot, hit: Hit, u
     emission
 }
 
-pub fn emitter_pdf(spot: &Spot, hit: Hit, density: f32, ray: Ray, normal: Vec3) -> f32 {
-    let q = &spot.primitive;
+pub fn emitter_pdf(prim: &HitPrimitive, hit: Hit, density: f32, ray: Ray, normal: Vec3) -> f32 {
+    let q = &prim.primitive;
     if q.kind == ELLIPSOID {
         return density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
     }

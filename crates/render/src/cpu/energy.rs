@@ -6,7 +6,7 @@ use super::lobe::{facet_alpha, streak_place};
 use super::math::{floor, max, min};
 use crate::records::{ENERGY_SIZE, Material, Packed, ROUGH_GLASS, STREAK_COLUMNS, STREAK_LINES};
 
-pub fn energy_kept(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
+pub fn single_scatter_albedo(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
     let last = (ENERGY_SIZE - 1) as f32;
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
     let row = min(square.sqrt().sqrt(), 1.0) * last;
@@ -22,9 +22,9 @@ pub fn energy_kept(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32
     both.x + (both.y - both.x) * (column - j)
 }
 
-pub fn streak_energy(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, part: u32) -> f32 {
+pub fn single_scatter_albedo_aniso(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, part: u32) -> f32 {
     let word = |i: u32| scene.textures.texels[i as usize];
-    let start = material.streaks - 1;
+    let start = material.aniso_table - 1;
     let rows = [word(start), word(start + 1)];
     let rough = min(max(material.roughness, 0.0), 1.0) * (rows[0] - 1) as f32;
     let long = min(max(material.anisotropy, 0.0), 1.0) * (rows[1] - 1) as f32;
@@ -53,23 +53,23 @@ pub fn streak_energy(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3,
     sum
 }
 
-pub fn glass_kept(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
-    if material.streaks != 0 {
+pub fn single_scatter_albedo_glass(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
+    if material.aniso_table != 0 {
         let behind = if material.kind == ROUGH_GLASS { 0 } else { 2 } + if side > 0.0 { 0 } else { 1 };
-        return streak_energy(scene, material, alpha, wo, behind);
+        return single_scatter_albedo_aniso(scene, material, alpha, wo, behind);
     }
-    energy_kept(scene, material.energy, alpha, wo, side)
+    single_scatter_albedo(scene, material.energy, alpha, wo, side)
 }
 
 pub fn principled_energy(scene: &Packed, material: &Material, wo: Vec3, side: f32) -> Vec3 {
     let mut found = Vec3::ONE;
     let alpha = facet_alpha(material);
-    if material.streaks != 0 {
-        found.x = streak_energy(scene, material, alpha, wo, 0);
-        found.y = streak_energy(scene, material, alpha, wo, 1);
+    if material.aniso_table != 0 {
+        found.x = single_scatter_albedo_aniso(scene, material, alpha, wo, 0);
+        found.y = single_scatter_albedo_aniso(scene, material, alpha, wo, 1);
     }
     if (material.thin == 0) & (material.transmission > 0.0) {
-        found.z = glass_kept(scene, material, alpha, wo, side);
+        found.z = single_scatter_albedo_glass(scene, material, alpha, wo, side);
     }
     found
 }

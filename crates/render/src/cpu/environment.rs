@@ -3,14 +3,14 @@
 use glam::{UVec2, UVec4, Vec2, Vec3};
 
 use super::emitter::LightSample;
+use super::equirect::{cell_towards, column_after, direction_in_cell, normal_bin};
 use super::light_sample::power_heuristic;
 use super::math::{dot, min, normalize};
 use super::rng::{hash4, unit_float};
-use super::surroundings::{cell_towards, column_after, direction_in_cell, normal_bin};
 use crate::records::{ENVIRONMENT_BLOCKS, Light, NO_INDEX, Packed};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arriving {
+pub struct EnvironmentEval {
     pub radiance: Vec3,
     pub pdf: f32,
 }
@@ -64,7 +64,7 @@ pub fn interval_width(scene: &Packed, distribution: u32, index: u32) -> f32 {
     environment_float(scene, distribution + index + 1) - environment_float(scene, distribution + index)
 }
 
-pub fn arriving_from(scene: &Packed, direction: Vec3, normal: Vec3) -> Arriving {
+pub fn environment_eval(scene: &Packed, direction: Vec3, normal: Vec3) -> EnvironmentEval {
     let around = &scene.environment;
     let d = Vec3::new(
         dot(around.x, direction),
@@ -86,14 +86,14 @@ pub fn arriving_from(scene: &Packed, direction: Vec3, normal: Vec3) -> Arriving 
     let columns = rows + (row + 1) * (ENVIRONMENT_BLOCKS + 1);
     let probability = interval_width(scene, rows, row) * interval_width(scene, columns, column) * around.density;
     let inverse = environment_float(scene, around.blocks + row * ENVIRONMENT_BLOCKS + column);
-    Arriving {
+    EnvironmentEval {
         radiance: upper + (lower - upper) * cell.y,
         pdf: (sum.x + sum.y + sum.z) * inverse * probability,
     }
 }
 
-pub fn light_from_afar(scene: &Packed, direction: Vec3, pdf: f32, normal: Vec3) -> Vec3 {
-    let arriving = arriving_from(scene, direction, normal);
+pub fn environment_mis(scene: &Packed, direction: Vec3, pdf: f32, normal: Vec3) -> Vec3 {
+    let arriving = environment_eval(scene, direction, normal);
     let weight = if pdf > 0.0 {
         power_heuristic(pdf, arriving.pdf)
     } else {
@@ -128,13 +128,13 @@ pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) 
     let inside = Vec2::new(x - cell.x as f32, y - cell.y as f32);
     let d = direction_in_cell(chosen & 65_535, chosen >> 16, inside, width, height);
     let to = normalize(around.x * d.x + around.y * d.y + around.z * d.z);
-    let arriving = arriving_from(scene, to, normal);
+    let arriving = environment_eval(scene, to, normal);
     LightSample {
         to,
         radiance: arriving.radiance,
         pdf: arriving.pdf,
         is_delta: false,
-        reach: light.reach,
+        t_max: light.t_max,
         primitive: NO_INDEX,
     }
 }

@@ -143,9 +143,9 @@ impl Weights {
         let across = xx - m.y * slope;
         let x = near_coordinate(f.uv.x, wrap_u(t)) * size.x - 0.5;
         let y = near_coordinate(f.uv.y, wrap_v(t)) * size.y - 0.5;
-        let reach = yy.sqrt();
-        let first_row = -(floor(reach - y) as i32);
-        let last_row = floor(y + reach) as i32;
+        let t_max = yy.sqrt();
+        let first_row = -(floor(t_max - y) as i32);
+        let last_row = floor(y + t_max) as i32;
         let mut total = 0.0;
         for row in first_row..=last_row {
             let start = wrapped_index(row, height, wrap_v(t)) * width;

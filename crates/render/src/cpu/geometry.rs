@@ -4,48 +4,49 @@ use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4Swizzles as _};
 
 use super::alpha::first_seen;
+use super::bvh::{closest_in_tree, is_occluded_by_bvh, occluded_by_bvh};
 use super::camera::camera_ray;
-use super::differential::{Arrival, Differential, arrival};
+use super::differential::{Differential, HitDifferential, arrival};
 use super::footprint::{Footprint, surface_footprint};
+use super::linear_primitives::{closest_primitive, is_occluded_by_primitives, occluded_by_primitives};
 use super::math::dot;
 use super::mesh::{
-    Spot, face_arrival, face_first_hit, face_footprint, face_primitive, face_surface, normal_from_mesh, spot_by_itself,
-    vector_from_mesh,
+    HitPrimitive, face_first_hit, face_footprint, face_hit_differential, face_primitive, face_surface,
+    normal_from_mesh, standalone_hit_primitive, vector_from_mesh,
 };
 use super::panorama::panorama_ray;
-use super::path::{Path, passed_path};
+use super::path::{Path, pass_through_path};
 use super::primitive::Tangents;
 use super::ray::{Hit, Ray, by_itself};
-use super::shadow::Block;
+use super::shadow::SampleBlock;
 use super::surface::{Surface, first_hit, surface_at, with_coordinates};
-use super::traverse::{closest_primitive, hidden_by_primitives, is_hidden_by_primitives};
-use super::tree::{closest_in_tree, hidden_by_tree, is_hidden_by_tree};
 use crate::records::{
-    FirstHit, HIDDEN_BACK, Instance, Light, MOST_HIDDEN, Material, NO_INDEX, NO_SHADOW, NOWHERE, Packed, SOME_SHADOWS,
+    CULL_BACKFACE, FirstHit, Instance, Light, MAX_CAMERA_SKIPS, Material, NO_INDEX, NO_PRIMITIVE, NO_SHADOW, Packed,
+    SOME_SHADOWS,
 };
 
-pub fn closest_hit(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
+pub fn closest_hit(scene: &Packed, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {
     if scene.specialization.in_tree == 0 {
-        return closest_primitive(scene, ray, left.y, wall.y);
+        return closest_primitive(scene, ray, origin_prim.y, inside_prim.y);
     }
-    let hit = closest_primitive(scene, ray, by_itself(left), by_itself(wall));
-    closest_in_tree(scene, hit, ray, left, wall)
+    let hit = closest_primitive(scene, ray, by_itself(origin_prim), by_itself(inside_prim));
+    closest_in_tree(scene, hit, ray, origin_prim, inside_prim)
 }
 
-pub fn hidden_samples(scene: &Packed, surface: &Surface, light: &Light, block: Block, unlit: u32) -> u32 {
-    let bits = hidden_by_primitives(scene, surface, light, block);
+pub fn occluded_samples(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock, unlit: u32) -> u32 {
+    let bits = occluded_by_primitives(scene, surface, light, block);
     if scene.specialization.in_tree == 0 {
         return bits;
     }
-    hidden_by_tree(scene, bits | unlit, surface, light, block)
+    occluded_by_bvh(scene, bits | unlit, surface, light, block)
 }
 
-pub fn is_hidden(scene: &Packed, before: bool, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
-    let hidden = before || is_hidden_by_primitives(scene, surface, to, reach, goal);
+pub fn is_occluded(scene: &Packed, before: bool, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
+    let hidden = before || is_occluded_by_primitives(scene, surface, to, t_max, target_prim);
     if scene.specialization.in_tree == 0 {
         return hidden;
     }
-    hidden || is_hidden_by_tree(scene, surface, to, reach, goal)
+    hidden || is_occluded_by_bvh(scene, surface, to, t_max, target_prim)
 }
 
 pub fn is_on_mesh(hit: Hit) -> bool {
@@ -67,7 +68,7 @@ pub fn triangle_casts(scene: &Packed, i: &Instance, slot: u32) -> bool {
     i.shadows != SOME_SHADOWS || group_word(scene, i, slot) & NO_SHADOW == 0
 }
 
-fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
+fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> HitPrimitive {
     let mesh = &scene.bvh.meshes[i.mesh as usize];
     let UVec4 { x, y, z, .. } = mesh.triangles[hit.slot as usize];
     let corners = [x, y, z].map(|vertex| vertex as usize);
@@ -75,7 +76,7 @@ fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
     let v0 = p0.xyz();
     let edge_1 = vector_from_mesh(i, p1.xyz() - v0);
     let edge_2 = vector_from_mesh(i, p2.xyz() - v0);
-    let mut face = Spot {
+    let mut face = HitPrimitive {
         primitive: face_primitive(i, v0, edge_1, edge_2, group_word(scene, i, hit.slot) & !NO_SHADOW),
         edge_1,
         edge_2,
@@ -114,21 +115,21 @@ fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
     face
 }
 
-pub fn spot_of(scene: &Packed, hit: Hit) -> Spot {
+pub fn fetch_hit_primitive(scene: &Packed, hit: Hit) -> HitPrimitive {
     if is_on_mesh(hit) {
         return face_of(scene, instance_of(scene, hit), hit);
     }
-    spot_by_itself(&scene.primitives[hit.primitive as usize])
+    standalone_hit_primitive(&scene.primitives[hit.primitive as usize])
 }
 
-pub fn surface_of(scene: &Packed, spot: &Spot, hit: Hit, ray: Ray) -> Surface {
+pub fn surface_of(scene: &Packed, prim: &HitPrimitive, hit: Hit, ray: Ray) -> Surface {
     let s = &scene.specialization;
     let epsilon = scene.environment.shadow_epsilon;
     if is_on_mesh(hit) {
         let place = UVec2::new(hit.instance, hit.primitive);
-        return face_surface(spot, place, hit.barycentric, ray.direction, epsilon);
+        return face_surface(prim, place, hit.barycentric, ray.direction, epsilon);
     }
-    let q = &spot.primitive;
+    let q = &prim.primitive;
     let surface = surface_at(q, hit.primitive, ray, hit.t, epsilon);
     if s.lookups + s.specular_lookups + s.anisotropic == 0 {
         return surface;
@@ -136,32 +137,32 @@ pub fn surface_of(scene: &Packed, spot: &Spot, hit: Hit, ray: Ray) -> Surface {
     with_coordinates(surface, q)
 }
 
-pub fn material_of<'a>(scene: &'a Packed, spot: &Spot) -> &'a Material {
-    &scene.materials[spot.primitive.material as usize]
+pub fn material_of<'a>(scene: &'a Packed, prim: &HitPrimitive) -> &'a Material {
+    &scene.materials[prim.primitive.material as usize]
 }
 
-pub fn arrival_of(
+pub fn hit_differential(
     scene: &Packed,
-    spot: &Spot,
+    prim: &HitPrimitive,
     hit: Hit,
     surface: Surface,
     ray: Ray,
     differential: Differential,
-) -> Arrival {
+) -> HitDifferential {
     if scene.specialization.differentials == 0 {
-        return Arrival::default();
+        return HitDifferential::default();
     }
     if is_on_mesh(hit) {
-        return face_arrival(spot, hit.barycentric, differential, ray, hit.t, surface);
+        return face_hit_differential(prim, hit.barycentric, differential, ray, hit.t, surface);
     }
-    arrival(&spot.primitive, differential, ray, hit.t, surface)
+    arrival(&prim.primitive, differential, ray, hit.t, surface)
 }
 
-pub fn footprint_of(spot: &Spot, hit: Hit, surface: Surface, at: Arrival) -> Footprint {
+pub fn footprint_of(prim: &HitPrimitive, hit: Hit, surface: Surface, at: HitDifferential) -> Footprint {
     if is_on_mesh(hit) {
-        return face_footprint(spot, surface, at.x.position, at.y.position);
+        return face_footprint(prim, surface, at.x.position, at.y.position);
     }
-    surface_footprint(&spot.primitive, surface, at.x.position, at.y.position)
+    surface_footprint(&prim.primitive, surface, at.x.position, at.y.position)
 }
 
 pub fn view_ray(scene: &Packed, place: Vec2) -> Ray {
@@ -171,24 +172,24 @@ pub fn view_ray(scene: &Packed, place: Vec2) -> Ray {
     camera_ray(&scene.camera, place)
 }
 
-pub fn seen_path(scene: &Packed, start: Path) -> Path {
+pub fn skip_camera_invisible(scene: &Packed, start: Path) -> Path {
     let mut path = start;
-    for _ in 0..MOST_HIDDEN {
-        let hit = closest_hit(scene, path.ray, path.left, path.wall);
+    for _ in 0..MAX_CAMERA_SKIPS {
+        let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
         if hit.primitive == NO_INDEX {
             break;
         }
-        let spot = spot_of(scene, hit);
-        let hidden = material_of(scene, &spot).hidden;
+        let prim = fetch_hit_primitive(scene, hit);
+        let hidden = material_of(scene, &prim).hidden;
         if hidden == 0 {
             break;
         }
-        let surface = surface_of(scene, &spot, hit, path.ray);
-        if (hidden == HIDDEN_BACK) & (surface.side > 0.0) {
+        let surface = surface_of(scene, &prim, hit, path.ray);
+        if (hidden == CULL_BACKFACE) & (surface.side > 0.0) {
             break;
         }
-        let at = arrival_of(scene, &spot, hit, surface, path.ray, path.differential);
-        path = passed_path(path, surface, at);
+        let at = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
+        path = pass_through_path(path, surface, at);
     }
     path
 }
@@ -201,15 +202,15 @@ pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
-        left: NOWHERE,
-        wall: NOWHERE,
+        origin_prim: NO_PRIMITIVE,
+        inside_prim: NO_PRIMITIVE,
     };
-    let is_hidden = scene.specialization.hidden != 0;
-    if is_hidden {
-        path = seen_path(scene, path);
+    let is_occluded = scene.specialization.hidden != 0;
+    if is_occluded {
+        path = skip_camera_invisible(scene, path);
     }
     let mut found = path_first_hit(scene, path);
-    if is_hidden && found.shape != NO_INDEX {
+    if is_occluded && found.shape != NO_INDEX {
         found.depth += dot(path.ray.origin - start.origin, start.direction);
     }
     found
@@ -217,7 +218,7 @@ pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
 
 pub fn path_first_hit(scene: &Packed, path: Path) -> FirstHit {
     let ray = path.ray;
-    let mut hit = closest_hit(scene, ray, path.left, path.wall);
+    let mut hit = closest_hit(scene, ray, path.origin_prim, path.inside_prim);
     if scene.specialization.sees_through != 0 {
         hit = first_seen(scene, ray, hit);
     }
@@ -229,9 +230,9 @@ pub fn path_first_hit(scene: &Packed, path: Path) -> FirstHit {
             ..FirstHit::zeroed()
         };
     }
-    let spot = spot_of(scene, hit);
+    let prim = fetch_hit_primitive(scene, hit);
     if is_on_mesh(hit) {
-        return face_first_hit(&spot, hit);
+        return face_first_hit(&prim, hit);
     }
-    first_hit(&spot.primitive, ray, hit.t)
+    first_hit(&prim.primitive, ray, hit.t)
 }

@@ -9,13 +9,20 @@ use super::rng::{hash4, unit_float};
 use crate::records::{Emitter, NO_INDEX, Packed};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Chosen {
+pub struct EmitterSelection {
     pub emitter: Emitter,
     pub density: f32,
 }
 
-pub fn chosen_light(scene: &Packed, emitter: Emitter, p: Vec3, n: Vec3, key: UVec2, sample: u32) -> Chosen {
-    let mut chosen = Chosen { emitter, density: 0.0 };
+pub fn light_tree_select(
+    scene: &Packed,
+    emitter: Emitter,
+    p: Vec3,
+    n: Vec3,
+    key: UVec2,
+    sample: u32,
+) -> EmitterSelection {
+    let mut chosen = EmitterSelection { emitter, density: 0.0 };
     if emitter.index != NO_INDEX {
         return chosen;
     }
@@ -43,7 +50,7 @@ pub fn chosen_light(scene: &Packed, emitter: Emitter, p: Vec3, n: Vec3, key: UVe
     chosen
 }
 
-pub fn met_density(scene: &Packed, hit: Hit, wanted: bool, p: Vec3, n: Vec3) -> f32 {
+pub fn light_tree_pdf(scene: &Packed, hit: Hit, wanted: bool, p: Vec3, n: Vec3) -> f32 {
     let mut at = NO_INDEX;
     if wanted {
         at = light_leaf(scene, hit);

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::math::{dot, power};
 use super::surface::Surface;
-use super::walk::{Directions, MOST};
+use super::traversal::{Directions, MOST};
 use crate::records::Material;
 
 /// Bit i is set where direction i lights the surface: [`is_lit`](super::phong::is_lit) for each.
@@ -107,9 +107,9 @@ mod tests {
     use crate::cpu::light::{Segments, segment};
     use crate::cpu::phong::{is_lit, phong_lobes};
     use crate::cpu::samples::Samples;
-    use crate::cpu::shadow::{Block, block_sample};
-    use crate::cpu::walk::levels;
-    use crate::records::{GRID, JITTERED, NOWHERE, SOBOL};
+    use crate::cpu::shadow::{SampleBlock, block_sample};
+    use crate::cpu::traversal::levels;
+    use crate::records::{GRID, JITTERED, NO_PRIMITIVE, SOBOL};
 
     fn surface(smooth_normal: Vec3, shading_normal: Vec3) -> Surface {
         let zero = Vec3::ZERO;
@@ -119,11 +119,11 @@ mod tests {
             smooth_normal,
             shading_normal,
             wo: Vec3::new(0.6, 0.0, 0.8),
-            start: zero,
-            bulge: zero,
+            ray_origin: zero,
+            terminator_offset: zero,
             side: 1.0,
-            above: NOWHERE,
-            below: NOWHERE,
+            exclude_front: NO_PRIMITIVE,
+            exclude_back: NO_PRIMITIVE,
             uv: zero.truncate(),
             du: zero,
             dv: zero,
@@ -151,7 +151,7 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            let block = Block {
+            let block = SampleBlock {
                 pattern,
                 side,
                 first,

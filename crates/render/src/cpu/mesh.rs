@@ -2,14 +2,14 @@
 
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
-use super::differential::{Arrival, Differential, transferred};
+use super::differential::{Differential, HitDifferential, transferred};
 use super::footprint::Footprint;
 use super::math::{cross, dot, max, max4, min, normalize, positive_zero};
 use super::primitive::Tangents;
 use super::ray::{Hit, Ray, point_to_local, vector_to_local};
-use super::slab::{Slabs, box_passage, is_passed};
+use super::slab::{Slabs, box_interval, interval_hits};
 use super::surface::{Surface, largest, with_positive_zeros};
-use crate::records::{FirstHit, INFINITE_T, Instance, PAD, Primitive, TRIANGLE};
+use crate::records::{BOX_PAD, FirstHit, INFINITE_T, Instance, Primitive, TRIANGLE};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shear {
@@ -63,8 +63,8 @@ pub fn triangle_crossing(v0: Vec3, v1: Vec3, v2: Vec3, origin: Vec3, shear: Shea
     let sum = u + v + w;
     let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
     let t = (u * a.z + v * b.z + w * c.z) / sum;
-    let passage = box_passage(lowest(v0, v1, v2), highest(v0, v1, v2), s);
-    let met = inside & (sum.abs() > 0.0) & is_passed(passage, INFINITE_T);
+    let passage = box_interval(lowest(v0, v1, v2), highest(v0, v1, v2), s);
+    let met = inside & (sum.abs() > 0.0) & interval_hits(passage, INFINITE_T);
     Crossing {
         met,
         t: min(passage.y, max(passage.x, t)),
@@ -107,11 +107,11 @@ pub fn normal_from_mesh(i: &Instance, n: Vec3) -> Vec3 {
 }
 
 pub fn mesh_pad(i: &Instance, origin: Vec3) -> f32 {
-    PAD * (largest(origin) + i.size)
+    BOX_PAD * (largest(origin) + i.size)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
+pub struct HitPrimitive {
     pub primitive: Primitive,
     pub edge_1: Vec3,
     pub edge_2: Vec3,
@@ -128,8 +128,8 @@ pub struct Spot {
     pub condition: f32,
 }
 
-pub fn spot_by_itself(q: &Primitive) -> Spot {
-    Spot {
+pub fn standalone_hit_primitive(q: &Primitive) -> HitPrimitive {
+    HitPrimitive {
         primitive: *q,
         edge_1: Vec3::ZERO,
         edge_2: Vec3::ZERO,
@@ -172,7 +172,7 @@ pub fn face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, materi
     }
 }
 
-pub fn face_surface(face: &Spot, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface {
+pub fn face_surface(face: &HitPrimitive, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface {
     let q = &face.primitive;
     let from_anchor = face.edge_1 * b.x + face.edge_2 * b.y;
     let position = q.anchor + from_anchor;
@@ -193,18 +193,18 @@ pub fn face_surface(face: &Spot, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -
         smooth_normal,
         shading_normal: smooth_normal,
         wo: -d,
-        start,
-        bulge: face_bulge(face, b, side),
+        ray_origin: start,
+        terminator_offset: face_bulge(face, b, side),
         side,
-        above: place,
-        below: place,
+        exclude_front: place,
+        exclude_back: place,
         uv: face_uv(face, b),
         du: tangents.u,
         dv: tangents.v,
     }
 }
 
-pub fn face_uv(face: &Spot, b: Vec2) -> Vec2 {
+pub fn face_uv(face: &HitPrimitive, b: Vec2) -> Vec2 {
     face.uv_0 + (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y
 }
 
@@ -212,7 +212,7 @@ pub fn color_between(c0: Vec4, c1: Vec4, c2: Vec4, b: Vec2) -> Vec4 {
     max4(c0 + (c1 - c0) * b.x + (c2 - c0) * b.y, Vec4::ZERO)
 }
 
-pub fn face_normal(face: &Spot, b: Vec2) -> Vec3 {
+pub fn face_normal(face: &HitPrimitive, b: Vec2) -> Vec3 {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let length2 = dot(n, n);
     let unit = n / max(length2, 1e-12).sqrt();
@@ -227,7 +227,7 @@ pub fn turned_to(v: Vec3, side: Vec3) -> Vec3 {
     v * if dot(v, side) < 0.0 { -1.0 } else { 1.0 }
 }
 
-pub fn face_bulge(face: &Spot, b: Vec2, side: f32) -> Vec3 {
+pub fn face_bulge(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3 {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
     let lift_0 = lift(turned_to(face.normal_0, up), p, up);
@@ -240,15 +240,15 @@ pub fn lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3 {
     n * if dot(n, up) > 0.8 { max(-dot(n, way), 0.0) } else { 0.0 }
 }
 
-pub fn face_lets_pass(face: &Spot, surface: &Surface, to: Vec3) -> bool {
+pub fn face_lets_pass(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool {
     let fall = -dot(surface.normal, to);
-    let height = dot(surface.normal, surface.bulge);
-    let crossing = surface.position + surface.bulge + to * (height / max(fall, 1e-30));
+    let height = dot(surface.normal, surface.terminator_offset);
+    let crossing = surface.position + surface.terminator_offset + to * (height / max(fall, 1e-30));
     let b = point_to_local(&face.primitive, crossing);
     (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0)
 }
 
-pub fn face_tangents(face: &Spot) -> Tangents {
+pub fn face_tangents(face: &HitPrimitive) -> Tangents {
     let a = face.uv_1 - face.uv_0;
     let b = face.uv_2 - face.uv_0;
     let area = a.x * b.y - a.y * b.x;
@@ -262,7 +262,7 @@ pub fn face_tangents(face: &Spot) -> Tangents {
     }
 }
 
-pub fn face_frame(face: &Spot, b: Vec2) -> Tangents {
+pub fn face_frame(face: &HitPrimitive, b: Vec2) -> Tangents {
     let a = 1.0 - b.x - b.y;
     let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;
     let v = face.tangents_0.v * a + face.tangents_1.v * b.x + face.tangents_2.v * b.y;
@@ -273,12 +273,12 @@ pub fn face_frame(face: &Spot, b: Vec2) -> Tangents {
     face_tangents(face)
 }
 
-pub fn face_uv_derivative(face: &Spot, d: Vec3) -> Vec2 {
+pub fn face_uv_derivative(face: &HitPrimitive, d: Vec3) -> Vec2 {
     let b = vector_to_local(&face.primitive, d);
     (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y
 }
 
-pub fn face_normal_derivative(face: &Spot, b: Vec2, d: Vec3) -> Vec3 {
+pub fn face_normal_derivative(face: &HitPrimitive, b: Vec2, d: Vec3) -> Vec3 {
     let db = vector_to_local(&face.primitive, d);
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let dn = (face.normal_1 - face.normal_0) * db.x + (face.normal_2 - face.normal_0) * db.y;
@@ -290,12 +290,19 @@ pub fn face_normal_derivative(face: &Spot, b: Vec2, d: Vec3) -> Vec3 {
     if length2 > 1e-12 { outward } else { Vec3::ZERO }
 }
 
-pub fn face_arrival(face: &Spot, b: Vec2, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival {
+pub fn face_hit_differential(
+    face: &HitPrimitive,
+    b: Vec2,
+    differential: Differential,
+    ray: Ray,
+    t: f32,
+    surface: Surface,
+) -> HitDifferential {
     let x = transferred(differential.x, ray, t, surface.normal);
     let y = transferred(differential.y, ray, t, surface.normal);
     let normal_x = face_normal_derivative(face, b, x.position) * surface.side;
     let normal_y = face_normal_derivative(face, b, y.position) * surface.side;
-    Arrival {
+    HitDifferential {
         x,
         y,
         normal_x,
@@ -303,7 +310,7 @@ pub fn face_arrival(face: &Spot, b: Vec2, differential: Differential, ray: Ray, 
     }
 }
 
-pub fn face_footprint(face: &Spot, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint {
+pub fn face_footprint(face: &HitPrimitive, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint {
     Footprint {
         uv: surface.uv,
         dx: face_uv_derivative(face, dx),
@@ -311,7 +318,7 @@ pub fn face_footprint(face: &Spot, surface: Surface, dx: Vec3, dy: Vec3) -> Foot
     }
 }
 
-pub fn face_first_hit(face: &Spot, hit: Hit) -> FirstHit {
+pub fn face_first_hit(face: &HitPrimitive, hit: Hit) -> FirstHit {
     let b = hit.barycentric;
     let normal = with_positive_zeros(face.primitive.z);
     let shading_normal = with_positive_zeros(face_normal(face, b));

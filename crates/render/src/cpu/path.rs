@@ -2,12 +2,12 @@
 
 use glam::{UVec2, Vec3};
 
-use super::differential::{Arrival, Differential, reflected_differential, refracted_differential};
+use super::differential::{Differential, HitDifferential, reflected_differential, refracted_differential};
 use super::math::{dot, max};
 use super::ray::Ray;
 use super::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use super::surface::Surface;
-use crate::records::{GLASS, MIRROR, Material, SPLITS};
+use crate::records::{GLASS, MAX_SPLIT_DEPTH, MIRROR, Material};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Path {
@@ -16,14 +16,14 @@ pub struct Path {
     pub throughput: Vec3,
     pub depth: u32,
     pub branch: u32,
-    pub left: UVec2,
-    pub wall: UVec2,
+    pub origin_prim: UVec2,
+    pub inside_prim: UVec2,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scattered {
-    pub onward: Path,
-    pub other: Path,
+pub struct SpecularSplit {
+    pub primary: Path,
+    pub secondary: Path,
     pub splits: bool,
 }
 
@@ -31,11 +31,11 @@ pub fn is_specular(material: &Material) -> bool {
     (material.kind == MIRROR) | (material.kind == GLASS)
 }
 
-pub fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered {
-    let onward = reflected_path(path, surface, at, path.throughput * material.tint);
-    Scattered {
-        onward,
-        other: onward,
+pub fn mirrored_path(path: Path, surface: Surface, at: HitDifferential, material: &Material) -> SpecularSplit {
+    let primary = reflected_path(path, surface, at, path.throughput * material.tint);
+    SpecularSplit {
+        primary,
+        secondary: primary,
         splits: false,
     }
 }
@@ -55,7 +55,13 @@ pub fn is_usable(surface: Surface, normal: Vec3) -> bool {
     outward & (dot(surface.wo, normal) > 0.0)
 }
 
-pub fn glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered {
+pub fn glass_path(
+    path: Path,
+    surface: Surface,
+    at: HitDifferential,
+    material: &Material,
+    random: f32,
+) -> SpecularSplit {
     let eta = if surface.side > 0.0 {
         1.0 / material.ior
     } else {
@@ -64,7 +70,7 @@ pub fn glass_path(path: Path, surface: Surface, at: Arrival, material: &Material
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
     let cosine_t = refracted_cosine(cosine_i, eta);
     let reflectance = fresnel(cosine_i, cosine_t, eta);
-    let splits = (path.depth < SPLITS) & (reflectance > 0.0) & (reflectance < 1.0);
+    let splits = (path.depth < MAX_SPLIT_DEPTH) & (reflectance > 0.0) & (reflectance < 1.0);
     let share = if splits { reflectance } else { 1.0 };
     let mut reflection = reflected_path(path, surface, at, path.throughput * share);
     let rest = if splits { 1.0 - reflectance } else { 1.0 };
@@ -72,30 +78,30 @@ pub fn glass_path(path: Path, surface: Surface, at: Arrival, material: &Material
     let refraction = refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t);
     if splits {
         reflection.branch |= 1 << path.depth;
-        return Scattered {
-            onward: refraction,
-            other: reflection,
+        return SpecularSplit {
+            primary: refraction,
+            secondary: reflection,
             splits: true,
         };
     }
     if random < reflectance {
-        return Scattered {
-            onward: reflection,
-            other: reflection,
+        return SpecularSplit {
+            primary: reflection,
+            secondary: reflection,
             splits: false,
         };
     }
-    Scattered {
-        onward: refraction,
-        other: refraction,
+    SpecularSplit {
+        primary: refraction,
+        secondary: refraction,
         splits: false,
     }
 }
 
-pub fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3) -> Path {
+pub fn reflected_path(path: Path, surface: Surface, at: HitDifferential, throughput: Vec3) -> Path {
     let d = path.ray.direction;
     let ray = Ray {
-        origin: surface.start,
+        origin: surface.ray_origin,
         direction: reflected_direction(d, surface.shading_normal),
     };
     let differential = reflected_differential(at, d, surface.shading_normal);
@@ -105,22 +111,22 @@ pub fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec
         throughput,
         depth: path.depth + 1,
         branch: path.branch,
-        left: surface.above,
-        wall: surface.below,
+        origin_prim: surface.exclude_front,
+        inside_prim: surface.exclude_back,
     }
 }
 
 pub fn refracted_path(
     path: Path,
     surface: Surface,
-    at: Arrival,
+    at: HitDifferential,
     throughput: Vec3,
     eta: f32,
     cosine_i: f32,
     cosine_t: f32,
 ) -> Path {
     let d = path.ray.direction;
-    let below = surface.position - (surface.start - surface.position);
+    let below = surface.position - (surface.ray_origin - surface.position);
     let ray = Ray {
         origin: below,
         direction: refracted_direction(d, surface.shading_normal, eta, cosine_i, cosine_t),
@@ -132,13 +138,13 @@ pub fn refracted_path(
         throughput,
         depth: path.depth + 1,
         branch: path.branch,
-        left: surface.below,
-        wall: surface.above,
+        origin_prim: surface.exclude_back,
+        inside_prim: surface.exclude_front,
     }
 }
 
-pub fn passed_path(path: Path, surface: Surface, at: Arrival) -> Path {
-    let below = surface.position - (surface.start - surface.position);
+pub fn pass_through_path(path: Path, surface: Surface, at: HitDifferential) -> Path {
+    let below = surface.position - (surface.ray_origin - surface.position);
     let ray = Ray {
         origin: below,
         direction: path.ray.direction,
@@ -149,8 +155,8 @@ pub fn passed_path(path: Path, surface: Surface, at: Arrival) -> Path {
         throughput: path.throughput,
         depth: path.depth,
         branch: path.branch,
-        left: surface.below,
-        wall: surface.above,
+        origin_prim: surface.exclude_back,
+        inside_prim: surface.exclude_front,
     }
 }
 
@@ -158,7 +164,7 @@ pub fn passed_path(path: Path, surface: Surface, at: Arrival) -> Path {
 mod tests {
     use super::*;
     use crate::cpu::math::normalize;
-    use crate::records::NOWHERE;
+    use crate::records::NO_PRIMITIVE;
 
     #[test]
     fn what_cannot_be_reflected_by_falls_back_to_the_smooth_normal() {
@@ -170,11 +176,11 @@ mod tests {
             smooth_normal,
             shading_normal: smooth_normal,
             wo: normalize(Vec3::new(x, 0.0, 1.0)),
-            start: zero,
-            bulge: zero,
+            ray_origin: zero,
+            terminator_offset: zero,
             side: 1.0,
-            above: NOWHERE,
-            below: NOWHERE,
+            exclude_front: NO_PRIMITIVE,
+            exclude_back: NO_PRIMITIVE,
             uv: zero.truncate(),
             du: zero,
             dv: zero,

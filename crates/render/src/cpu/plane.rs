@@ -10,8 +10,8 @@ pub fn intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     if (t > 0.0) & (t < limit) { t } else { limit }
 }
 
-pub fn plane_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
-    crosses_plane(o, d, reach)
+pub fn plane_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
+    crosses_plane(o, d, t_max)
 }
 
 #[cfg(test)]
@@ -49,7 +49,7 @@ mod tests {
     #[test]
     fn segments_are_blocked_where_they_cross() {
         let down = Vec3::new(5.0, 0.0, -2.0);
-        assert!(plane_blocks(Vec3::Z, down, 1.0) && plane_blocks(-Vec3::Z, -down, 1.0));
-        assert!(!plane_blocks(Vec3::Z, down, 0.5) && !plane_blocks(Vec3::Z, -down, 1.0));
+        assert!(plane_occludes(Vec3::Z, down, 1.0) && plane_occludes(-Vec3::Z, -down, 1.0));
+        assert!(!plane_occludes(Vec3::Z, down, 0.5) && !plane_occludes(Vec3::Z, -down, 1.0));
     }
 }

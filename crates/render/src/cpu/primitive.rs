@@ -5,20 +5,20 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::{Vec2, Vec3};
 
 use super::cylinder::{
-    cylinder_bitangent, cylinder_blocks, cylinder_gradient, cylinder_gradient_derivative, cylinder_height,
-    cylinder_levels, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder, levels_on_surface,
+    cylinder_bitangent, cylinder_gradient, cylinder_gradient_derivative, cylinder_height, cylinder_levels,
+    cylinder_occludes, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder, levels_on_surface,
 };
-use super::disk::{disk_blocks, intersect_disk};
-use super::ellipsoid::{ellipsoid_blocks, ellipsoid_level, intersect_ellipsoid, longitude};
+use super::disk::{disk_occludes, intersect_disk};
+use super::ellipsoid::{ellipsoid_level, ellipsoid_occludes, intersect_ellipsoid, longitude};
 use super::math::{atan2, max, normalize};
-use super::plane::{intersect_plane, plane_blocks};
+use super::plane::{intersect_plane, plane_occludes};
 use super::ray::Ray;
-use super::rectangle::{intersect_rectangle, rectangle_blocks};
-use super::triangle::{intersect_triangle, triangle_blocks};
+use super::rectangle::{intersect_rectangle, rectangle_occludes};
+use super::triangle::{intersect_triangle, triangle_occludes};
 use crate::records::{CYLINDER, DISK, ELLIPSOID, Primitive, RECTANGLE, SOLID_KINDS, TRIANGLE};
 
 #[inline(always)] // compiled for each kind
-pub fn intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
+pub fn intersect(kind: u32, q: &Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
     }
@@ -26,35 +26,35 @@ pub fn intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> 
         return intersect_triangle(q, ray, limit);
     }
     if kind == ELLIPSOID {
-        return intersect_ellipsoid(q, wall, ray, limit);
+        return intersect_ellipsoid(q, inside_prim, ray, limit);
     }
     if kind == DISK {
         return intersect_disk(q, ray, limit);
     }
     if kind == CYLINDER {
-        return intersect_cylinder(q, wall, ray, limit);
+        return intersect_cylinder(q, inside_prim, ray, limit);
     }
     intersect_plane(q, ray, limit)
 }
 
 #[inline(always)] // compiled for each kind
-pub fn blocks(kind: u32, o: Vec3, d: Vec3, levels: Vec2, reach: f32) -> bool {
+pub fn occludes(kind: u32, o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool {
     if kind == RECTANGLE {
-        return rectangle_blocks(o, d, reach);
+        return rectangle_occludes(o, d, t_max);
     }
     if kind == TRIANGLE {
-        return triangle_blocks(o, d, reach);
+        return triangle_occludes(o, d, t_max);
     }
     if kind == ELLIPSOID {
-        return ellipsoid_blocks(o, d, levels.x, reach);
+        return ellipsoid_occludes(o, d, levels.x, t_max);
     }
     if kind == DISK {
-        return disk_blocks(o, d, reach);
+        return disk_occludes(o, d, t_max);
     }
     if kind == CYLINDER {
-        return cylinder_blocks(o, d, levels, reach);
+        return cylinder_occludes(o, d, levels, t_max);
     }
-    plane_blocks(o, d, reach)
+    plane_occludes(o, d, t_max)
 }
 
 pub fn is_solid(kind: u32) -> bool {
@@ -66,16 +66,23 @@ pub fn is_centered(kind: u32) -> bool {
 }
 
 #[inline(always)] // compiled for each kind
-pub fn solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, wall: bool) -> Vec2 {
+pub fn solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, inside_prim: bool) -> Vec2 {
     if kind == CYLINDER {
         let levels = cylinder_levels(q, from_anchor);
-        return if wall {
+        return if inside_prim {
             levels_on_surface(levels, -1e-30)
         } else {
             levels
         };
     }
-    Vec2::new(if wall { -1e-30 } else { ellipsoid_level(q, from_anchor) }, 0.0)
+    Vec2::new(
+        if inside_prim {
+            -1e-30
+        } else {
+            ellipsoid_level(q, from_anchor)
+        },
+        0.0,
+    )
 }
 
 pub fn primitive_gradient(q: &Primitive, local: Vec3) -> Vec3 {

@@ -14,7 +14,7 @@ use crate::records::{
 };
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mixture {
+pub struct PrincipledLobes {
     pub diffuse: Vec3,
     pub alpha: Vec2,
     pub f0: Vec3,
@@ -42,8 +42,8 @@ pub fn principled_mixture(
     coat_normal: Vec3,
     lobes: u32,
     energy: Vec3,
-) -> Mixture {
-    let mut m = Mixture::default();
+) -> PrincipledLobes {
+    let mut m = PrincipledLobes::default();
     let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);
     m.alpha = Vec2::new(rough, rough);
     if lobes & LOBE_ANISOTROPY != 0 {
@@ -96,7 +96,7 @@ pub fn principled_mixture(
     if lobes & (LOBE_SPECULAR | LOBE_TRANSMISSION) != 0 {
         share = ggx_albedo(m.alpha.y, wo.z);
         let mut certain = 1.005;
-        if lobes & LOBE_ANISOTROPY != 0 && material.streaks != 0 {
+        if lobes & LOBE_ANISOTROPY != 0 && material.aniso_table != 0 {
             share = energy.xy();
             certain = 1.0;
         }
@@ -159,7 +159,7 @@ pub fn luminance(color: Vec3) -> f32 {
     0.2126 * color.x + 0.7152 * color.y + 0.0722 * color.z
 }
 
-pub fn sheen_chance(m: &Mixture) -> f32 {
+pub fn sheen_chance(m: &PrincipledLobes) -> f32 {
     max(1.0 - (m.chances.x + m.chances.y + m.chances.z + m.chances.w), 0.0)
 }
 
@@ -169,7 +169,7 @@ pub fn schlick(f0: Vec3, f90: Vec3, cosine: f32) -> Vec3 {
     f0 + (f90 - f0) * (x2 * x2 * x)
 }
 
-pub fn glass_fresnel(m: &Mixture, cosine: f32) -> Vec3 {
+pub fn glass_fresnel(m: &PrincipledLobes, cosine: f32) -> Vec3 {
     let c = min(max(cosine, 1e-6), 1.0);
     let behind = refracted_cosine(c, m.ratio);
     let once = fresnel(c, behind, m.ratio);
@@ -183,11 +183,11 @@ pub fn glass_fresnel(m: &Mixture, cosine: f32) -> Vec3 {
     }
 }
 
-pub fn glass_chance(m: &Mixture, cosine: f32) -> f32 {
+pub fn glass_chance(m: &PrincipledLobes, cosine: f32) -> f32 {
     min(luminance(glass_fresnel(m, cosine)), 1.0)
 }
 
-pub fn passes_straight(m: &Mixture) -> bool {
+pub fn passes_straight(m: &PrincipledLobes) -> bool {
     is_flat(m.alpha) | (!m.thin & ((m.eta - 1.0).abs() < 1e-3))
 }
 
@@ -218,7 +218,7 @@ pub fn refracting_density(wo: Vec3, wi: Vec3, half: Vec3, eta: f32) -> f32 {
     if (o > 0.0) & (i < 0.0) { density } else { 0.0 }
 }
 
-pub fn principled_eval(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3 {
+pub fn principled_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3 {
     let mut value = m.diffuse * (max(wi.z, 0.0) * std::f32::consts::FRAC_1_PI);
     if (lobes & LOBE_SPECULAR != 0) && (wi.z > 0.0) & !is_flat(m.alpha) {
         let half = half_between(wo, wi);
@@ -236,7 +236,7 @@ pub fn principled_eval(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3 {
     value
 }
 
-pub fn glass_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3 {
+pub fn glass_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> Vec3 {
     let above = wi.z > 0.0;
     if above | m.thin {
         let up = Vec3::new(wi.x, wi.y, wi.z.abs());
@@ -256,7 +256,7 @@ pub fn glass_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3 {
     m.passed * (Vec3::ONE - reflected) * density
 }
 
-pub fn glass_pdf(m: &Mixture, wo: Vec3, wi: Vec3) -> f32 {
+pub fn glass_pdf(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> f32 {
     let above = wi.z > 0.0;
     if above | m.thin {
         let half = half_between(wo, Vec3::new(wi.x, wi.y, wi.z.abs()));
@@ -268,7 +268,7 @@ pub fn glass_pdf(m: &Mixture, wo: Vec3, wi: Vec3) -> f32 {
     ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta) * (1.0 - chance)
 }
 
-pub fn coat_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> f32 {
+pub fn coat_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> f32 {
     let o = to_frame_around(m.coat_normal, wo);
     let i = to_frame_around(m.coat_normal, wi);
     let alpha = Vec2::splat(m.coat_alpha);
@@ -285,7 +285,7 @@ pub fn to_frame_around(n: Vec3, v: Vec3) -> Vec3 {
     Vec3::new(dot(frame.u, v), dot(frame.v, v), dot(n, v))
 }
 
-pub fn principled_pdf(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> f32 {
+pub fn principled_pdf(m: &PrincipledLobes, wo: Vec3, wi: Vec3, lobes: u32) -> f32 {
     let mut pdf = m.chances.x * (max(wi.z, 0.0) * std::f32::consts::FRAC_1_PI);
     if (lobes & LOBE_SPECULAR != 0) && (wi.z > 0.0) & !is_flat(m.alpha) {
         pdf += m.chances.y * mirrored_pdf(m.alpha, wo, half_between(wo, wi));
@@ -329,7 +329,7 @@ pub fn nowhere() -> LobeSample {
     }
 }
 
-pub fn principled_sample(m: &Mixture, wo: Vec3, u: Vec2, random: f32, lobes: u32) -> LobeSample {
+pub fn principled_sample(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lobes: u32) -> LobeSample {
     let p = disk_sample(u);
     let mut wi = p.extend(max(1.0 - p.x * p.x - p.y * p.y, 0.0).sqrt());
     let mut is_delta = false;

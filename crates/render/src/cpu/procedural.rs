@@ -26,12 +26,12 @@ pub fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let swap = dx.x * dx.x + dx.y * dx.y < dy.x * dy.x + dy.y * dy.y;
     let long = if swap { dy } else { dx };
     let short = widened_edge(long, if swap { dx } else { dy });
-    let reach = Vec2::new(long.x.abs() + short.x.abs(), long.y.abs() + short.y.abs());
+    let t_max = Vec2::new(long.x.abs() + short.x.abs(), long.y.abs() + short.y.abs());
     let at = Vec2::new(phase(f.uv.x * scale + shift), phase(f.uv.y * scale + shift));
 
     let least = min(on, 1.0 - on);
-    let near_x = reach.x < least;
-    let near_y = reach.y < least;
+    let near_x = t_max.x < least;
+    let near_y = t_max.y < least;
     let offset = Vec2::new(nearest_step(at.x, on), nearest_step(at.y, on));
     let rise = Vec2::new(
         if offset.x == at.x - on { -0.5 } else { 0.5 },
@@ -61,7 +61,7 @@ pub fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     };
 
     let apart =
-        wide_x | wide_y | (near_x & (offset.x.abs() >= 0.5 * reach.x)) | (near_y & (offset.y.abs() >= 0.5 * reach.y));
+        wide_x | wide_y | (near_x & (offset.x.abs() >= 0.5 * t_max.x)) | (near_y & (offset.y.abs() >= 0.5 * t_max.y));
     let crossed = max(min(long.x.abs(), long.y.abs()), min(short.x.abs(), short.y.abs()));
     let together = if crossed > MOST_PERIODS {
         far_product(at, long, short, on)

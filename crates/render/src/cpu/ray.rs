@@ -51,8 +51,8 @@ pub fn plane_distance(q: &Primitive, ray: Ray) -> f32 {
     dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction)
 }
 
-pub fn crosses_plane(o: Vec3, d: Vec3, reach: f32) -> bool {
-    (o.z * d.z < 0.0) & (o.z.abs() < reach * d.z.abs())
+pub fn crosses_plane(o: Vec3, d: Vec3, t_max: f32) -> bool {
+    (o.z * d.z < 0.0) & (o.z.abs() < t_max * d.z.abs())
 }
 
 pub fn scaled_crossing(o: Vec3, d: Vec3) -> Vec2 {
@@ -61,8 +61,8 @@ pub fn scaled_crossing(o: Vec3, d: Vec3) -> Vec2 {
     Vec2::new(o.x * a + s * d.x, o.y * a + s * d.y)
 }
 
-pub fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
-    let nearer = (t < hit.t) & (i != left);
+pub fn closer(hit: Hit, t: f32, i: u32, origin_prim: u32) -> Hit {
+    let nearer = (t < hit.t) & (i != origin_prim);
     Hit {
         t: if nearer { t } else { hit.t },
         primitive: if nearer { i } else { hit.primitive },

@@ -13,9 +13,9 @@ pub fn intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     if (t > 0.0) & (t < limit) & inside { t } else { limit }
 }
 
-pub fn rectangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
+pub fn rectangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
-    crosses_plane(o, d, reach) & (p.x.abs() <= d.z.abs()) & (p.y.abs() <= d.z.abs())
+    crosses_plane(o, d, t_max) & (p.x.abs() <= d.z.abs()) & (p.y.abs() <= d.z.abs())
 }
 
 #[cfg(test)]
@@ -79,12 +79,12 @@ mod tests {
 
     #[test]
     fn segments_are_blocked_where_they_cross() {
-        let blocks = |o: [f32; 3], d: [f32; 3], reach| rectangle_blocks(o.into(), d.into(), reach);
-        assert!(blocks([0.9, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0));
-        assert!(blocks([-0.9, -0.9, -1.0], [0.0, 0.0, 2.0], 1.0), "from below");
-        assert!(!blocks([1.1, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0), "beside");
-        assert!(!blocks([0.9, 0.9, 1.0], [0.0, 0.0, -2.0], 0.4), "ends before");
-        assert!(!blocks([0.9, 0.9, 1.0], [0.0, 0.0, 2.0], 1.0), "leads away");
-        assert!(!blocks([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 1.0), "in its plane");
+        let occludes = |o: [f32; 3], d: [f32; 3], t_max| rectangle_occludes(o.into(), d.into(), t_max);
+        assert!(occludes([0.9, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0));
+        assert!(occludes([-0.9, -0.9, -1.0], [0.0, 0.0, 2.0], 1.0), "from below");
+        assert!(!occludes([1.1, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0), "beside");
+        assert!(!occludes([0.9, 0.9, 1.0], [0.0, 0.0, -2.0], 0.4), "ends before");
+        assert!(!occludes([0.9, 0.9, 1.0], [0.0, 0.0, 2.0], 1.0), "leads away");
+        assert!(!occludes([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 1.0), "in its plane");
     }
 }

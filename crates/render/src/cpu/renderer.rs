@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
-use super::adaptive::{look_with, moments_with, samples_wanted, whole_look};
+use super::adaptive::{moments_with, pilot_add, pilot_finish, samples_wanted};
 use super::geometry::pixel_first_hit;
 use super::pixel::{Layers, pixel_radiance};
 use crate::backend::{Backend, Rules, Started};
@@ -165,7 +165,7 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
             } else if first_looks {
                 first_look(scene, pixel, samples.clone(), &mut run, x);
             } else {
-                let looks = looks_around(looks_to_read, region, pixel);
+                let looks = neighbor_pilot_sum(looks_to_read, region, pixel);
                 further_samples(scene, pixel, samples.clone(), &mut run, x, looks);
             }
         }
@@ -215,12 +215,12 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
 fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
     for sample in samples {
         let (value, layers) = pixel_radiance(scene, pixel, sample);
-        run.looks[x] = look_with(run.looks[x], run.sums[x], value);
+        run.looks[x] = pilot_add(run.looks[x], run.sums[x], value);
         run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
         run.sums[x] += value;
         run.add_layers(x, layers);
     }
-    run.looks[x] = whole_look(run.looks[x], run.sums[x], run.moments[x]);
+    run.looks[x] = pilot_finish(run.looks[x], run.sums[x], run.moments[x]);
 }
 
 /// What it does to a pixel later on.
@@ -235,7 +235,7 @@ fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut 
     }
 }
 
-fn looks_around(looks: &[Vec4], region: Region, pixel: UVec2) -> Vec4 {
+fn neighbor_pilot_sum(looks: &[Vec4], region: Region, pixel: UVec2) -> Vec4 {
     let (x, y) = (pixel.x - region.x0, pixel.y - region.y0);
     let width = region.width() as usize;
     let index = y as usize * width + x as usize;

@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 use fearless_simd::{Level, dispatch};
 
 use super::light::Segments;
-use super::shadow::{Block, block_sample};
-use super::walk::{Directions, MOST};
+use super::shadow::{SampleBlock, block_sample};
+use super::traversal::{Directions, MOST};
 use crate::records::GRID;
 
 /// The instructions that this processor has for several numbers at once.
@@ -22,7 +22,7 @@ pub struct Samples {
 
 impl Samples {
     /// Those of this block.
-    pub fn of(block: Block) -> Samples {
+    pub fn of(block: SampleBlock) -> Samples {
         let count = block.count as usize;
         let first = block_sample(block, 0);
         let mut samples = Samples {

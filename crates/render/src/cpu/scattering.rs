@@ -4,16 +4,16 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::dielectric::{eta_of, refracts_inwards};
 use super::diffuse::{angles_at, diffuse_eval, diffuse_pdf, rough_diffuse_eval};
-use super::energy::{glass_kept, principled_energy, streak_energy};
+use super::energy::{principled_energy, single_scatter_albedo_aniso, single_scatter_albedo_glass};
 use super::lobe::{LobeSample, facet_alpha, facet_loss, is_polished, lobe_frame, vector_to_lobe};
 use super::math::{dot, max, min};
-use super::mesh::{Spot, face_lets_pass};
+use super::mesh::{HitPrimitive, face_lets_pass};
 use super::metal::{metal_eval, metal_fresnel, metal_pdf, metal_sample};
 use super::modified_phong::{modified_phong_eval, modified_phong_pdf, phong_factors};
 use super::path::{is_specular, usable_normal};
 use super::phong::is_lit;
 use super::primitive::Tangents;
-use super::principled::{Mixture, principled_eval, principled_mixture, principled_pdf};
+use super::principled::{PrincipledLobes, principled_eval, principled_mixture, principled_pdf};
 use super::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample};
 use super::surface::Surface;
 use super::thin::{thin_eval, thin_pdf, thin_sample};
@@ -24,7 +24,7 @@ use crate::records::{
 };
 
 /// What a material has that is none of that kind.
-pub static NO_MIXTURE: Mixture = Mixture {
+pub static NO_MIXTURE: PrincipledLobes = PrincipledLobes {
     diffuse: Vec3::ZERO,
     alpha: Vec2::ZERO,
     f0: Vec3::ZERO,
@@ -73,10 +73,10 @@ pub fn plain_reflection(surface: &Surface, material: &Material, wi: Vec3) -> Ref
 #[inline(always)]
 pub fn reflection(
     scene: &Packed,
-    spot: &Spot,
+    prim: &HitPrimitive,
     surface: &Surface,
     material: &Material,
-    mixture: &Mixture,
+    mixture: &PrincipledLobes,
     wi: Vec3,
 ) -> Reflection {
     let frame = Tangents {
@@ -97,7 +97,7 @@ pub fn reflection(
     } else {
         plain_reflection(surface, material, wi)
     };
-    if !lets_light(scene, spot, surface, material, wi) {
+    if !direction_allowed(scene, prim, surface, material, wi) {
         result.value = Vec3::ZERO;
     }
     result
@@ -189,9 +189,9 @@ pub fn facets_of(scene: &Packed, surface: &Surface, found: Material) -> Material
     }
     if material.energy != NO_INDEX {
         material.loss = if material.kind == ROUGH_GLASS {
-            1.0 / glass_kept(scene, &material, facet_alpha(&material), wo, surface.side) - 1.0
-        } else if material.streaks != 0 {
-            1.0 / streak_energy(scene, &material, facet_alpha(&material), wo, 0) - 1.0
+            1.0 / single_scatter_albedo_glass(scene, &material, facet_alpha(&material), wo, surface.side) - 1.0
+        } else if material.aniso_table != 0 {
+            1.0 / single_scatter_albedo_aniso(scene, &material, facet_alpha(&material), wo, 0) - 1.0
         } else {
             facet_loss(facet_alpha(&material), wo)
         };
@@ -230,7 +230,7 @@ pub fn local_wo(surface: &Surface) -> Vec3 {
     Vec3::new(wo.x, wo.y, max(wo.z, 1e-6))
 }
 
-pub fn mixture_at(scene: &Packed, surface: &Surface, material: &Material, coat_normal: Vec3) -> Mixture {
+pub fn mixture_at(scene: &Packed, surface: &Surface, material: &Material, coat_normal: Vec3) -> PrincipledLobes {
     let s = &scene.specialization;
     let mut coat = Vec3::Z;
     if (s.lobes & LOBE_COAT != 0) & (s.normal_maps == 1) {
@@ -246,12 +246,18 @@ pub fn mixture_at(scene: &Packed, surface: &Surface, material: &Material, coat_n
 }
 
 #[inline(always)]
-pub fn lets_light(scene: &Packed, spot: &Spot, surface: &Surface, material: &Material, wi: Vec3) -> bool {
+pub fn direction_allowed(
+    scene: &Packed,
+    prim: &HitPrimitive,
+    surface: &Surface,
+    material: &Material,
+    wi: Vec3,
+) -> bool {
     let mut lit = is_lit(surface, wi);
     if scene.specialization.in_tree & (1 << INSTANCE) != 0 {
-        lit &= face_lets_pass(spot, surface, wi);
+        lit &= face_lets_pass(prim, surface, wi);
     }
-    if lets_through(material) {
+    if is_transmissive(material) {
         let behind = (dot(surface.shading_normal, wi) < 0.0) & (dot(surface.smooth_normal, wi) < 0.0);
         lit |= behind & (dot(surface.normal, wi) < 0.0);
     }
@@ -259,32 +265,32 @@ pub fn lets_light(scene: &Packed, spot: &Spot, surface: &Surface, material: &Mat
 }
 
 #[inline(always)]
-pub fn lets_through(material: &Material) -> bool {
+pub fn is_transmissive(material: &Material) -> bool {
     let passes = (PASSING_KINDS >> material.kind) & 1 != 0;
     passes | ((material.kind == PRINCIPLED) & (material.transmission > 0.0))
 }
 
 #[inline(always)]
 pub fn lit_normal(surface: &Surface, material: &Material) -> Vec3 {
-    if !lets_through(material) {
+    if !is_transmissive(material) {
         surface.shading_normal
     } else {
         Vec3::ZERO
     }
 }
 
-pub fn turned_over(scene: &Packed, surface: &Surface) -> Surface {
+pub fn flipped(scene: &Packed, surface: &Surface) -> Surface {
     let mut result = *surface;
-    result.start = surface.position - (surface.start - surface.position);
+    result.ray_origin = surface.position - (surface.ray_origin - surface.position);
     if scene.specialization.in_tree & (1 << INSTANCE) != 0 {
-        result.start += surface.bulge;
+        result.ray_origin += surface.terminator_offset;
     }
-    result.above = surface.below;
-    result.below = surface.above;
+    result.exclude_front = surface.exclude_back;
+    result.exclude_back = surface.exclude_front;
     result
 }
 
-pub fn absorption_behind(before: Vec3, surface: &Surface, material: &Material) -> Vec3 {
+pub fn absorption_after(before: Vec3, surface: &Surface, material: &Material) -> Vec3 {
     if !has_inside(material) {
         before
     } else if surface.side > 0.0 {

@@ -4,14 +4,14 @@ use glam::{UVec2, Vec2, Vec3};
 
 use super::light::{Segments, segments_to_light, segments_to_local};
 use super::math::dot;
-use super::primitive::{blocks, solid_levels};
+use super::primitive::{occludes, solid_levels};
 use super::ray::vector_to_local;
 use super::samples::{LEVEL, Samples};
 use super::sampling::sample_square;
 use crate::records::{Light, Primitive, Sphere};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Block {
+pub struct SampleBlock {
     pub pattern: u32,
     pub side: u32,
     pub first: u32,
@@ -21,14 +21,14 @@ pub struct Block {
 }
 
 #[inline(always)] // compiled for each kind
-pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32 {
+pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, light: &Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
-    let levels = solid_levels(kind, q, from_anchor, wall);
+    let levels = solid_levels(kind, q, from_anchor, inside_prim);
     let to = Samples::of(block).segments(*LEVEL, segments_to_local(q, segments_to_light(light, p)));
     let mut bits = 0;
     for i in 0..to.count {
-        bits |= if blocks(kind, o, to.get(i), levels, light.reach) {
+        bits |= if occludes(kind, o, to.get(i), levels, light.t_max) {
             1 << i
         } else {
             0
@@ -38,13 +38,13 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light,
 }
 
 #[inline(always)] // compiled for each kind
-pub fn cuts(kind: u32, q: &Primitive, p: Vec3, wall: bool, to: Vec3, reach: f32) -> bool {
+pub fn occludes_segment(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, to: Vec3, t_max: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
-    let levels = solid_levels(kind, q, from_anchor, wall);
-    blocks(kind, from_anchor - q.middle, vector_to_local(q, to), levels, reach)
+    let levels = solid_levels(kind, q, from_anchor, inside_prim);
+    occludes(kind, from_anchor - q.middle, vector_to_local(q, to), levels, t_max)
 }
 
-pub fn block_sample(block: Block, i: u32) -> Vec2 {
+pub fn block_sample(block: SampleBlock, i: u32) -> Vec2 {
     sample_square(block.pattern, block.side, block.first + i, block.group, block.key)
 }
 
@@ -56,7 +56,7 @@ pub struct Cone {
     pub inverse_depth: f32,
 }
 
-pub fn cone_to_light(light: &Light, p: Vec3) -> Cone {
+pub fn light_frustum(light: &Light, p: Vec3) -> Cone {
     let to = segments_to_light(light, p);
     let length2 = dot(to.towards, to.towards);
     let depth = length2 - dot(to.towards, to.u).abs() - dot(to.towards, to.v).abs();

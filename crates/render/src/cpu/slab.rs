@@ -30,7 +30,7 @@ pub fn inverse_of(x: f32) -> f32 {
     1.0 / if x.abs() >= 7.888609e-31 { x } else { least }
 }
 
-pub fn box_passage(low: Vec3, high: Vec3, s: Slabs) -> Vec2 {
+pub fn box_interval(low: Vec3, high: Vec3, s: Slabs) -> Vec2 {
     let a = (low - s.low_origin) * s.inverse;
     let b = (high - s.high_origin) * s.inverse;
     let near = max(max(min(a.x, b.x), min(a.y, b.y)), min(a.z, b.z));
@@ -38,12 +38,12 @@ pub fn box_passage(low: Vec3, high: Vec3, s: Slabs) -> Vec2 {
     Vec2::new(near, far)
 }
 
-pub fn is_passed(passage: Vec2, limit: f32) -> bool {
+pub fn interval_hits(passage: Vec2, limit: f32) -> bool {
     (passage.x <= passage.y) & (passage.y >= 0.0) & (passage.x <= limit)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fan {
+pub struct RayInterval {
     pub low_origin: Vec3,
     pub high_origin: Vec3,
     pub near_low: Vec3,
@@ -52,13 +52,13 @@ pub struct Fan {
     pub far_high: Vec3,
 }
 
-pub fn fan(origin: Vec3, least: Vec3, most: Vec3, pad: f32) -> Fan {
+pub fn ray_interval(origin: Vec3, least: Vec3, most: Vec3, pad: f32) -> RayInterval {
     let up = least.cmpge(Vec3::ZERO);
     let down = most.cmplt(Vec3::ZERO);
     let of_least = Vec3::new(inverse_of(least.x), inverse_of(least.y), inverse_of(least.z));
     let of_most = Vec3::new(inverse_of(most.x), inverse_of(most.y), inverse_of(most.z));
     let zero = Vec3::ZERO;
-    Fan {
+    RayInterval {
         low_origin: origin + pad,
         high_origin: origin - pad,
         near_low: Vec3::select(down, zero, of_most),
@@ -68,7 +68,7 @@ pub fn fan(origin: Vec3, least: Vec3, most: Vec3, pad: f32) -> Fan {
     }
 }
 
-pub fn fan_passage(low: Vec3, high: Vec3, f: Fan) -> Vec2 {
+pub fn ray_interval_box(low: Vec3, high: Vec3, f: RayInterval) -> Vec2 {
     let a = low - f.low_origin;
     let b = high - f.high_origin;
     let by_low = a * f.near_low;

@@ -2,13 +2,13 @@
 
 use glam::{Vec2, Vec3};
 
-use super::differential::Arrival;
+use super::differential::HitDifferential;
 use super::ewa;
 use super::footprint::{Footprint, footprint_ellipse, texture_footprint, wrap_u, wrap_v};
 use super::geometry::footprint_of;
 use super::lobe::direction_turn;
 use super::math::{floor, log2, max};
-use super::mesh::Spot;
+use super::mesh::HitPrimitive;
 use super::normal_map::mapped_normal;
 use super::procedural::procedural_share;
 use super::ray::Hit;
@@ -153,9 +153,9 @@ pub fn ewa_level_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2, dx: 
     let across = xx - m.y * slope;
     let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
     let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
-    let reach = yy.sqrt();
-    let first_row = -(floor(reach - y) as i32);
-    let last_row = floor(y + reach) as i32;
+    let t_max = yy.sqrt();
+    let first_row = -(floor(t_max - y) as i32);
+    let last_row = floor(y + t_max) as i32;
     let mut base = Vec3::ZERO;
     let mut sum = Vec3::ZERO;
     let mut total = 0.0;
@@ -212,65 +212,65 @@ pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Materi
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Appearance {
+pub struct EvaluatedMaterial {
     pub material: Material,
     pub normal: Vec3,
     pub coat_normal: Vec3,
 }
 
-pub fn appearance(
+pub fn evaluate_material(
     scene: &Packed,
-    spot: &Spot,
+    prim: &HitPrimitive,
     hit: Hit,
     material: &Material,
     surface: Surface,
-    at: Arrival,
+    at: HitDifferential,
     lookups: u32,
-) -> Appearance {
-    let mut look = Appearance {
+) -> EvaluatedMaterial {
+    let mut shading = EvaluatedMaterial {
         material: *material,
         normal: surface.shading_normal,
         coat_normal: surface.shading_normal,
     };
     if lookups == 0 {
-        return look;
+        return shading;
     }
-    let footprint = footprint_of(spot, hit, surface, at);
+    let footprint = footprint_of(prim, hit, surface, at);
     for i in 0..lookups {
         if i < material.lookups.y {
             let lookup = &scene.textures.lookups[(material.lookups.x + i) as usize];
             let t = &scene.textures.records[lookup.texture as usize];
-            let place = footprint_in_set(scene, footprint, spot, hit, at, lookup.uv_set);
+            let place = footprint_in_set(scene, footprint, prim, hit, at, lookup.uv_set);
             let color = texture_color(scene, t, place);
             let purposes = lookup.purposes;
             if purposes & FOR_AMBIENT != 0 {
-                look.material.ambient = color;
+                shading.material.ambient = color;
             }
             if purposes & FOR_DIFFUSE != 0 {
-                look.material.diffuse = color;
+                shading.material.diffuse = color;
             }
             if purposes & FOR_SPECULAR != 0 {
-                look.material.specular = color;
+                shading.material.specular = color;
             }
             if purposes & FOR_TINT != 0 {
-                look.material.tint = color;
+                shading.material.tint = color;
             }
             if purposes & FOR_EMISSION != 0 {
-                look.material.emission = color;
+                shading.material.emission = color;
             }
             if purposes & FOR_ROUGHNESS != 0 {
-                look.material.roughness = channel_of(color, lookup, ROUGHNESS_CHANNEL);
+                shading.material.roughness = channel_of(color, lookup, ROUGHNESS_CHANNEL);
             }
-            if look.material.kind == PRINCIPLED {
-                look.material = with_principled(look.material, color, lookup);
+            if shading.material.kind == PRINCIPLED {
+                shading.material = with_principled(shading.material, color, lookup);
                 if purposes & FOR_COAT_NORMAL != 0 {
-                    look.coat_normal = mapped_normal(surface, t, color);
+                    shading.coat_normal = mapped_normal(surface, t, color);
                 }
             }
             if purposes & FOR_NORMAL != 0 {
-                look.normal = mapped_normal(surface, t, color);
+                shading.normal = mapped_normal(surface, t, color);
             }
         }
     }
-    look
+    shading
 }

@@ -15,9 +15,9 @@ pub fn intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     if (t > 0.0) & (t < limit) & inside { t } else { limit }
 }
 
-pub fn triangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
+pub fn triangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
-    crosses_plane(o, d, reach) & (p.x >= 0.0) & (p.y >= 0.0) & (p.x + p.y <= d.z.abs())
+    crosses_plane(o, d, t_max) & (p.x >= 0.0) & (p.y >= 0.0) & (p.x + p.y <= d.z.abs())
 }
 
 #[cfg(test)]
@@ -67,11 +67,11 @@ mod tests {
 
     #[test]
     fn segments_are_blocked_where_they_cross() {
-        let blocks = |x: f32, y: f32| triangle_blocks(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), 1.0);
-        assert!(blocks(0.01, 0.01) && blocks(0.45, 0.5) && blocks(0.9, 0.05));
-        assert!(!blocks(-0.01, 0.5) && !blocks(0.5, -0.01) && !blocks(0.55, 0.5));
+        let occludes = |x: f32, y: f32| triangle_occludes(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), 1.0);
+        assert!(occludes(0.01, 0.01) && occludes(0.45, 0.5) && occludes(0.9, 0.05));
+        assert!(!occludes(-0.01, 0.5) && !occludes(0.5, -0.01) && !occludes(0.55, 0.5));
         assert!(
-            !triangle_blocks(Vec3::new(0.2, 0.2, 1.0), Vec3::new(0.0, 0.0, -3.0), 0.3),
+            !triangle_occludes(Vec3::new(0.2, 0.2, 1.0), Vec3::new(0.0, 0.0, -3.0), 0.3),
             "ends before"
         );
     }

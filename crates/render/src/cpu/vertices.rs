@@ -2,10 +2,10 @@
 
 use glam::{UVec4, Vec2, Vec3, Vec4};
 
-use super::differential::Arrival;
+use super::differential::HitDifferential;
 use super::footprint::Footprint;
 use super::geometry::{instance_of, is_on_mesh};
-use super::mesh::{Spot, color_between, face_uv, face_uv_derivative};
+use super::mesh::{HitPrimitive, color_between, face_uv, face_uv_derivative};
 use super::ray::Hit;
 use crate::records::{COLORS_OF_BASE, COLORS_OF_EMISSION, Instance, Material, NO_COLORS, NO_INDEX, Packed};
 
@@ -48,8 +48,8 @@ pub fn load_further_uv(scene: &Packed, i: &Instance, vertex: u32, uv_set: u32) -
     }
 }
 
-pub fn spot_in_set(scene: &Packed, spot: &Spot, hit: Hit, uv_set: u32) -> Spot {
-    let mut face = *spot;
+pub fn spot_in_set(scene: &Packed, prim: &HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
+    let mut face = *prim;
     if is_on_mesh(hit) {
         let i = instance_of(scene, hit);
         let has_set = uv_set <= i.uv_sets;
@@ -68,25 +68,25 @@ pub fn spot_in_set(scene: &Packed, spot: &Spot, hit: Hit, uv_set: u32) -> Spot {
     face
 }
 
-pub fn uv_in_set(scene: &Packed, first: Vec2, spot: &Spot, hit: Hit, uv_set: u32) -> Vec2 {
+pub fn uv_in_set(scene: &Packed, first: Vec2, prim: &HitPrimitive, hit: Hit, uv_set: u32) -> Vec2 {
     if uv_set == 0 {
         return first;
     }
-    face_uv(&spot_in_set(scene, spot, hit, uv_set), hit.barycentric)
+    face_uv(&spot_in_set(scene, prim, hit, uv_set), hit.barycentric)
 }
 
 pub fn footprint_in_set(
     scene: &Packed,
     first: Footprint,
-    spot: &Spot,
+    prim: &HitPrimitive,
     hit: Hit,
-    at: Arrival,
+    at: HitDifferential,
     uv_set: u32,
 ) -> Footprint {
     if uv_set == 0 {
         return first;
     }
-    let face = spot_in_set(scene, spot, hit, uv_set);
+    let face = spot_in_set(scene, prim, hit, uv_set);
     Footprint {
         uv: face_uv(&face, hit.barycentric),
         dx: face_uv_derivative(&face, at.x.position),

@@ -8,7 +8,8 @@ use glam::UVec4;
 
 use crate::pack::MAX_LINEAR_PRIMITIVES;
 use crate::records::{
-    BLOCK, Emitter, Field as _, Instance, Item, Light, LightNode, Lookup, Material, Node, Packed, Record, Texture,
+    Emitter, Field as _, Instance, Item, Light, LightNode, Lookup, Material, Node, Packed, Record, SAMPLE_BLOCK,
+    Texture,
 };
 
 /// Scenes of more materials, lights and textures are read from buffers: compiling grows with every one of them, faster than
@@ -34,7 +35,7 @@ pub fn bake(packed: &Packed) -> String {
     let records: Vec<String> = packed.primitives.iter().map(Record::constant).collect();
     write_function(
         &mut out,
-        "closest_primitive(ray: Ray, left: u32, wall: u32) -> Hit",
+        "closest_primitive(ray: Ray, origin_prim: u32, inside_prim: u32) -> Hit",
         "var hit = no_hit();",
         "hit",
         |body| {
@@ -42,22 +43,22 @@ pub fn bake(packed: &Packed) -> String {
                 let kind = p.kind;
                 let _ = writeln!(
                     body,
-                    "    hit = closer(hit, intersect({kind}u, {record}, {i}u == wall, ray, hit.t), {i}u, left);"
+                    "    hit = closer(hit, intersect({kind}u, {record}, {i}u == inside_prim, ray, hit.t), {i}u, origin_prim);"
                 );
             }
         },
     );
     write_function(
         &mut out,
-        "hidden_by_primitives(surface: Surface, light: Light, block: Block) -> u32",
-        "let cone = cone_to_light(light, surface.start);\n    var bits = 0u;",
+        "occluded_by_primitives(surface: Surface, light: Light, block: SampleBlock) -> u32",
+        "let cone = light_frustum(light, surface.ray_origin);\n    var bits = 0u;",
         "bits",
         |body| {
             for (kind, range) in packed.shadow_casters() {
                 let (start, end) = (range.start, range.end);
                 let _ = writeln!(
                     body,
-                    "    bits |= hidden_by({kind}u, vec2u({start}u, {end}u), surface, cone, light, block);"
+                    "    bits |= occluded_by({kind}u, vec2u({start}u, {end}u), surface, cone, light, block);"
                 );
             }
         },
@@ -65,9 +66,9 @@ pub fn bake(packed: &Packed) -> String {
     let signature = "shadow_candidates(first: u32, end: u32, cone: Cone) -> u32";
     write_function(&mut out, signature, "var bits = 0u;", "bits", |body| {
         for (_, range) in packed.shadow_casters() {
-            for first in range.clone().step_by(BLOCK as usize) {
+            for first in range.clone().step_by(SAMPLE_BLOCK as usize) {
                 let _ = writeln!(body, "    if first == {first}u {{");
-                for i in first..range.end.min(first + BLOCK as usize) {
+                for i in first..range.end.min(first + SAMPLE_BLOCK as usize) {
                     let (bit, sphere) = (i - first, packed.bounds[i].constant());
                     let _ = writeln!(
                         body,
@@ -99,7 +100,7 @@ pub fn bake(packed: &Packed) -> String {
     );
     write_function(
         &mut out,
-        "is_hidden_by_primitives(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool",
+        "is_occluded_by_primitives(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
         "var hidden = before;",
         "hidden",
         |body| {
@@ -108,7 +109,7 @@ pub fn bake(packed: &Packed) -> String {
                     let record = &records[i];
                     let _ = writeln!(
                         body,
-                        "    hidden |= is_cut({kind}u, {record}, {i}u, surface, to, reach, goal);"
+                        "    hidden |= is_occluded_by_primitive({kind}u, {record}, {i}u, surface, to, t_max, target_prim);"
                     );
                 }
             }

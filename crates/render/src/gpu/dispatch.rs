@@ -11,56 +11,56 @@ pub fn linear_loops() -> String {
         true,
         &[
             (
-                "closest_primitive(ray: Ray, left: u32, wall: u32) -> Hit",
+                "closest_primitive(ray: Ray, origin_prim: u32, inside_prim: u32) -> Hit",
                 "var hit = no_hit();",
-                "if (PRIMITIVES & (1u << KIND)) != 0u { hit = closest_of(KIND, hit, ray, left, wall); }",
+                "if (PRIMITIVES & (1u << KIND)) != 0u { hit = closest_of(KIND, hit, ray, origin_prim, inside_prim); }",
                 "hit",
             ),
             (
-                "hidden_by_primitives(surface: Surface, light: Light, block: Block) -> u32",
-                "let cone = cone_to_light(light, surface.start);\n    var bits = 0u;",
+                "occluded_by_primitives(surface: Surface, light: Light, block: SampleBlock) -> u32",
+                "let cone = light_frustum(light, surface.ray_origin);\n    var bits = 0u;",
                 "if (SHADOW_CASTERS & (1u << KIND)) != 0u {
-        bits |= hidden_by(KIND, counts.primitives[KIND].xy, surface, cone, light, block);
+        bits |= occluded_by(KIND, counts.primitives[KIND].xy, surface, cone, light, block);
     }",
                 "bits",
             ),
             (
-                "is_hidden_by_primitives(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool",
+                "is_occluded_by_primitives(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
                 "var hidden = before;",
-                "if (SHADOW_CASTERS & (1u << KIND)) != 0u { hidden = is_hidden_by(KIND, hidden, surface, to, reach, goal); }",
+                "if (SHADOW_CASTERS & (1u << KIND)) != 0u { hidden = is_occluded_by(KIND, hidden, surface, to, t_max, target_prim); }",
                 "hidden",
             ),
         ],
     )
 }
 
-/// The tests of the primitive of an item in `tree.wgsl`: its hit, whether it occludes one sample of a light, and whether it cuts a segment. Loops
+/// The tests of the primitive of an item in `bvh.wgsl`: its hit, whether it occludes one sample of a light, and whether it cuts a segment. Loops
 /// stand where an `if` would do, because software Vulkan skips them.
 pub fn item_tests() -> String {
     functions(
         false,
         &[
             (
-                "closest_of_primitive_item(before: Hit, item: Item, ray: Ray, near: f32, left: vec2u, wall: vec2u) -> Hit",
+                "closest_of_primitive_item(before: Hit, item: Item, ray: Ray, near: f32, origin_prim: vec2u, inside_prim: vec2u) -> Hit",
                 "var hit = before;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
-        hit = nearer_hit(hit, hit_by_itself(KIND, item.index, ray, near, left, wall));
+        hit = nearer_hit(hit, hit_by_itself(KIND, item.index, ray, near, origin_prim, inside_prim));
     }",
                 "hit",
             ),
             (
-                "hidden_by_primitive_item(item: Item, p: vec3f, wall: bool, light: Light, block: Block) -> u32",
+                "occluded_by_primitive_item(item: Item, p: vec3f, inside_prim: bool, light: Light, block: SampleBlock) -> u32",
                 "var bits = 0u;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
-        bits = shadow_bits(KIND, primitives[item.index], p, wall, light, block);
+        bits = occlusion_mask(KIND, primitives[item.index], p, inside_prim, light, block);
     }",
                 "bits",
             ),
             (
-                "is_cut_by_primitive_item(item: Item, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool",
+                "is_occluded_by_primitive_item(item: Item, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
                 "var cut = false;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
-        cut = is_cut(KIND, primitives[item.index], item.index, surface, to, reach, goal);
+        cut = is_occluded_by_primitive(KIND, primitives[item.index], item.index, surface, to, t_max, target_prim);
     }",
                 "cut",
             ),

@@ -71,7 +71,7 @@ impl Sides<'_> {
                 let span = self.place_of_function(entry);
                 let name = name_of(known);
                 let hint = match name {
-                    "receipt" => ": every pixel must end with `sign(local)`",
+                    "completion" => ": every pixel must end with `report_completion(local)`",
                     _ => "",
                 };
                 self.tell(

@@ -22,7 +22,7 @@ use super::timer::{TIMES, Timer};
 use crate::backend::{Backend, Rules, Started};
 use crate::error::RenderError;
 use crate::film::{Film, Form};
-use crate::records::{Camera, FirstHit, Packed, Specialization, Work};
+use crate::records::{Camera, DispatchParams, FirstHit, Packed, Specialization};
 use wgray_image::Region;
 use wgray_scene::Integrator;
 
@@ -55,7 +55,7 @@ pub struct Gpu {
     scene: SceneBuffers,
     work: wgpu::Buffer,
     /// The kernel's receipt of a call: as the kernel writes it, and as the host reads it.
-    receipt: [wgpu::Buffer; 2],
+    completion: [wgpu::Buffer; 2],
     /// What the last dispatch of a call has changed, as it was before.
     before: Option<wgpu::Buffer>,
     film: Option<(Target, Started)>,
@@ -92,7 +92,7 @@ struct Pending {
     end: u32,
     start: Instant,
     /// Tells when the dispatch has ended.
-    receipt: Mapping,
+    completion: Mapping,
 }
 
 /// What it takes to compile another kernel for the same scene.
@@ -179,11 +179,14 @@ impl Gpu {
         };
         let render = kernels.compile(device, kernel_of(packed.sampling.adaptive))?;
         let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
-        let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+        let work = device.buffer(
+            size_of::<DispatchParams>() as u64,
+            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+        );
         let values = kernels.sliders.len().div_ceil(4) as u64 * size_of::<[u32; 4]>() as u64;
         let slider_values = (values > 0).then(|| device.buffer(values, BufferUsages::UNIFORM | BufferUsages::COPY_DST));
         let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
-        let receipt = [device.buffer(RECEIPT, written), receipt_to_read(device)];
+        let completion = [device.buffer(RECEIPT, written), receipt_to_read(device)];
         let mut gpu = Gpu {
             samples_per_call: samples_per_call(packed, kernels.baked.is_some()),
             device: device.clone(),
@@ -192,7 +195,7 @@ impl Gpu {
             first_hits: None,
             scene,
             work,
-            receipt,
+            completion,
             before: None,
             film: None,
             pending: None,
@@ -289,7 +292,7 @@ impl Gpu {
         let target = self.device.checked(|| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             let buffer = self.device.buffer(size, usage);
-            let buffers = [&self.work, &buffer, &self.receipt[0]]
+            let buffers = [&self.work, &buffer, &self.completion[0]]
                 .into_iter()
                 .chain(&self.slider_values);
             let group = bind_group(&self.device, &self.kernels.layouts[0], &buffers.collect::<Vec<_>>());
@@ -327,16 +330,16 @@ impl Gpu {
         samples: Range<u32>,
         copies: impl FnOnce(&mut wgpu::CommandEncoder),
     ) -> Result<Mapping, RenderError> {
-        let work = Work {
+        let work = DispatchParams {
             origin: UVec2::new(tile.x0, tile.y0),
             size: UVec2::new(tile.width(), tile.height()),
             film_origin: UVec2::new(target.region.x0, target.region.y0),
             film_size: UVec2::new(target.region.width(), target.region.height()),
             samples: UVec2::new(samples.start, samples.end),
-            proof: PROOF,
+            loop_probe: PROOF,
         };
         let Device { device, queue, .. } = &self.device;
-        let [written, read] = &self.receipt;
+        let [written, read] = &self.completion;
         let [columns, rows] = groups(tile);
         self.device.checked(|| {
             queue.write_buffer(&self.work, 0, bytes_of(&work));
@@ -373,8 +376,8 @@ impl Gpu {
         start: Instant,
     ) -> Result<bool, RenderError> {
         let waited = start.elapsed();
-        let receipt: Vec<u32> = self.device.mapped(&self.receipt[1])?;
-        let (receipt, ticks) = receipt.split_at((RECEIPT / 4) as usize);
+        let completion: Vec<u32> = self.device.mapped(&self.completion[1])?;
+        let (completion, ticks) = completion.split_at((RECEIPT / 4) as usize);
         if let Some(timer) = &self.timer {
             let told = timer.took(ticks);
             self.calls.push(Call {
@@ -385,7 +388,7 @@ impl Gpu {
             });
         }
         let [columns, rows] = groups(tile);
-        Ok(receipt == [columns * rows, 0])
+        Ok(completion == [columns * rows, 0])
     }
 
     fn idle(&self) -> Result<(), RenderError> {
@@ -416,14 +419,14 @@ impl Gpu {
             }
         };
         let start = Instant::now();
-        let receipt = self.dispatch(&self.render, film, tile, samples.start..end, save)?;
+        let completion = self.dispatch(&self.render, film, tile, samples.start..end, save)?;
         self.before = Some(before);
         self.pending = Some(Pending {
             tile,
             samples,
             end,
             start,
-            receipt,
+            completion,
         });
         Ok(())
     }
@@ -476,7 +479,7 @@ impl Gpu {
         let Some(pending) = self.pending.take() else {
             return Ok(());
         };
-        match pending.receipt.done() {
+        match pending.completion.done() {
             None => {
                 self.pending = Some(pending);
                 Ok(())
@@ -492,7 +495,7 @@ impl Gpu {
         if result.is_err() {
             self.pending = None;
             self.film = None;
-            self.receipt[1] = receipt_to_read(&self.device);
+            self.completion[1] = receipt_to_read(&self.device);
         }
         result
     }
@@ -504,9 +507,9 @@ impl Gpu {
         };
         let target = self.target(FIRST_HITS_RECORD, region)?;
         let start = Instant::now();
-        let receipt = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
+        let completion = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
         self.first_hits = Some(pipeline);
-        self.device.wait_for(&receipt)?;
+        self.device.wait_for(&completion)?;
         match self.ran_whole(FIRST_HITS.entry_point, region, 1, start)? {
             true => self.device.download(&target.buffer),
             false => Err(self.cut_short()),

@@ -1,6 +1,6 @@
 //! How many samples of a pixel one call may have, so that software Vulkan runs it whole.
 
-use crate::records::{BLOCK, LEAVES, Packed};
+use crate::records::{MAX_PATH_LEAVES, Packed, SAMPLE_BLOCK};
 
 /// After so many rounds of all its loops together, Mesa 22.3's software Vulkan ends every loop of an invocation. Rounds
 /// are counted for all lanes of a vector: a round that any of them needs counts.
@@ -34,7 +34,9 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
     let s = &packed.specialization;
     let all = packed.kinds().map(|(_, range)| range.len()).sum::<usize>() as f64;
     let casting = || packed.shadow_casters().map(|(_, range)| range.len());
-    let lists = casting().map(|count| count.div_ceil(BLOCK as usize)).sum::<usize>() as f64;
+    let lists = casting()
+        .map(|count| count.div_ceil(SAMPLE_BLOCK as usize))
+        .sum::<usize>() as f64;
     let casters = casting().sum::<usize>() as f64;
     // A scene in buffers is read by loops, one of constants by statements.
     let (of_hit, of_lists) = if baked { (0.0, lists) } else { (all, lists + casters) };
@@ -57,11 +59,11 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
         let lobes = f64::from(samples) * (2.0 + f64::from(s.exponent_bits));
         of_lists + shadows + lobes
     };
-    let (blocks, rest) = (s.light_samples / BLOCK, s.light_samples % BLOCK);
-    let area_light = f64::from(blocks) * block(BLOCK) + if rest > 0 { block(rest) } else { 0.0 };
+    let (blocks, rest) = (s.light_samples / SAMPLE_BLOCK, s.light_samples % SAMPLE_BLOCK);
+    let area_light = f64::from(blocks) * block(SAMPLE_BLOCK) + if rest > 0 { block(rest) } else { 0.0 };
     let (area_lights, lights) = (f64::from(packed.counts.lights.x), f64::from(packed.counts.lights.y));
     let shading = area_lights * (1.0 + area_light) + (lights - area_lights) * (1.0 + block(1));
-    let paths = if s.bounces == 0 { 1 } else { LEAVES };
+    let paths = if s.bounces == 0 { 1 } else { MAX_PATH_LEAVES };
     of_start + f64::from(paths) * (shading + (f64::from(s.bounces) + 1.0) * (1.0 + of_hit))
 }
 

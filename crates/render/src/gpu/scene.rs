@@ -10,7 +10,7 @@ use super::memory::Held;
 use super::pipeline::bind_group;
 use super::texels::TexelParts;
 use crate::error::RenderError;
-use crate::records::{BINS, Camera, Packed};
+use crate::records::{Camera, FILTER_BINS_MAX, Packed};
 
 /// What a scene takes on a device, in bytes.
 pub fn bytes_of_scene(packed: &Packed) -> u64 {
@@ -20,7 +20,7 @@ pub fn bytes_of_scene(packed: &Packed) -> u64 {
         of_rows * size_of::<UVec4>(),
         size_of_val(packed.primitives.as_slice()),
         size_of_val(packed.bounds.as_slice()),
-        BINS as usize * size_of::<Vec4>(),
+        FILTER_BINS_MAX as usize * size_of::<Vec4>(),
     ];
     sizes.iter().map(|size| *size as u64).sum()
 }
@@ -45,7 +45,7 @@ impl SceneBuffers {
         let storage = BufferUsages::STORAGE;
         let (rows, nodes, meshes) = (rows(packed), node_rows(packed), mesh_rows(packed));
         let mut filter_table = packed.sampling.filter_table.clone();
-        filter_table.resize(BINS as usize, Vec4::ZERO);
+        filter_table.resize(FILTER_BINS_MAX as usize, Vec4::ZERO);
         let bytes = bytes_of_scene(packed);
         let uploaded = || {
             let texels = texels.split(&packed.textures.texels);

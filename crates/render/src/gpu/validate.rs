@@ -274,21 +274,21 @@ mod tests {
         let rows = "struct Rows { light_counts: vec4u, more: vec4u }\n";
         says(
             &[
-                ("bindings.wgsl", "receipt: Receipt", "receipt: Receipts"),
+                ("bindings.wgsl", "completion: Completion", "completion: Receipts"),
                 (
-                    "receipt.wgsl",
+                    "completion.wgsl",
                     "",
                     "struct Receipts { ended: atomic<u32>, more: f32, cut: atomic<u32> }",
                 ),
             ],
-            &["bindings.wgsl: `receipt` is not laid out .. `receipt.more` is `f32`"],
+            &["bindings.wgsl: `completion` is not laid out .. `completion.more` is `f32`"],
         );
         says(
             &[
                 ("bindings.wgsl", "", rows),
                 (
                     "bindings.wgsl",
-                    "filter_table: array<vec4f, BINS>",
+                    "filter_table: array<vec4f, FILTER_BINS_MAX>",
                     "filter_table: array<vec4f, 64>",
                 ),
             ],
@@ -311,7 +311,7 @@ mod tests {
     fn a_second_definition_of_a_name_is_reported_with_the_place_of_the_first() {
         says(
             &[("phong.wgsl", "", "const steps: i32 = 3;")],
-            &["node.wgsl:5:4: redefinition of `steps`; the other definition is at phong.wgsl:"],
+            &["bvh_node.wgsl:5:4: redefinition of `steps`; the other definition is at phong.wgsl:"],
         );
     }
 
@@ -327,9 +327,9 @@ mod tests {
     #[test]
     fn results_must_be_written() {
         says(
-            &[(RENDER, "    sign(local);\n", "")],
+            &[(RENDER, "    report_completion(local);\n", "")],
             &[
-                "kernels/render.wgsl: `render` never writes `receipt`, which the program reads: every pixel must end with `sign(local)`",
+                "kernels/render.wgsl: `render` never writes `completion`, which the program reads: every pixel must end with `report_completion(local)`",
             ],
         );
         says(

@@ -9,7 +9,7 @@ use super::light_tree::{self, Cone, Lamp};
 use super::primitive::{area, axes, bounding_box, bounding_sphere};
 use super::{
     DIRECTIONAL, DISTANT, EMITTER, ENVIRONMENT, Emitter, Light, Material, NO_INDEX, NO_SHADOW, PLANE, POINT, Primitive,
-    SPOT, TRIANGLE, reach,
+    SPOT, TRIANGLE, t_max,
 };
 use crate::cpu::primitive::is_solid;
 use crate::records::{Lighting, PackedBvh};
@@ -64,7 +64,7 @@ pub fn emitters(
         let material = &materials[primitive.material as usize];
         let strength = strengths[primitive.material as usize];
         if strength > 0.0 && primitive.kind != PLANE {
-            let light = light_of(primitive, i, material, reach(scene.render.shadow_epsilon));
+            let light = light_of(primitive, i, material, t_max(scene.render.shadow_epsilon));
             powers.push(strength * area(primitive));
             kinds.push(primitive.material as usize);
             shining.lighting.lights.push(light);
@@ -200,7 +200,7 @@ fn balance(powers: &mut [f64], places: &[(u32, u32)], lights: &[Light]) {
 
 fn environment_light() -> Light {
     Light {
-        reach: DISTANT,
+        t_max: DISTANT,
         primitive: NO_INDEX,
         number: NO_INDEX,
         kind: ENVIRONMENT,
@@ -456,11 +456,11 @@ fn mean_of(scene: &Scene, color: &Color) -> f64 {
 }
 
 /// A primitive that shines, as a light.
-fn light_of(primitive: &Primitive, number: u32, material: &Material, reach: f32) -> Light {
+fn light_of(primitive: &Primitive, number: u32, material: &Material, t_max: f32) -> Light {
     let [u, v, _] = axes(primitive);
     Light {
         center: primitive.anchor,
-        reach,
+        t_max,
         u: u.as_vec3(),
         finite: 1.0,
         v: v.as_vec3(),

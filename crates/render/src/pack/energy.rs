@@ -93,7 +93,7 @@ pub enum Parts {
     /// What rough glass of the index with these bits lets pass and mirrors: from outside, from inside.
     Glass(u32),
     /// The two parts of what they mirror by Schlick's formula and, where there is an index, those of glass.
-    Mixture(Option<u32>),
+    PrincipledLobes(Option<u32>),
 }
 
 /// Rows of a table by roughness, and by anisotropy, where a texture gives it.
@@ -102,7 +102,7 @@ const ROWS: (u32, u32) = (10, 6);
 /// Inside glass all light is mirrored from some directions on. The tables' straight lines cut that corner, and so much more counts as kept.
 const CUT: f32 = 1.004;
 
-/// The table of facets that are rougher along one axis, for `streak_energy`: how many rows there are by roughness and by anisotropy, one where
+/// The table of facets that are rougher along one axis, for `single_scatter_albedo_aniso`: how many rows there are by roughness and by anisotropy, one where
 /// it is known; then for each part the rows, each of lines by the direction along the surface of columns by the cosine.
 pub fn streak_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
     let rows = [
@@ -152,7 +152,7 @@ pub fn streak_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32
             let both = mirrors(*alpha, *wo, &facets);
             ((both.x + both.y) as f32).to_bits()
         })),
-        Parts::Mixture(index) => {
+        Parts::PrincipledLobes(index) => {
             let both: Vec<DVec2> = nodes.iter().map(|(alpha, wo)| mirrors(*alpha, *wo, &facets)).collect();
             words.extend(both.iter().map(|both| (both.x as f32).to_bits()));
             words.extend(both.iter().map(|both| (both.y as f32).to_bits()));

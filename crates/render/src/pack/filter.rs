@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec4, Vec4};
 
-use super::BINS;
+use super::FILTER_BINS_MAX;
 use wgray_scene::{PixelFilter, PixelFilterKind};
 
 /// Steps of the numerical integrals, between two sign changes of a filter.
@@ -41,15 +41,15 @@ fn mitchell(x: f64) -> f64 {
     six_times / 6.0
 }
 
-/// The [`BINS`] bins of a filter: inner edge, outer edge and weight, then 0. All bins are met equally often. Those of a lobe have the same integral, and a weight that makes
+/// The [`FILTER_BINS_MAX`] bins of a filter: inner edge, outer edge and weight, then 0. All bins are met equally often. Those of a lobe have the same integral, and a weight that makes
 /// up for the lobe's share of bins, which is a whole number: close to 1, below 0 in negative lobes.
 pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
     let mut table = Vec::new();
-    let mut left = BINS;
+    let mut left = FILTER_BINS_MAX;
     for (i, lobe) in lobes.iter().enumerate() {
-        let share = f64::from(BINS) * lobe.integral().abs() / total;
+        let share = f64::from(FILTER_BINS_MAX) * lobe.integral().abs() / total;
         let bins = match i + 1 == lobes.len() {
             true => left,
             false => share.round() as u32,

@@ -7,7 +7,7 @@ use bytemuck::cast_vec;
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 
 use super::primitive::bounding_box;
-use super::{CASTS_SHADOW, INSTANCE, Instance, Item, NO_INDEX, NO_SHADOW, Node, PAD, Primitive, SOME_SHADOWS};
+use super::{BOX_PAD, CASTS_SHADOW, INSTANCE, Instance, Item, NO_INDEX, NO_SHADOW, Node, Primitive, SOME_SHADOWS};
 use crate::bvh::{Aabb, build};
 use crate::records::{PackedBvh, PackedMesh};
 use wgray_scene::mesh::Mesh;
@@ -79,7 +79,7 @@ pub fn trees(
         .map(|b| b.low.abs().max(b.high.abs()).max_element())
         .fold(0.0, f32::max);
     trees.place_rows();
-    (trees, Vec4::new(PAD * condition, farthest, 0.0, 0.0))
+    (trees, Vec4::new(BOX_PAD * condition, farthest, 0.0, 0.0))
 }
 
 /// The meshes of which any instance has a normal map. What else has a direction along the surface, facets that are rougher along one axis and

@@ -18,7 +18,7 @@ const BEFORE_LIGHT: f64 = 1e-5;
 const LEAST_FALLOFF: f64 = 1e-12;
 
 /// Where shadow rays to a point of a light end, as a multiple of the way.
-pub(super) fn reach(shadow_epsilon: f64) -> f32 {
+pub(super) fn t_max(shadow_epsilon: f64) -> f32 {
     (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
 }
 
@@ -54,10 +54,10 @@ pub(super) fn pack_lights(
 }
 
 fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
-    let reach = reach(shadow_epsilon);
+    let t_max = t_max(shadow_epsilon);
     let unit = Light {
         finite: 1.0,
-        reach,
+        t_max,
         primitive: NO_INDEX,
         number,
         ..Light::zeroed()
@@ -79,7 +79,7 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
         scene::Light::Directional { direction, color } => Light {
             center: -direction.as_vec3(),
             finite: 0.0,
-            reach: DISTANT,
+            t_max: DISTANT,
             color: color.as_vec3(),
             kind: DIRECTIONAL,
             ..unit

@@ -31,14 +31,14 @@ pub struct Appearances {
     /// The tables of rough glass, by its index and alpha where that is one.
     energies: BTreeMap<(u32, Option<u32>), u32>,
     /// Those of facets that are rougher along one axis, by what is in them, roughness and anisotropy.
-    streaks: BTreeMap<(Parts, Option<u32>, Option<u32>), u32>,
+    aniso_table: BTreeMap<(Parts, Option<u32>, Option<u32>), u32>,
 }
 
 /// What of a material the camera does not see.
 fn hidden(material: &scene::Material) -> u32 {
     match &material.reflection {
         _ if !material.visible => 1,
-        Reflection::Principled(principled) if !principled.double_sided => HIDDEN_BACK,
+        Reflection::Principled(principled) if !principled.double_sided => CULL_BACKFACE,
         _ => 0,
     }
 }
@@ -223,12 +223,12 @@ impl Appearances {
         let parts = match record.kind {
             METAL | THIN if record.energy != NO_INDEX => Some(Parts::Mirror),
             ROUGH_GLASS if record.energy != NO_INDEX => Some(Parts::Glass(record.ior.to_bits())),
-            PRINCIPLED => Some(Parts::Mixture(passes.then_some(record.ior.to_bits()))),
+            PRINCIPLED => Some(Parts::PrincipledLobes(passes.then_some(record.ior.to_bits()))),
             _ => None,
         };
         if let Some(parts) = parts {
             if record.anisotropy > 0.0 || has(FOR_ANISOTROPY) {
-                record.streaks = 1 + self.streaks(&record, parts, textured, has(FOR_ANISOTROPY));
+                record.aniso_table = 1 + self.aniso_table(&record, parts, textured, has(FOR_ANISOTROPY));
             } else if record.kind == ROUGH_GLASS || record.kind == PRINCIPLED && passes {
                 record.energy = self.energy(&record, textured);
             }
@@ -267,12 +267,12 @@ impl Appearances {
     }
 
     /// The same of facets that are rougher along one axis; textures may give roughness and anisotropy.
-    fn streaks(&mut self, record: &Material, parts: Parts, rough: bool, long: bool) -> u32 {
+    fn aniso_table(&mut self, record: &Material, parts: Parts, rough: bool, long: bool) -> u32 {
         let known = |number: f32, textured: bool| (!textured).then_some(number);
         let (roughness, anisotropy) = (known(record.roughness, rough), known(record.anisotropy, long));
         let key = (parts, roughness.map(f32::to_bits), anisotropy.map(f32::to_bits));
         let texels = &mut self.texels;
-        *self.streaks.entry(key).or_insert_with(|| {
+        *self.aniso_table.entry(key).or_insert_with(|| {
             let start = texels.len() as u32;
             texels.extend(streak_table(parts, roughness, anisotropy));
             start

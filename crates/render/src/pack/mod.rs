@@ -23,7 +23,7 @@ use glam::{UVec2, UVec4, Vec3};
 pub use self::camera::pack_camera;
 use self::emitters::PackedEmitters;
 pub use self::geometry::MAX_LINEAR_PRIMITIVES;
-use self::light::{DISTANT, connect_lights, pack_lights, reach};
+use self::light::{DISTANT, connect_lights, pack_lights, t_max};
 use self::materials::Appearances;
 use self::order::Ordered;
 use self::primitive::pack_shapes;
@@ -132,7 +132,7 @@ fn environment(scene: &Scene, around: &EnvironmentMap, share: f64) -> Environmen
         background: background.unwrap_or(scene.render.background).as_vec3(),
         light_weight: 1.0 / scene.render.light_samples.count as f32,
         radiance: environment.map_or(Vec3::ZERO, |environment| environment.color.as_vec3()),
-        reach: reach(scene.render.shadow_epsilon),
+        t_max: t_max(scene.render.shadow_epsilon),
         ..around.record(share)
     }
 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{BACKGROUND, ENVIRONMENT_BLOCKS, Environment, IMAGE_AROUND, NORMAL_BINS, UNSEEN_AROUND};
+use super::{BACKGROUND, ENVIRONMENT_BLOCKS, ENVIRONMENT_INVISIBLE, ENVIRONMENT_MAP, Environment, NORMAL_BINS};
 use wgray_scene::halves::linear;
 use wgray_scene::{self as scene, EnvironmentImage, Scene};
 
@@ -54,8 +54,8 @@ impl EnvironmentMap {
     pub fn bits(&self, scene: &Scene) -> u32 {
         let any = |test: fn(&scene::Environment) -> bool| scene.environment.as_ref().is_some_and(test);
         let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
-        bit(self.0.is_some(), IMAGE_AROUND)
-            | bit(any(|environment| !environment.visible), UNSEEN_AROUND)
+        bit(self.0.is_some(), ENVIRONMENT_MAP)
+            | bit(any(|environment| !environment.visible), ENVIRONMENT_INVISIBLE)
             | bit(any(|environment| environment.background.is_some()), BACKGROUND)
     }
 
@@ -380,7 +380,7 @@ fn write_table(mut rest: Vec<f64>, words: &mut Vec<u32>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::surroundings::normal_bin;
+    use crate::cpu::equirect::normal_bin;
 
     /// The probabilities that a table gives.
     fn probabilities(words: &[u32]) -> Vec<f64> {

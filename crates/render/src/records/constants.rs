@@ -27,10 +27,10 @@ constants! {
     /// [`Instance::shadows`]: some groups cast none.
     pub const SOME_SHADOWS: u32 = 1;
     /// Levels of nodes that a tree has at most.
-    pub const LEVELS: u32 = 32;
+    pub const BVH_MAX_DEPTH: u32 = 32;
     /// How much larger a mesh's boxes count, relative to the coordinates: 32 units of rounding, more than all that is
     /// computed of a ray and a triangle loses.
-    pub const PAD: f32 = 32.0 / 16_777_216.0;
+    pub const BOX_PAD: f32 = 32.0 / 16_777_216.0;
 
     /// [`Material::kind`]: Phong's reflection model.
     pub const PHONG: u32 = 0;
@@ -54,7 +54,7 @@ constants! {
     pub const PASSING_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
     /// Rows and columns of a table of [`Material::energy`], for each side.
     pub const ENERGY_SIZE: u32 = 32;
-    /// Lines of a table of [`Material::streaks`], by the direction along the surface.
+    /// Lines of a table of [`Material::aniso_table`], by the direction along the surface.
     pub const STREAK_LINES: u32 = 49;
     /// Its columns, by the cosine.
     pub const STREAK_COLUMNS: u32 = 48;
@@ -73,7 +73,7 @@ constants! {
     /// [`Material::alpha_mode`]: it is there for that share of the rays.
     pub const BLEND: u32 = 2;
     /// The most surfaces that a ray passes by their alpha.
-    pub const MOST_PASSED: u32 = 64;
+    pub const MAX_ALPHA_SKIPS: u32 = 64;
     /// The bits of the kinds of materials that mirror or refract, and do nothing else.
     pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
 
@@ -85,9 +85,9 @@ constants! {
     pub const ENVIRONMENT: u32 = KINDS + 3;
 
     /// In [`Specialization::surroundings`](super::Specialization::surroundings): an image surrounds the scene.
-    pub const IMAGE_AROUND: u32 = 1;
+    pub const ENVIRONMENT_MAP: u32 = 1;
     /// In [`Specialization::surroundings`](super::Specialization::surroundings): the camera does not see what surrounds the scene.
-    pub const UNSEEN_AROUND: u32 = 2;
+    pub const ENVIRONMENT_INVISIBLE: u32 = 2;
     /// In [`Specialization::surroundings`](super::Specialization::surroundings): the camera sees one colour in place of them.
     pub const BACKGROUND: u32 = 4;
     /// Blocks of an environment map's cells along a row or a column, at most; a power of two.
@@ -98,7 +98,7 @@ constants! {
     /// [`Light::kind`](super::Light::kind): a cone of light from one point.
     pub const SPOT: u32 = KINDS + 4;
     /// [`Material::hidden`]: the camera's rays go through its back.
-    pub const HIDDEN_BACK: u32 = 2;
+    pub const CULL_BACKFACE: u32 = 2;
     /// [`Material::vertex_colors`]: colours of vertices do nothing.
     pub const NO_COLORS: u32 = 0;
     /// [`Material::vertex_colors`]: they are factors of the base colour, and of what there is of the surface.
@@ -106,12 +106,12 @@ constants! {
     /// [`Material::vertex_colors`]: they are factors of the emission, and of what there is of the surface.
     pub const COLORS_OF_EMISSION: u32 = 2;
     /// The camera's rays go through so many surfaces that are hidden from it, at most; they see the next one.
-    pub const MOST_HIDDEN: u32 = 64;
+    pub const MAX_CAMERA_SKIPS: u32 = 64;
 
     /// Glass splits a path at the first so many bounces.
-    pub const SPLITS: u32 = 2;
+    pub const MAX_SPLIT_DEPTH: u32 = 2;
     /// A path so has at most so many ends.
-    pub const LEAVES: u32 = 4;
+    pub const MAX_PATH_LEAVES: u32 = 4;
 
     /// [`Texture::kind`]: two colours that alternate.
     pub const CHECKER: u32 = 0;
@@ -209,18 +209,18 @@ constants! {
     pub const SOBOL: u32 = 5;
 
     /// Bins between the centre and the radius of a reconstruction filter.
-    pub const BINS: u32 = 128;
+    pub const FILTER_BINS_MAX: u32 = 128;
 
     /// No distance of a hit is larger.
     pub const INFINITE_T: f32 = f32::MAX;
     /// The number of a primitive that is none.
     pub const NO_INDEX: u32 = u32::MAX;
     /// The instance and primitive of a ray's start that is on none.
-    pub const NOWHERE: UVec2 = UVec2::new(0, NO_INDEX);
+    pub const NO_PRIMITIVE: UVec2 = UVec2::new(0, NO_INDEX);
     /// Shadow rays are traced in blocks of so many, a bit of a word for each.
-    pub const BLOCK: u32 = 32;
+    pub const SAMPLE_BLOCK: u32 = 32;
 
     /// How many samples an estimate must rest on to allow a pixel as many samples again as its first look has, under adaptive
     /// sampling.
-    pub const EVIDENCE: f32 = 2.0;
+    pub const EFFECTIVE_SAMPLES_PER_DOUBLING: f32 = 2.0;
 }

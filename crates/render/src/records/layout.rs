@@ -50,7 +50,7 @@ records! {
         /// Radiance that comes from everywhere, under the integrator `path`.
         pub radiance: Vec3,
         /// Where shadow rays to a point of a surface end, as a multiple of the way.
-        pub reach: f32,
+        pub t_max: f32,
         /// Of the image that surrounds the scene, as all below and 0 where there is none: the image's direction to its middle.
         pub x: Vec3,
         /// Where its texels start among the scene's: three floats each, row by row from the upper edge, between rows of the poles' means.
@@ -171,10 +171,10 @@ records! {
         pub alpha_mode: u32,
         /// 1 where it is a thin sheet, else 0.
         pub thin: u32,
-        /// Of any kind: 1 where the camera's rays go through it, [`HIDDEN_BACK`] where they go through its back alone, else 0.
+        /// Of any kind: 1 where the camera's rays go through it, [`CULL_BACKFACE`] where they go through its back alone, else 0.
         pub hidden: u32,
         /// Of any kind with facets: the texel where the table of those that are rougher along one axis starts, plus one; 0 where there is none.
-        pub streaks: u32,
+        pub aniso_table: u32,
         /// What the colours of vertices are factors of: [`COLORS_OF_BASE`], [`COLORS_OF_EMISSION`], or [`NO_COLORS`].
         pub vertex_colors: u32,
     }
@@ -225,7 +225,7 @@ records! {
         /// The middle; the direction to a directional light.
         pub center: Vec3,
         /// Where shadow rays end, as a multiple of the way to the light's sample.
-        pub reach: f32,
+        pub t_max: f32,
         /// Half the first edge.
         pub u: Vec3,
         /// 1, or 0 if the center is a direction.
@@ -439,7 +439,7 @@ records! {
     }
 
     /// One dispatch's share of the work: a rectangle of pixels and a range of their samples.
-    pub struct Work {
+    pub struct DispatchParams {
         /// Its first pixel, in the picture.
         pub origin: UVec2,
         /// Its size in pixels.
@@ -451,6 +451,6 @@ records! {
         /// The first sample, and one past the last.
         pub samples: UVec2,
         /// The range of the loop that proves a pixel whole (`shaders/receipt.wgsl`).
-        pub proof: UVec2,
+        pub loop_probe: UVec2,
     }
 }

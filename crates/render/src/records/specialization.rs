@@ -15,7 +15,7 @@ macro_rules! specialization {
 
             /// Returns whether the scene has an environment map.
             pub fn has_environment_map(&self) -> bool {
-                self.surroundings & super::IMAGE_AROUND != 0
+                self.surroundings & super::ENVIRONMENT_MAP != 0
             }
 
             /// The overrides in WGSL.
@@ -33,7 +33,7 @@ specialization! {
     shadow_casters = "SHADOW_CASTERS",
     /// Bit i is set if primitives of kind i are in the scene's tree, the bit of [`INSTANCE`](super::INSTANCE) if instances of
     /// meshes are.
-    in_tree = "IN_TREE",
+    in_tree = "TLAS_KINDS",
     /// Bit 0 is set if there are lights with an area, bit 1 if there are others, bit 2 if there are spots among these.
     lights = "LIGHTS",
     /// 1 if the camera has a lens, else 0.
@@ -41,7 +41,7 @@ specialization! {
     /// 1 if the camera sees in all directions, else 0.
     panoramic = "PANORAMIC",
     /// 1 if anything is hidden from the camera, else 0.
-    hidden = "HIDDEN",
+    hidden = "CAMERA_INVISIBLE",
     /// How the samples of a pixel are laid out.
     pixel_pattern = "PIXEL_PATTERN",
     /// Side of their grid of cells; how many there are in patterns without cells.
@@ -57,7 +57,7 @@ specialization! {
     /// Bins of the filter's table; 0 if it is the box of the pixel.
     filter_bins = "FILTER_BINS",
     /// How many samples every pixel gets.
-    first_look = "FIRST_LOOK",
+    first_look = "PILOT_SAMPLES",
     /// The bits, as an f32, of the square of the error that adaptive sampling aims at.
     squared_error = "SQUARED_ERROR",
     /// Bits of the largest shininess if all are whole numbers, else 0.
@@ -91,11 +91,11 @@ specialization! {
     /// The lobes that [`PRINCIPLED`](super::PRINCIPLED) materials have, such as [`LOBE_COAT`](super::LOBE_COAT).
     lobes = "LOBES",
     /// 1 if rays pass any surface by its alpha, else 0.
-    sees_through = "SEES_THROUGH",
+    sees_through = "ALPHA_SURFACES",
     /// 1 if anything absorbs light that passes through it, else 0.
     absorption = "ABSORPTION",
     /// 1 if any surface shines, else 0.
-    shines = "SHINES",
+    shines = "EMISSIVE",
     /// 0 where no light can be sampled, 1 where there is one emitter, else 2.
     emitters = "EMITTERS",
     /// 1 where a tree is over what shines, else 0.
@@ -104,12 +104,12 @@ specialization! {
     emitter_kinds = "EMITTER_KINDS",
     /// 1 if a texture says how anything shines, else 0.
     emission_textures = "EMISSION_TEXTURES",
-    /// Any of [`IMAGE_AROUND`](super::IMAGE_AROUND), [`UNSEEN_AROUND`](super::UNSEEN_AROUND) and [`BACKGROUND`](super::BACKGROUND).
-    surroundings = "SURROUNDINGS",
+    /// Any of [`ENVIRONMENT_MAP`](super::IMAGE_AROUND), [`ENVIRONMENT_INVISIBLE`](super::UNSEEN_AROUND) and [`BACKGROUND`](super::BACKGROUND).
+    surroundings = "ENVIRONMENT_FLAGS",
     /// From which bounce on paths end at random.
     rr_depth = "RR_DEPTH",
     /// The bits, as an f32, of the largest component of a sample of indirect light; 0 for no such limit.
-    most_indirect = "MOST_INDIRECT",
+    most_indirect = "MAX_INDIRECT",
     /// 1 where the background is transparent, else 0.
     alpha = "ALPHA",
     /// 1 where the film has layers, else 0.

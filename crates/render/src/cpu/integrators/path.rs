@@ -3,39 +3,41 @@
 
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
-use crate::cpu::alpha::{ONWARD, is_there, is_veiled};
+use crate::cpu::alpha::{RAY_BSDF, alpha_accepts, is_occluded_alpha};
 use crate::cpu::dielectric::{dielectric_sample, transmittance};
-use crate::cpu::differential::{Arrival, Differential};
+use crate::cpu::differential::{Differential, HitDifferential};
 use crate::cpu::diffuse::diffuse_sample;
-use crate::cpu::emitter::{chosen_emitter, emitter_pdf, sample_emitter};
-use crate::cpu::environment::light_from_afar;
-use crate::cpu::geometry::{arrival_of, closest_hit, is_hidden, material_of, seen_path, spot_of, surface_of};
-use crate::cpu::light_choice::{Chosen, chosen_light, met_density};
+use crate::cpu::emitter::{emitter_pdf, sample_emitter, select_emitter};
+use crate::cpu::environment::environment_mis;
+use crate::cpu::geometry::{
+    closest_hit, fetch_hit_primitive, hit_differential, is_occluded, material_of, skip_camera_invisible, surface_of,
+};
+use crate::cpu::light_choice::{EmitterSelection, light_tree_pdf, light_tree_select};
 use crate::cpu::light_sample::power_heuristic;
 use crate::cpu::lobe::{LobeSample, vector_from_lobe, vector_to_lobe};
 use crate::cpu::math::{dot, max, min, normalize};
-use crate::cpu::mesh::Spot;
+use crate::cpu::mesh::HitPrimitive;
 use crate::cpu::metal::metal_fresnel;
 use crate::cpu::modified_phong::modified_phong_sample;
-use crate::cpu::path::{Path, mirrored_path, passed_path, reflected_path, refracted_path};
+use crate::cpu::path::{Path, mirrored_path, pass_through_path, reflected_path, refracted_path};
 use crate::cpu::pixel::{Layers, camera_sample};
 use crate::cpu::primitive::Tangents;
-use crate::cpu::principled::{Mixture, principled_sample};
+use crate::cpu::principled::{PrincipledLobes, principled_sample};
 use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::{hash4, unit_float};
 use crate::cpu::scattering::{
-    NO_MIXTURE, absorption_behind, albedo, bounded, facet_frame, facet_sample, facets_of, has_facets, has_inside,
-    is_delta, lets_light, lets_through, lit_normal, local_wo, mixture_at, plain_reflection, reflection, shaded_normal,
-    turned_over,
+    NO_MIXTURE, absorption_after, albedo, bounded, direction_allowed, facet_frame, facet_sample, facets_of, flipped,
+    has_facets, has_inside, is_delta, is_transmissive, lit_normal, local_wo, mixture_at, plain_reflection, reflection,
+    shaded_normal,
 };
 use crate::cpu::sequence::sobol_bits;
 use crate::cpu::surface::{Surface, largest};
-use crate::cpu::texture::appearance;
+use crate::cpu::texture::evaluate_material;
 use crate::cpu::thin::thin_reflectance;
 use crate::cpu::vertices::with_vertex_colors;
 use crate::records::{
-    BACKGROUND, DIFFUSE, EMITTER, GLASS, IMAGE_AROUND, INFINITE_T, INSTANCE, METAL, MOST_PASSED, Material, NO_INDEX,
-    NOWHERE, OPAQUE, PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN, UNSEEN_AROUND,
+    BACKGROUND, DIFFUSE, EMITTER, ENVIRONMENT_INVISIBLE, ENVIRONMENT_MAP, GLASS, INFINITE_T, INSTANCE, MAX_ALPHA_SKIPS,
+    METAL, Material, NO_INDEX, NO_PRIMITIVE, OPAQUE, PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,11 +51,11 @@ pub struct PathState {
     pub weight: f32,
     pub ended: bool,
     pub layers: Layers,
-    pub described: bool,
-    pub start: Vec3,
-    pub start_normal: Vec3,
-    pub way: f32,
-    pub passed: u32,
+    pub albedo_recorded: bool,
+    pub prev_position: Vec3,
+    pub prev_normal: Vec3,
+    pub skipped_distance: f32,
+    pub skips: u32,
 }
 
 #[inline(always)]
@@ -65,13 +67,13 @@ pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
-        left: NOWHERE,
-        wall: NOWHERE,
+        origin_prim: NO_PRIMITIVE,
+        inside_prim: NO_PRIMITIVE,
     };
-    let mut way = 0.0;
+    let mut skipped_distance = 0.0;
     if scene.specialization.hidden != 0 {
-        path = seen_path(scene, path);
-        way = dot(path.ray.origin - start.ray.origin, path.ray.direction);
+        path = skip_camera_invisible(scene, path);
+        skipped_distance = dot(path.ray.origin - start.ray.origin, path.ray.direction);
     }
     PathState {
         path,
@@ -83,11 +85,11 @@ pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
         weight: start.weight,
         ended: false,
         layers: Layers::default(),
-        described: false,
-        start: Vec3::ZERO,
-        start_normal: Vec3::ZERO,
-        way,
-        passed: 0,
+        albedo_recorded: false,
+        prev_position: Vec3::ZERO,
+        prev_normal: Vec3::ZERO,
+        skipped_distance,
+        skips: 0,
     }
 }
 
@@ -95,12 +97,12 @@ pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
 pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     let s = &scene.specialization;
     let path = state.path;
-    let hit = closest_hit(scene, path.ray, path.left, path.wall);
+    let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
     if hit.primitive == NO_INDEX {
         state.ended = true;
-        let shown = ((s.alpha == 0) & (s.surroundings & UNSEEN_AROUND == 0)) | (path.depth > 0);
-        let arriving = if s.surroundings & IMAGE_AROUND != 0 {
-            light_from_afar(scene, path.ray.direction, state.pdf, state.start_normal)
+        let shown = ((s.alpha == 0) & (s.surroundings & ENVIRONMENT_INVISIBLE == 0)) | (path.depth > 0);
+        let arriving = if s.surroundings & ENVIRONMENT_MAP != 0 {
+            environment_mis(scene, path.ray.direction, state.pdf, state.prev_normal)
         } else {
             scene.environment.radiance
         };
@@ -109,32 +111,32 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
             false => arriving,
         };
         let found = path.throughput * arriving;
-        return with_radiance(scene, state, found, shown, path.depth);
+        return add_radiance(scene, state, found, shown, path.depth);
     }
-    let spot = spot_of(scene, hit);
-    let mut surface = surface_of(scene, &spot, hit, path.ray);
-    let at = arrival_of(scene, &spot, hit, surface, path.ray, path.differential);
+    let prim = fetch_hit_primitive(scene, hit);
+    let mut surface = surface_of(scene, &prim, hit, path.ray);
+    let at = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
     let looked;
     let faceted;
     let (mut material, normal, coat_normal) = if (s.lookups == 0) & (s.vertex_colors == 0) {
         let normal = surface.shading_normal;
-        (material_of(scene, &spot), normal, normal)
+        (material_of(scene, &prim), normal, normal)
     } else {
-        let mut look = appearance(scene, &spot, hit, material_of(scene, &spot), surface, at, s.lookups);
+        let mut shading = evaluate_material(scene, &prim, hit, material_of(scene, &prim), surface, at, s.lookups);
         if s.vertex_colors != 0 {
-            look.material = with_vertex_colors(scene, &look.material, hit);
+            shading.material = with_vertex_colors(scene, &shading.material, hit);
         }
-        looked = bounded(look.material);
-        (&looked, look.normal, look.coat_normal)
+        looked = bounded(shading.material);
+        (&looked, shading.normal, shading.coat_normal)
     };
     if s.sees_through != 0
-        && !is_there(
+        && !alpha_accepts(
             scene,
             material,
             pixel,
             state.sample,
             path.depth,
-            ONWARD,
+            RAY_BSDF,
             hit,
             surface.side,
         )
@@ -144,13 +146,13 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     if s.absorption != 0 {
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
         let absorption = if inside { material.absorption } else { state.absorption };
-        state.path.throughput *= transmittance(absorption, hit.t + state.way);
+        state.path.throughput *= transmittance(absorption, hit.t + state.skipped_distance);
     }
     if s.shines != 0 {
-        with_emission(scene, state, &spot, hit, surface, material, true);
+        add_emission(scene, state, &prim, hit, surface, material, true);
     }
     surface.shading_normal = shaded_normal(surface, material, normal);
-    state.way = 0.0;
+    state.skipped_distance = 0.0;
     let mixed;
     let mixture = if material.kind == PRINCIPLED {
         let frame = facet_frame(scene, surface, material);
@@ -162,7 +164,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
         &NO_MIXTURE
     };
     if s.layers != 0 {
-        described(state, surface, material);
+        record_first_hit_layers(state, surface, material);
     }
     if (path.depth >= s.bounces) | (material.kind == EMITTER) {
         state.ended = true;
@@ -176,10 +178,10 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
         choices = decision_set(scene, UVec2::new(other_key.z, other_key.w), state.sample);
     }
     if is_delta(material) {
-        scattered_specularly(scene, state, surface, at, material, unit_float(choices.x));
+        sample_delta_bsdf(scene, state, surface, at, material, unit_float(choices.x));
     } else {
         if s.in_tree & (1 << INSTANCE) != 0 {
-            surface.start += surface.bulge;
+            surface.ray_origin += surface.terminator_offset;
         }
         if has_facets(material) {
             let frame = facet_frame(scene, surface, material);
@@ -193,23 +195,30 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
             if s.emitters > 1 {
                 bits = decision_set(scene, UVec2::new(other_key.x, other_key.y), state.sample);
             }
-            let mut chosen = Chosen {
-                emitter: chosen_emitter(scene, bits),
+            let mut chosen = EmitterSelection {
+                emitter: select_emitter(scene, bits),
                 density: 0.0,
             };
             if s.light_tree != 0 {
                 let normal = lit_normal(&surface, material);
                 let level_key = UVec2::new(other_key.x, other_key.y);
-                chosen = chosen_light(scene, chosen.emitter, surface.start, normal, level_key, state.sample);
+                chosen = light_tree_select(
+                    scene,
+                    chosen.emitter,
+                    surface.ray_origin,
+                    normal,
+                    level_key,
+                    state.sample,
+                );
             }
             let u = decision(scene, UVec2::new(key.x, key.y), state.sample);
-            with_light(scene, state, &spot, &surface, material, mixture, chosen, u, true, pixel);
+            add_direct_light(scene, state, &prim, &surface, material, mixture, chosen, u, true, pixel);
         }
         let u = decision(scene, UVec2::new(key.z, key.w), state.sample);
-        scattered(
+        sample_bsdf(
             scene,
             state,
-            &spot,
+            &prim,
             &surface,
             material,
             mixture,
@@ -257,7 +266,7 @@ pub fn decision(scene: &Packed, key: UVec2, sample: u32) -> Vec2 {
 }
 
 #[inline(always)]
-pub fn with_radiance(scene: &Packed, state: &mut PathState, found: Vec3, taken: bool, bounces: u32) {
+pub fn add_radiance(scene: &Packed, state: &mut PathState, found: Vec3, taken: bool, bounces: u32) {
     let s = &scene.specialization;
     let mut radiance = if taken { found } else { Vec3::ZERO };
     if s.most_indirect != 0 && bounces > 1 {
@@ -276,10 +285,10 @@ pub fn with_radiance(scene: &Packed, state: &mut PathState, found: Vec3, taken: 
 }
 
 #[inline(always)]
-pub fn with_emission(
+pub fn add_emission(
     scene: &Packed,
     state: &mut PathState,
-    spot: &Spot,
+    prim: &HitPrimitive,
     hit: Hit,
     surface: Surface,
     material: &Material,
@@ -294,53 +303,53 @@ pub fn with_emission(
     let mut weighs = (state.pdf > 0.0) & (scene.specialization.emitters != 0);
     let mut density = material.density;
     if scene.specialization.light_tree != 0 {
-        density = met_density(scene, hit, weighs, state.start, state.start_normal);
+        density = light_tree_pdf(scene, hit, weighs, state.prev_position, state.prev_normal);
         weighs &= density > 0.0;
     }
     if weighs {
         let mut ray = state.path.ray;
         let mut seen = hit;
         if scene.specialization.sees_through != 0 {
-            ray.origin -= ray.direction * state.way;
-            seen.t += state.way;
+            ray.origin -= ray.direction * state.skipped_distance;
+            seen.t += state.skipped_distance;
         }
-        let other = emitter_pdf(spot, seen, density, ray, surface.normal);
+        let other = emitter_pdf(prim, seen, density, ray, surface.normal);
         weight = power_heuristic(state.pdf, other);
     }
     let found = state.path.throughput * material.emission * weight;
-    with_radiance(scene, state, found, true, state.path.depth)
+    add_radiance(scene, state, found, true, state.path.depth)
 }
 
-pub fn past(scene: &Packed, state: &mut PathState, surface: Surface, at: Arrival, t: f32) {
-    state.path = passed_path(state.path, surface, at);
+pub fn past(scene: &Packed, state: &mut PathState, surface: Surface, at: HitDifferential, t: f32) {
+    state.path = pass_through_path(state.path, surface, at);
     if scene.specialization.hidden != 0 && state.path.depth == 0 {
         let start = state.path.ray;
-        state.path = seen_path(scene, state.path);
-        state.way += dot(state.path.ray.origin - start.origin, start.direction);
+        state.path = skip_camera_invisible(scene, state.path);
+        state.skipped_distance += dot(state.path.ray.origin - start.origin, start.direction);
     }
-    state.way += t;
-    state.passed += 1;
-    state.ended |= state.passed > MOST_PASSED;
+    state.skipped_distance += t;
+    state.skips += 1;
+    state.ended |= state.skips > MAX_ALPHA_SKIPS;
 }
 
 #[inline(always)]
-pub fn described(state: &mut PathState, surface: Surface, material: &Material) {
+pub fn record_first_hit_layers(state: &mut PathState, surface: Surface, material: &Material) {
     if state.path.depth == 0 {
         state.layers.emission.w = 1.0;
         state.layers.normal = (surface.shading_normal * surface.side).extend(0.0);
     }
-    if !state.described & !is_delta(material) {
+    if !state.albedo_recorded & !is_delta(material) {
         state.layers.albedo = (state.path.throughput * albedo(material)).extend(0.0);
-        state.described = true;
+        state.albedo_recorded = true;
     }
 }
 
 #[inline(always)]
-pub fn scattered_specularly(
+pub fn sample_delta_bsdf(
     scene: &Packed,
     state: &mut PathState,
     surface: Surface,
-    at: Arrival,
+    at: HitDifferential,
     material: &Material,
     random: f32,
 ) {
@@ -365,7 +374,7 @@ pub fn scattered_specularly(
             reflected_path(state.path, surface, at, state.path.throughput)
         }
     } else {
-        let mut onward = mirrored_path(state.path, surface, at, material).onward;
+        let mut onward = mirrored_path(state.path, surface, at, material).primary;
         if material.kind == METAL {
             let cosine = dot(surface.wo, surface.shading_normal);
             onward.throughput = state.path.throughput * metal_fresnel(material, cosine);
@@ -378,38 +387,38 @@ pub fn scattered_specularly(
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 #[inline(always)]
-pub fn with_light(
+pub fn add_direct_light(
     scene: &Packed,
     state: &mut PathState,
-    spot: &Spot,
+    prim: &HitPrimitive,
     surface: &Surface,
     material: &Material,
-    mixture: &Mixture,
-    chosen: Chosen,
+    mixture: &PrincipledLobes,
+    chosen: EmitterSelection,
     u: Vec2,
     wanted: bool,
     pixel: UVec2,
 ) {
-    let light = sample_emitter(scene, chosen, surface.start, lit_normal(surface, material), u);
-    let reflected = reflection(scene, spot, surface, material, mixture, normalize(light.to));
+    let light = sample_emitter(scene, chosen, surface.ray_origin, lit_normal(surface, material), u);
+    let reflected = reflection(scene, prim, surface, material, mixture, normalize(light.to));
     let mut found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
     let turned;
     let mut from_side = surface;
     let mut to = light.to;
     let mut absorption = state.absorption;
-    if lets_through(material) & (dot(surface.normal, to) < 0.0) {
-        turned = turned_over(scene, surface);
+    if is_transmissive(material) & (dot(surface.normal, to) < 0.0) {
+        turned = flipped(scene, surface);
         from_side = &turned;
         to = light.to
-            + if light.reach < 2.0 {
-                surface.start - from_side.start
+            + if light.t_max < 2.0 {
+                surface.ray_origin - from_side.ray_origin
             } else {
                 Vec3::ZERO
             };
-        absorption = absorption_behind(absorption, surface, material);
+        absorption = absorption_after(absorption, surface, material);
     }
     if scene.specialization.absorption != 0 {
-        found *= transmittance(absorption, light.reach * dot(light.to, light.to).sqrt());
+        found *= transmittance(absorption, light.t_max * dot(light.to, light.to).sqrt());
     }
     found *= if light.is_delta {
         1.0
@@ -420,23 +429,33 @@ pub fn with_light(
     let dark = !(wanted && most > 0.0 && most < INFINITE_T);
     if scene.specialization.sees_through != 0 {
         let bounce = state.path.depth + 1;
-        let (reach, goal) = (light.reach, light.primitive);
-        let veiled = is_veiled(scene, dark, from_side, to, reach, goal, pixel, state.sample, bounce);
-        return with_radiance(scene, state, found, !veiled, bounce);
+        let (t_max, target_prim) = (light.t_max, light.primitive);
+        let veiled = is_occluded_alpha(
+            scene,
+            dark,
+            from_side,
+            to,
+            t_max,
+            target_prim,
+            pixel,
+            state.sample,
+            bounce,
+        );
+        return add_radiance(scene, state, found, !veiled, bounce);
     }
-    let hidden = is_hidden(scene, dark, from_side, to, light.reach, light.primitive);
-    with_radiance(scene, state, found, !hidden, state.path.depth + 1)
+    let hidden = is_occluded(scene, dark, from_side, to, light.t_max, light.primitive);
+    add_radiance(scene, state, found, !hidden, state.path.depth + 1)
 }
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 #[inline(always)]
-pub fn scattered(
+pub fn sample_bsdf(
     scene: &Packed,
     state: &mut PathState,
-    spot: &Spot,
+    prim: &HitPrimitive,
     surface: &Surface,
     material: &Material,
-    mixture: &Mixture,
+    mixture: &PrincipledLobes,
     u: Vec2,
     random: f32,
 ) {
@@ -447,10 +466,10 @@ pub fn scattered(
         };
         let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
         let found = facet_sample(material, wo, u, random);
-        scattered_by_lobe(scene, state, spot, surface, material, found);
+        apply_lobe_sample(scene, state, prim, surface, material, found);
     } else if material.kind == PRINCIPLED {
         let found = principled_sample(mixture, local_wo(surface), u, random, scene.specialization.lobes);
-        scattered_by_lobe(scene, state, spot, surface, material, found);
+        apply_lobe_sample(scene, state, prim, surface, material, found);
     } else {
         let wi = if material.kind == PHONG {
             modified_phong_sample(material, surface.shading_normal, surface.wo, u, random)
@@ -458,7 +477,7 @@ pub fn scattered(
             diffuse_sample(surface.shading_normal, u)
         };
         let reflected = plain_reflection(surface, material, wi);
-        let value = if lets_light(scene, spot, surface, material, wi) {
+        let value = if direction_allowed(scene, prim, surface, material, wi) {
             reflected.value
         } else {
             Vec3::ZERO
@@ -466,31 +485,31 @@ pub fn scattered(
         let factor = value * if reflected.pdf > 0.0 { 1.0 / reflected.pdf } else { 0.0 };
         state.path = Path {
             ray: Ray {
-                origin: surface.start,
+                origin: surface.ray_origin,
                 direction: wi,
             },
             differential: Differential::default(),
             throughput: state.path.throughput * factor,
             depth: state.path.depth + 1,
             branch: 0,
-            left: surface.above,
-            wall: surface.below,
+            origin_prim: surface.exclude_front,
+            inside_prim: surface.exclude_back,
         };
         state.pdf = reflected.pdf;
     }
     if scene.specialization.light_tree != 0 {
-        state.start = surface.start;
+        state.prev_position = surface.ray_origin;
     }
-    if (scene.specialization.light_tree != 0) | (scene.specialization.surroundings & IMAGE_AROUND != 0) {
-        state.start_normal = lit_normal(surface, material);
+    if (scene.specialization.light_tree != 0) | (scene.specialization.surroundings & ENVIRONMENT_MAP != 0) {
+        state.prev_normal = lit_normal(surface, material);
     }
 }
 
 #[inline(always)]
-pub fn scattered_by_lobe(
+pub fn apply_lobe_sample(
     scene: &Packed,
     state: &mut PathState,
-    spot: &Spot,
+    prim: &HitPrimitive,
     surface: &Surface,
     material: &Material,
     found: LobeSample,
@@ -500,27 +519,27 @@ pub fn scattered_by_lobe(
         v: surface.dv,
     };
     let wi = normalize(vector_from_lobe(frame, surface.shading_normal, found.wi));
-    let lit = lets_light(scene, spot, surface, material, wi);
+    let lit = direction_allowed(scene, prim, surface, material, wi);
     let weight = if lit { found.weight } else { Vec3::ZERO };
     let turned;
     let mut from_side = surface;
     if found.wi.z < 0.0 {
-        turned = turned_over(scene, surface);
+        turned = flipped(scene, surface);
         from_side = &turned;
         state.eta2 = state.eta2 * found.eta * found.eta;
-        state.absorption = absorption_behind(state.absorption, surface, material);
+        state.absorption = absorption_after(state.absorption, surface, material);
     }
     state.path = Path {
         ray: Ray {
-            origin: from_side.start,
+            origin: from_side.ray_origin,
             direction: wi,
         },
         differential: Differential::default(),
         throughput: state.path.throughput * weight,
         depth: state.path.depth + 1,
         branch: 0,
-        left: from_side.above,
-        wall: from_side.below,
+        origin_prim: from_side.exclude_front,
+        inside_prim: from_side.exclude_back,
     };
     state.pdf = found.pdf;
 }

@@ -3,18 +3,24 @@
 use glam::{UVec2, Vec3};
 
 use crate::cpu::differential::Differential;
-use crate::cpu::geometry::{arrival_of, closest_hit, hidden_samples, material_of, seen_path, spot_of, surface_of};
+use crate::cpu::geometry::{
+    closest_hit, fetch_hit_primitive, hit_differential, material_of, occluded_samples, skip_camera_invisible,
+    surface_of,
+};
 use crate::cpu::light::{segments_to_light, spot_falloff};
-use crate::cpu::mesh::Spot;
-use crate::cpu::path::{Path, Scattered, glass_path, is_specular, mirrored_path, usable_normal};
-use crate::cpu::phong::{Lobes, phong_block, unlit_samples};
+use crate::cpu::mesh::HitPrimitive;
+use crate::cpu::path::{Path, SpecularSplit, glass_path, is_specular, mirrored_path, usable_normal};
+use crate::cpu::phong::{Lobes, phong_block, unlit_mask};
 use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::unit_float;
 use crate::cpu::sampling::{decision_bits, sample_key};
-use crate::cpu::shadow::Block;
+use crate::cpu::shadow::SampleBlock;
 use crate::cpu::surface::Surface;
-use crate::cpu::texture::appearance;
-use crate::records::{BLOCK, EMITTER, GRID, LEAVES, Light, MIRROR, Material, NO_INDEX, NOWHERE, Packed, SPLITS, SPOT};
+use crate::cpu::texture::evaluate_material;
+use crate::records::{
+    EMITTER, GRID, Light, MAX_PATH_LEAVES, MAX_SPLIT_DEPTH, MIRROR, Material, NO_INDEX, NO_PRIMITIVE, Packed,
+    SAMPLE_BLOCK, SPOT,
+};
 
 pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
     let bounces = scene.specialization.bounces;
@@ -24,41 +30,41 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
-        left: NOWHERE,
-        wall: NOWHERE,
+        origin_prim: NO_PRIMITIVE,
+        inside_prim: NO_PRIMITIVE,
     };
     if scene.specialization.hidden != 0 {
-        path = seen_path(scene, path);
+        path = skip_camera_invisible(scene, path);
     }
     if bounces == 0 {
-        let hit = closest_hit(scene, path.ray, path.left, path.wall);
+        let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
         if hit.primitive == NO_INDEX {
             return scene.environment.background;
         }
-        return radiance_from(scene, &spot_of(scene, hit), hit, path, pixel, sample);
+        return radiance_from(scene, &fetch_hit_primitive(scene, hit), hit, path, pixel, sample);
     }
     let mut sum = Vec3::ZERO;
-    let mut pending = [path; SPLITS as usize];
+    let mut pending = [path; MAX_SPLIT_DEPTH as usize];
     let mut waiting = 0;
-    for _ in 0..LEAVES {
+    for _ in 0..MAX_PATH_LEAVES {
         let mut seen = scene.environment.background;
         while path.depth <= bounces {
-            let hit = closest_hit(scene, path.ray, path.left, path.wall);
+            let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
             if hit.primitive == NO_INDEX {
                 break;
             }
-            let spot = spot_of(scene, hit);
-            if !is_specular(material_of(scene, &spot)) {
-                seen = radiance_from(scene, &spot, hit, path, pixel, sample);
+            let prim = fetch_hit_primitive(scene, hit);
+            if !is_specular(material_of(scene, &prim)) {
+                seen = radiance_from(scene, &prim, hit, path, pixel, sample);
                 break;
             }
             if path.depth == bounces {
                 break;
             }
-            let scattered = scatter(scene, &spot, hit, path, pixel, sample);
-            path = scattered.onward;
+            let scattered = scatter(scene, &prim, hit, path, pixel, sample);
+            path = scattered.primary;
             if scattered.splits {
-                pending[waiting] = scattered.other;
+                pending[waiting] = scattered.secondary;
                 waiting += 1;
             }
         }
@@ -72,41 +78,41 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
     sum
 }
 
-pub fn scatter(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Scattered {
-    let mut surface = surface_of(scene, spot, hit, path.ray);
-    let at = arrival_of(scene, spot, hit, surface, path.ray, path.differential);
+pub fn scatter(scene: &Packed, prim: &HitPrimitive, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> SpecularSplit {
+    let mut surface = surface_of(scene, prim, hit, path.ray);
+    let at = hit_differential(scene, prim, hit, surface, path.ray, path.differential);
     let lookups = scene.specialization.specular_lookups;
-    let look = appearance(scene, spot, hit, material_of(scene, spot), surface, at, lookups);
-    let material = &look.material;
-    surface.shading_normal = usable_normal(surface, look.normal);
+    let shading = evaluate_material(scene, prim, hit, material_of(scene, prim), surface, at, lookups);
+    let material = &shading.material;
+    surface.shading_normal = usable_normal(surface, shading.normal);
     if material.kind == MIRROR {
         return mirrored_path(path, surface, at, material);
     }
-    let bounce = path.depth * LEAVES + path.branch;
+    let bounce = path.depth * MAX_PATH_LEAVES + path.branch;
     let bits = decision_bits(pixel, scene.camera.seed, sample, bounce, NO_INDEX);
     glass_path(path, surface, at, material, unit_float(bits.x))
 }
 
-pub fn radiance_from(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Vec3 {
+pub fn radiance_from(scene: &Packed, prim: &HitPrimitive, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Vec3 {
     let s = &scene.specialization;
-    let plain = material_of(scene, spot);
+    let plain = material_of(scene, prim);
     if plain.kind == EMITTER {
         return plain.emission;
     }
-    let mut surface = surface_of(scene, spot, hit, path.ray);
-    let at = arrival_of(scene, spot, hit, surface, path.ray, path.differential);
-    let look = appearance(scene, spot, hit, plain, surface, at, s.lookups);
-    let material = &look.material;
-    surface.shading_normal = look.normal;
+    let mut surface = surface_of(scene, prim, hit, path.ray);
+    let at = hit_differential(scene, prim, hit, surface, path.ray, path.differential);
+    let shading = evaluate_material(scene, prim, hit, plain, surface, at, s.lookups);
+    let material = &shading.material;
+    surface.shading_normal = shading.normal;
     if !scene.bvh.instances.is_empty() {
-        surface.start += surface.bulge;
+        surface.ray_origin += surface.terminator_offset;
     }
     let mut sum = scene.environment.ambient * material.ambient;
     let (area_lights, delta_lights) = scene.lighting.lights.split_at(scene.counts.lights.x as usize);
     for light in area_lights {
         let (pattern, side, count) = (s.light_pattern, s.light_side, s.light_samples);
         let lobes = lobes_of_light(
-            scene, spot, &surface, material, light, pattern, side, count, pixel, sample,
+            scene, prim, &surface, material, light, pattern, side, count, pixel, sample,
         );
         sum += phong_radiance(material, light, lobes, scene.environment.light_weight);
     }
@@ -115,7 +121,7 @@ pub fn radiance_from(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: U
         if light.kind == SPOT {
             light.color *= spot_falloff(&light, light.center - surface.position);
         }
-        let lobes = lobes_of_light(scene, spot, &surface, material, &light, GRID, 1, 1, pixel, sample);
+        let lobes = lobes_of_light(scene, prim, &surface, material, &light, GRID, 1, 1, pixel, sample);
         sum += phong_radiance(material, &light, lobes, 1.0);
     }
     sum
@@ -124,7 +130,7 @@ pub fn radiance_from(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: U
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 pub fn lobes_of_light(
     scene: &Packed,
-    spot: &Spot,
+    prim: &HitPrimitive,
     surface: &Surface,
     material: &Material,
     light: &Light,
@@ -142,19 +148,19 @@ pub fn lobes_of_light(
     };
     let mut first = 0;
     while first < count {
-        let block = Block {
+        let block = SampleBlock {
             pattern,
             side,
             first,
-            count: BLOCK.min(count - first),
+            count: SAMPLE_BLOCK.min(count - first),
             group: sample,
             key,
         };
         let mut unlit = 0;
         if scene.specialization.in_tree != 0 {
-            unlit = unlit_samples(spot, surface, to, block);
+            unlit = unlit_mask(prim, surface, to, block);
         }
-        let hidden = hidden_samples(scene, surface, light, block, unlit);
+        let hidden = occluded_samples(scene, surface, light, block, unlit);
         lobes = phong_block(
             surface,
             material,
@@ -164,7 +170,7 @@ pub fn lobes_of_light(
             scene.specialization.exponent_bits,
             lobes,
         );
-        first += BLOCK;
+        first += SAMPLE_BLOCK;
     }
     lobes
 }

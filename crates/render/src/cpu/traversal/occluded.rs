@@ -45,9 +45,9 @@ struct Slope {
     inverse: [f32; 2],
 }
 
-/// See [`super::hidden`].
+/// See [`super::occluded`].
 #[inline(always)]
-pub fn hidden<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) -> u32 {
+pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) -> u32 {
     let o = segments.o.to_array();
     walk(
         simd,
@@ -63,7 +63,7 @@ pub fn hidden<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) ->
                     for i in bits_of(waiting) {
                         let (met, t) = four.met_by(simd, &line_at(lanes, i, &o, segments.pad));
                         for c in bits_of(met) {
-                            if t[c] > 0.0 && t[c] < segments.reach && triangles[c][3] != segments.skip {
+                            if t[c] > 0.0 && t[c] < segments.t_max && triangles[c][3] != segments.skip {
                                 waiting &= !(1 << i);
                             }
                         }
@@ -91,7 +91,7 @@ pub fn hidden<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) ->
     )
 }
 
-/// See [`super::hidden_items`].
+/// See [`super::occluded_items`].
 #[inline(always)]
 pub fn items<S: Simd>(
     simd: S,
@@ -109,7 +109,7 @@ pub fn items<S: Simd>(
         asked,
         #[inline(always)]
         |lanes, items, mask| {
-            let mut hidden = 0;
+            let mut occluded = 0;
             for item in items {
                 let Some(bounds) = boxes(item) else { continue };
                 let passing = in_lanes(
@@ -117,12 +117,12 @@ pub fn items<S: Simd>(
                     #[inline(always)]
                     |lanes| passing_box(simd, lanes, &o, segments, &bounds),
                 ) & mask
-                    & !hidden;
+                    & !occluded;
                 if passing != 0 {
-                    hidden |= visit(item, passing);
+                    occluded |= visit(item, passing);
                 }
             }
-            hidden
+            occluded
         },
     )
 }
@@ -167,7 +167,7 @@ fn walk<S: Simd>(
     let mut lanes = ArrayVec::new();
     let slopes = prepare(simd, segments, &mut lanes);
     let zero = f32x8::splat(simd, 0.0);
-    let reach = f32x8::splat(simd, segments.reach);
+    let t_max = f32x8::splat(simd, segments.t_max);
     let mut stack: ArrayVec<(u32, u32), STACK> = ArrayVec::new();
     stack.push((0, waiting));
     while let Some((number, mask)) = stack.pop() {
@@ -190,7 +190,7 @@ fn walk<S: Simd>(
         if mask.count_ones() <= FEW {
             for i in bits_of(mask) {
                 let inverse = &lanes[i / S::f32s::LEN].inverse;
-                let (mut near, mut far) = (zero, reach);
+                let (mut near, mut far) = (zero, t_max);
                 for k in 0..3 {
                     let inverse = inverse[k][i % S::f32s::LEN];
                     let (a, b) = (seen[0][k] * inverse, seen[1][k] * inverse);
@@ -210,7 +210,7 @@ fn walk<S: Simd>(
                 }
             }
         } else {
-            let (mut near, mut far) = (zero, reach);
+            let (mut near, mut far) = (zero, t_max);
             for k in 0..3 {
                 near = near.max(seen[0][k] * slopes[k].inverse[0]);
                 let second = seen[1][k] * slopes[k].inverse[1];
@@ -226,7 +226,7 @@ fn walk<S: Simd>(
                     & in_lanes(
                         &lanes,
                         #[inline(always)]
-                        |lanes| passing(simd, lanes, &slopes, &seen, c, segments.reach),
+                        |lanes| passing(simd, lanes, &slopes, &seen, c, segments.t_max),
                     );
                 any |= u32::from(children[c] != 0) << c;
             }
@@ -373,7 +373,7 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// Which of the segments pass the box of an item: `is_passed` of `slab.rs`.
+/// Which of the segments pass the box of an item: `interval_hits` of `slab.rs`.
 #[inline(always)]
 fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segments, bounds: &Aabb) -> u64 {
     let [near, far] = passage(
@@ -385,8 +385,8 @@ fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segm
         bounds.high.to_array(),
     );
     let zero = S::f32s::splat(simd, 0.0);
-    let reach = S::f32s::splat(simd, segments.reach);
-    (near.simd_le(far) & far.simd_ge(zero) & near.simd_le(reach)).to_bitmask()
+    let t_max = S::f32s::splat(simd, segments.t_max);
+    (near.simd_le(far) & far.simd_ge(zero) & near.simd_le(t_max)).to_bitmask()
 }
 
 /// From where to where the segments' lines are in a box: [`Line::slab`](super::Line::slab) for each.
@@ -411,11 +411,11 @@ fn passing<S: Simd>(
     slopes: &[Slope; 3],
     seen: &[[f32x8<S>; 3]; 2],
     child: usize,
-    reach: f32,
+    t_max: f32,
 ) -> u64 {
     let zero = S::f32s::splat(simd, 0.0);
     let mut near = zero;
-    let mut far = S::f32s::splat(simd, reach);
+    let mut far = S::f32s::splat(simd, t_max);
     for k in 0..3 {
         let a = lanes.inverse[k] * seen[0][k][child];
         let b = lanes.inverse[k] * seen[1][k][child];
@@ -472,6 +472,6 @@ fn triangle_hides<S: Simd>(
         & determinant.simd_ne(zero)
         & near.simd_le(far)
         & t.simd_gt(zero)
-        & t.simd_lt(S::f32s::splat(simd, segments.reach));
+        & t.simd_lt(S::f32s::splat(simd, segments.t_max));
     hit.to_bitmask()
 }

@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use super::{Directions, Level, Line, Mesh, Nearest, Segments, closest, hidden, hidden_items, leaves, levels};
+use super::{Directions, Level, Line, Mesh, Nearest, Segments, closest, leaves, levels, occluded, occluded_items};
 use crate::bvh::{Aabb, Tree, build};
 
 const NONE: Nearest = Nearest {
@@ -93,13 +93,13 @@ impl Scene {
         })
     }
 
-    /// [`hidden`] without a tree.
-    fn hidden(&self, segments: &Segments, asked: u32) -> u32 {
+    /// [`occluded`] without a tree.
+    fn occluded(&self, segments: &Segments, asked: u32) -> u32 {
         let mut bits = 0;
         for i in 0..segments.directions.count {
             let line = Line::new(segments.o, segments.directions.get(i), segments.pad);
             let hides = |triangle: &[u32; 4]| {
-                triangle[3] != segments.skip && self.t(triangle, &line).is_some_and(|t| t < segments.reach)
+                triangle[3] != segments.skip && self.t(triangle, &line).is_some_and(|t| t < segments.t_max)
             };
             bits |= u32::from(self.triangles.iter().any(hides)) << i;
         }
@@ -112,7 +112,7 @@ impl Scene {
 struct Seen {
     hits: u32,
     misses: u32,
-    hidden: u32,
+    occluded: u32,
     free: u32,
 }
 
@@ -170,17 +170,17 @@ fn compare(
             o,
             pad,
             directions: &Directions::new(&directions),
-            reach: if i % 2 == 0 { 1.0 } else { 1e30 },
+            t_max: if i % 2 == 0 { 1.0 } else { 1e30 },
             skip,
         };
         let there = (0..directions.len()).fold(0, |bits, i| bits | 1 << i);
         let asked = there & if i % 3 == 1 { random.bits() } else { !0 };
-        let right = scene.hidden(&segments, asked);
+        let right = scene.occluded(&segments, asked);
         for level in &levels {
-            let bits = hidden(*level, &scene.mesh(), &segments, asked);
+            let bits = occluded(*level, &scene.mesh(), &segments, asked);
             assert_eq!(bits, right, "{level:?} {segments:?}");
         }
-        seen.hidden += right.count_ones();
+        seen.occluded += right.count_ones();
         seen.free += (asked & !right).count_ones();
     }
     seen
@@ -205,7 +205,7 @@ fn soups() {
         let rays = 400_000 / (count + 100);
         let seen = compare(&scene, random, rays, |random| (random.vector() * 1.5, random.vector()));
         assert!(
-            seen.hits > 5 && seen.misses > 5 && seen.hidden > 50 && seen.free > 50,
+            seen.hits > 5 && seen.misses > 5 && seen.occluded > 50 && seen.free > 50,
             "{seen:?}"
         );
     }
@@ -220,12 +220,12 @@ fn nothing_at_all() {
         o: Vec3::ZERO,
         pad: 0.0,
         directions: &Directions::new(&[Vec3::X, Vec3::Y]),
-        reach: 1.0,
+        t_max: 1.0,
         skip: u32::MAX,
     };
-    assert_eq!(hidden(Level::new(), &scene.mesh(), &segments, 3), 0);
+    assert_eq!(occluded(Level::new(), &scene.mesh(), &segments, 3), 0);
     let scene = soup(&mut Random(2), 10, 1.0);
-    assert_eq!(hidden(Level::new(), &scene.mesh(), &segments, 0), 0);
+    assert_eq!(occluded(Level::new(), &scene.mesh(), &segments, 0), 0);
 }
 
 /// A grid of squares in the plane z = 0, or rather a step that rises by `slope` a square, each of two triangles.
@@ -265,7 +265,7 @@ fn edges_and_corners_of_a_grid() {
             }
         });
         assert!(
-            seen.hits > 20 && seen.misses > 20 && seen.hidden > 20 && seen.free > 20,
+            seen.hits > 20 && seen.misses > 20 && seen.occluded > 20 && seen.free > 20,
             "{seen:?}"
         );
     }
@@ -310,7 +310,7 @@ fn degenerate_triangles() {
         (from, any[random.below(count)] - from * [1.0, 0.0][random.below(2)])
     });
     assert!(
-        seen.hits > 20 && seen.misses > 20 && seen.hidden > 20 && seen.free > 20,
+        seen.hits > 20 && seen.misses > 20 && seen.occluded > 20 && seen.free > 20,
         "{seen:?}"
     );
 }
@@ -346,7 +346,7 @@ fn huge_and_tiny() {
         let from = random.vector() * 2.0 + [Vec3::ZERO, Vec3::splat(1000.0)][random.below(2)];
         (from, random.vector())
     });
-    assert!(seen.hits > 20 && seen.hidden > 20 && seen.free > 20, "{seen:?}");
+    assert!(seen.hits > 20 && seen.occluded > 20 && seen.free > 20, "{seen:?}");
 }
 
 #[test]
@@ -364,7 +364,7 @@ fn directions_with_zeros() {
         )
     });
     assert!(
-        seen.hits > 20 && seen.misses > 20 && seen.hidden > 20 && seen.free > 20,
+        seen.hits > 20 && seen.misses > 20 && seen.occluded > 20 && seen.free > 20,
         "{seen:?}"
     );
 }
@@ -398,7 +398,7 @@ fn leaves_are_visited_until_the_limit() {
                 o,
                 pad: 0.0,
                 directions: &Directions::new(&directions),
-                reach: 1.0,
+                t_max: 1.0,
                 skip: u32::MAX,
             };
             let asked = random.bits();
@@ -407,18 +407,18 @@ fn leaves_are_visited_until_the_limit() {
                 let corners = [0, 1, 2].map(|k| scene.vertices[scene.triangles[i][k] as usize]);
                 Some(Aabb::around(&corners.map(|v| Vec3::new(v[0], v[1], v[2]))))
             };
-            let bits = hidden_items(level, &scene.tree.nodes, &segments, asked, bounds, |item, some| {
+            let bits = occluded_items(level, &scene.tree.nodes, &segments, asked, bounds, |item, some| {
                 assert_eq!(some & !asked, 0);
                 visits += 1;
-                let mut hidden = 0;
+                let mut occluded = 0;
                 for (i, d) in directions.iter().enumerate().filter(|(i, _)| some >> i & 1 == 1) {
                     let line = Line::new(o, *d, 0.0);
                     let hides = scene.t(&scene.triangles[item], &line).is_some_and(|t| t < 1.0);
-                    hidden |= u32::from(hides) << i;
+                    occluded |= u32::from(hides) << i;
                 }
-                hidden
+                occluded
             });
-            assert_eq!(bits, scene.hidden(&segments, asked));
+            assert_eq!(bits, scene.occluded(&segments, asked));
             assert!(visits < 200, "{visits} visits");
         }
     }

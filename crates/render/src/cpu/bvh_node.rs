@@ -1,8 +1,8 @@
-//! Twin of `shaders/node.wgsl`: a node of a tree of boxes, with eight children.
+//! Twin of `shaders/bvh_node.wgsl`: a node of a tree of boxes, with eight children.
 
 use glam::{UVec2, UVec3, Vec3, Vec4};
 
-use super::slab::{Fan, Slabs};
+use super::slab::{RayInterval, Slabs};
 use crate::records::{INFINITE_T, Node};
 
 pub fn steps(word: u32) -> Vec4 {
@@ -25,7 +25,7 @@ pub fn passed_bits(near: Vec4, far: Vec4, limit: f32) -> u32 {
     (near.cmple(far) & far.cmpge(Vec4::ZERO) & near.cmple(Vec4::splat(limit))).bitmask()
 }
 
-pub fn children_passed(node: &Node, s: Slabs, limit: f32) -> u32 {
+pub fn children_hit(node: &Node, s: Slabs, limit: f32) -> u32 {
     let first = four_passed(
         node,
         UVec3::new(node.low_x.x, node.low_y.x, node.low_z.x),
@@ -64,7 +64,7 @@ pub fn four_passed(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -
     passed_bits(near, far, limit)
 }
 
-pub fn children_in_fan(node: &Node, f: Fan, limit: f32) -> u32 {
+pub fn children_in_interval(node: &Node, f: RayInterval, limit: f32) -> u32 {
     let first = four_in_fan(
         node,
         UVec3::new(node.low_x.x, node.low_y.x, node.low_z.x),
@@ -82,7 +82,7 @@ pub fn children_in_fan(node: &Node, f: Fan, limit: f32) -> u32 {
     first | (second << 4)
 }
 
-pub fn four_in_fan(node: &Node, low: UVec3, high: UVec3, f: Fan, limit: f32) -> u32 {
+pub fn four_in_fan(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: f32) -> u32 {
     let x = step_length(node, 0);
     let y = step_length(node, 1);
     let z = step_length(node, 2);

@@ -25,8 +25,8 @@ fn passed_bits(near: vec4f, far: vec4f, limit: f32) -> u32 {
     return select(0u, 1u, passed.x) | select(0u, 2u, passed.y) | select(0u, 4u, passed.z) | select(0u, 8u, passed.w);
 }
 
-// Bit i is set where the ray passes the box of child i, as `box_passage` says.
-fn children_passed(node: Node, s: Slabs, limit: f32) -> u32 {
+// Bit i is set where the ray passes the box of child i, as `box_interval` says.
+fn children_hit(node: Node, s: Slabs, limit: f32) -> u32 {
     let first = four_passed(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
                             vec3u(node.high_x.x, node.high_y.x, node.high_z.x), s, limit);
     let second = four_passed(node, vec3u(node.low_x.y, node.low_y.y, node.low_z.y),
@@ -49,8 +49,8 @@ fn four_passed(node: Node, low: vec3u, high: vec3u, s: Slabs, limit: f32) -> u32
     return passed_bits(near, far, limit);
 }
 
-// Bit i is set where any ray of the fan may pass the box of child i, as `fan_passage` says.
-fn children_in_fan(node: Node, f: Fan, limit: f32) -> u32 {
+// Bit i is set where any ray of the fan may pass the box of child i, as `ray_interval_box` says.
+fn children_in_interval(node: Node, f: RayInterval, limit: f32) -> u32 {
     let first = four_in_fan(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
                             vec3u(node.high_x.x, node.high_y.x, node.high_z.x), f, limit);
     let second = four_in_fan(node, vec3u(node.low_x.y, node.low_y.y, node.low_z.y),
@@ -58,7 +58,7 @@ fn children_in_fan(node: Node, f: Fan, limit: f32) -> u32 {
     return first | (second << 4u);
 }
 
-fn four_in_fan(node: Node, low: vec3u, high: vec3u, f: Fan, limit: f32) -> u32 {
+fn four_in_fan(node: Node, low: vec3u, high: vec3u, f: RayInterval, limit: f32) -> u32 {
     let x = step_length(node, 0u);
     let y = step_length(node, 1u);
     let z = step_length(node, 2u);

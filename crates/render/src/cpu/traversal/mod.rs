@@ -12,8 +12,8 @@
 
 mod closest;
 mod four;
-mod hidden;
 mod line;
+mod occluded;
 
 use std::ops::Range;
 
@@ -58,9 +58,9 @@ pub fn closest(level: Level, mesh: &Mesh, line: &Line, start: f32, skip: u32, be
     dispatch!(level, simd => closest::closest(simd, mesh, line, start, skip, best))
 }
 
-/// Whether a ray meets any triangle before `reach` lengths of its direction, but for the one with the number `skip`.
-pub fn any(level: Level, mesh: &Mesh, line: &Line, skip: u32, reach: f32) -> bool {
-    dispatch!(level, simd => closest::any(simd, mesh, line, skip, reach))
+/// Whether a ray meets any triangle before `t_max` lengths of its direction, but for the one with the number `skip`.
+pub fn any(level: Level, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) -> bool {
+    dispatch!(level, simd => closest::any(simd, mesh, line, skip, t_max))
 }
 
 /// Visits the leaves of a tree that a ray meets before `limit`, nearly in the order in which it does: `visit` is given a range of
@@ -119,20 +119,20 @@ pub struct Segments<'a> {
     /// From the point to the other ends.
     pub directions: &'a Directions,
     /// Triangles at so many lengths of the direction, or beyond, hide nothing.
-    pub reach: f32,
+    pub t_max: f32,
     /// The number of a triangle that hides nothing.
     pub skip: u32,
 }
 
 /// Which of some segments are hidden by a triangle, a bit for each; only those whose bits are in `asked`.
-pub fn hidden(level: Level, mesh: &Mesh, segments: &Segments, asked: u32) -> u32 {
-    dispatch!(level, simd => hidden::hidden(simd, mesh, segments, asked))
+pub fn occluded(level: Level, mesh: &Mesh, segments: &Segments, asked: u32) -> u32 {
+    dispatch!(level, simd => occluded::occluded(simd, mesh, segments, asked))
 }
 
 /// Visits the items below a tree whose boxes any of some segments pass: `boxes` gives the box of an item, or nothing if it
 /// hides nothing; `visit` is given the item and the segments that pass its box, and says which of these are hidden. Says which of
 /// all are.
-pub fn hidden_items(
+pub fn occluded_items(
     level: Level,
     nodes: &[Node],
     segments: &Segments,
@@ -140,7 +140,7 @@ pub fn hidden_items(
     boxes: impl Fn(usize) -> Option<Aabb>,
     visit: impl FnMut(usize, u32) -> u32,
 ) -> u32 {
-    dispatch!(level, simd => hidden::items(simd, nodes, segments, asked, boxes, visit))
+    dispatch!(level, simd => occluded::items(simd, nodes, segments, asked, boxes, visit))
 }
 
 /// All levels of instructions that this machine has.

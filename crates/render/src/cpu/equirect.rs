@@ -1,4 +1,4 @@
-//! Twin of `shaders/surroundings.wgsl`: directions around a scene, and the cells of the image that surrounds it.
+//! Twin of `shaders/equirect.wgsl`: directions around a scene, and the cells of the image that surrounds it.
 
 use glam::{Vec2, Vec3};
 
@@ -6,14 +6,14 @@ use super::math::{atan2, floor, max, min, sine};
 use crate::records::NORMAL_BINS;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MapCell {
+pub struct EnvironmentCell {
     pub column: u32,
     pub row: u32,
     pub x: f32,
     pub y: f32,
 }
 
-pub fn cell_towards(d: Vec3, width: u32, height: u32) -> MapCell {
+pub fn cell_towards(d: Vec3, width: u32, height: u32) -> EnvironmentCell {
     let u = (0.5 - atan2(d.y, d.x) * 0.159_154_94) * width as f32 - 0.5;
     let v = atan2((d.x * d.x + d.y * d.y).sqrt(), d.z) * std::f32::consts::FRAC_1_PI * height as f32 + 0.5;
     let column = floor(u);
@@ -29,7 +29,7 @@ pub fn cell_towards(d: Vec3, width: u32, height: u32) -> MapCell {
         at
     };
     let inside = min(max(y, 0.0), 1.0);
-    MapCell {
+    EnvironmentCell {
         column: if column >= 0.0 { column } else { width as f32 - 1.0 } as u32,
         row: row as u32,
         x: u - column,

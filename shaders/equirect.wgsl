@@ -2,7 +2,7 @@
 // towards -x, its upper edge towards +z; a cell lies between the centres of four texels, or of two and a pole.
 
 // A cell: of `width` a row, and one row more than the image has.
-struct MapCell {
+struct EnvironmentCell {
     column: u32,
     row: u32,
     x: f32,                // where in it, 0 to 1
@@ -10,7 +10,7 @@ struct MapCell {
 }
 
 // The cell that a direction points at.
-fn cell_towards(d: vec3f, width: u32, height: u32) -> MapCell {
+fn cell_towards(d: vec3f, width: u32, height: u32) -> EnvironmentCell {
     let u = (0.5 - atan2(d.y, d.x) * 0.15915494) * f32(width) - 0.5;
     let v = atan2(sqrt(d.x * d.x + d.y * d.y), d.z) * 0.31830987 * f32(height) + 0.5;
     let column = floor(u);
@@ -21,7 +21,7 @@ fn cell_towards(d: vec3f, width: u32, height: u32) -> MapCell {
     let last = row == f32(height);
     let y = select(select(at, 2.0 * at, last), 2.0 * at - 1.0, first);
     let inside = min(max(y, 0.0), 1.0);
-    return MapCell(u32(select(f32(width) - 1.0, column, column >= 0.0)), u32(row), u - column, inside);
+    return EnvironmentCell(u32(select(f32(width) - 1.0, column, column >= 0.0)), u32(row), u - column, inside);
 }
 
 // The column to the right of one.

@@ -56,13 +56,13 @@ pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32
 
 /// See [`super::any`].
 #[inline(always)]
-pub fn any<S: Simd>(simd: S, mesh: &Mesh, line: &Line, skip: u32, reach: f32) -> bool {
+pub fn any<S: Simd>(simd: S, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) -> bool {
     let mut found = false;
     leaves(
         simd,
         mesh.nodes,
         line,
-        reach,
+        t_max,
         #[inline(always)]
         |items, limit| {
             for triangles in mesh.triangles[items].chunks(4) {
@@ -70,7 +70,7 @@ pub fn any<S: Simd>(simd: S, mesh: &Mesh, line: &Line, skip: u32, reach: f32) ->
                 while met != 0 {
                     let i = met.trailing_zeros() as usize;
                     met &= met - 1;
-                    found |= t[i] > 0.0 && t[i] < reach && triangles[i][3] != skip;
+                    found |= t[i] > 0.0 && t[i] < t_max && triangles[i][3] != skip;
                 }
             }
             if found { f32::NEG_INFINITY } else { limit }

@@ -3,24 +3,24 @@
 
 // Children of one node that wait for their visit: x is where the node's children start, bits 0 to 7 of y which slots are nodes,
 // bits 8 to 15 which of them wait, in the order of visits.
-struct Walk {
+struct TraversalStack {
     octant: u32,
     depth: u32,
-    waiting: array<vec2u, LEVELS>,
+    waiting: array<vec2u, BVH_MAX_DEPTH>,
 }
 
 // Outside of functions, where they are not set to zero for each ray: that took software Vulkan a fifth of the time.
-var<private> items_walk: Walk;
-var<private> mesh_walk: Walk;
+var<private> items_walk: TraversalStack;
+var<private> mesh_walk: TraversalStack;
 
-fn start_walk(walk: ptr<private, Walk>, octant: u32) {
+fn traversal_begin(walk: ptr<private, TraversalStack>, octant: u32) {
     (*walk).octant = octant;
     (*walk).depth = 1u;
     (*walk).waiting[0] = vec2u(0u, 1u | (256u << octant)); // the root, as the only child
 }
 
 // The number, in its tree, of the next node to visit. There is one.
-fn next_node(walk: ptr<private, Walk>) -> u32 {
+fn pop_node(walk: ptr<private, TraversalStack>) -> u32 {
     let top = (*walk).depth - 1u;
     let group = (*walk).waiting[top];
     let place = firstTrailingBit(group.y >> 8u);
@@ -32,7 +32,7 @@ fn next_node(walk: ptr<private, Walk>) -> u32 {
 }
 
 // The children of a node wait that are nodes and were passed; returned are those that are leaves.
-fn children_wait(walk: ptr<private, Walk>, node: Node, passed: u32) -> u32 {
+fn push_children(walk: ptr<private, TraversalStack>, node: Node, passed: u32) -> u32 {
     let inner = node.scales >> 24u;
     let waiting = in_order(passed & inner, (*walk).octant);
     if waiting != 0u {
@@ -48,49 +48,49 @@ fn item_pad(origin: vec3f) -> f32 {
 }
 
 // The nearest hit of the scene's tree, if it is nearer than `before`.
-fn closest_in_tree(before: Hit, ray: Ray, left: vec2u, wall: vec2u) -> Hit {
+fn closest_in_tree(before: Hit, ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     var hit = before;
     let s = slabs(ray.origin, ray.direction, item_pad(ray.origin));
-    start_walk(&items_walk, octant_of(ray.direction));
+    traversal_begin(&items_walk, octant_of(ray.direction));
     while items_walk.depth > 0u {
-        let node = load_node(5u * next_node(&items_walk));
-        var leaves = children_wait(&items_walk, node, children_passed(node, s, hit.t));
+        let node = load_node(5u * pop_node(&items_walk));
+        var leaves = push_children(&items_walk, node, children_hit(node, s, hit.t));
         while leaves != 0u {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
             for (var k = 0u; k < items.y; k++) {
-                hit = closest_of_item(hit, load_item(items.x + k), ray, s, left, wall);
+                hit = closest_of_item(hit, load_item(items.x + k), ray, s, origin_prim, inside_prim);
             }
         }
     }
     return hit;
 }
 
-fn closest_of_item(before: Hit, item: Item, ray: Ray, s: Slabs, left: vec2u, wall: vec2u) -> Hit {
+fn closest_of_item(before: Hit, item: Item, ray: Ray, s: Slabs, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     var hit = before;
-    let passage = box_passage(item.low, item.high, s);
-    if !is_passed(passage, hit.t) {
+    let passage = box_interval(item.low, item.high, s);
+    if !interval_hits(passage, hit.t) {
         return hit;
     }
     // A loop where an `if` would do: software Vulkan skips it.
     for (var once = has_kind(item, INSTANCE); once; once = false) {
-        hit = closest_of_mesh(hit, item.index, ray, max(passage.x, 0.0), left);
+        hit = closest_of_mesh(hit, item.index, ray, max(passage.x, 0.0), origin_prim);
     }
-    return closest_of_primitive_item(hit, item, ray, passage.x, left, wall);
+    return closest_of_primitive_item(hit, item, ray, passage.x, origin_prim, inside_prim);
 }
 
 // Whether an item is of a kind; false without a look at it where no item of the scene is.
 fn has_kind(item: Item, kind: u32) -> bool {
-    if (IN_TREE & (1u << kind)) == 0u {
+    if (TLAS_KINDS & (1u << kind)) == 0u {
         return false;
     }
     return (item.kind & 0xffu) == kind;
 }
 
 // The hit on primitive i, no nearer than its box.
-fn hit_by_itself(kind: u32, i: u32, ray: Ray, near: f32, left: vec2u, wall: vec2u) -> Hit {
-    let t = max(intersect(kind, primitives[i], i == by_itself(wall), ray, INFINITE_T), near);
-    return Hit(select(INFINITE_T, t, i != by_itself(left)), 0u, i, 0u, vec2f(0.0));
+fn hit_by_itself(kind: u32, i: u32, ray: Ray, near: f32, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
+    let t = max(intersect(kind, primitives[i], i == by_itself(inside_prim), ray, INFINITE_T), near);
+    return Hit(select(INFINITE_T, t, i != by_itself(origin_prim)), 0u, i, 0u, vec2f(0.0));
 }
 
 // How far beyond `start` what is nearer than t can be: more than t - start by what the sum of both may be rounded.
@@ -99,17 +99,17 @@ fn limit_from(start: f32, t: f32) -> f32 {
 }
 
 // Of the triangles of instance `number`. The ray is looked at from `start` on: so its origin is near the mesh.
-fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, left: vec2u) -> Hit {
+fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, origin_prim: vec2u) -> Hit {
     var hit = before;
     let i = load_instance(number);
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
     let s = slabs(origin, direction, mesh_pad(i, origin));
     let shear = shear_of(direction);
-    start_walk(&mesh_walk, octant_of(direction));
+    traversal_begin(&mesh_walk, octant_of(direction));
     while mesh_walk.depth > 0u {
-        let node = load_node(i.nodes + 5u * next_node(&mesh_walk));
-        var leaves = children_wait(&mesh_walk, node, children_passed(node, s, limit_from(start, hit.t)));
+        let node = load_node(i.nodes + 5u * pop_node(&mesh_walk));
+        var leaves = push_children(&mesh_walk, node, children_hit(node, s, limit_from(start, hit.t)));
         while leaves != 0u {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -119,7 +119,7 @@ fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, left: vec2u) 
                 let found = triangle_crossing(load_position(i, corners.x), load_position(i, corners.y),
                                               load_position(i, corners.z), origin, shear, s);
                 let t = start + max(found.t, 0.0);
-                let own = (left.x == number + 1u) & (left.y == corners.w);
+                let own = (origin_prim.x == number + 1u) & (origin_prim.y == corners.w);
                 let met = found.met & !own & (t > 0.0);
                 hit = nearer_hit(hit, Hit(select(INFINITE_T, t, met), number + 1u, corners.w, slot, found.barycentric));
             }
@@ -129,70 +129,70 @@ fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, left: vec2u) 
 }
 
 // Two shadow rays from one point: software Vulkan takes longer to load a node or a triangle than to test it.
-struct Two {
+struct RayPair {
     direction: array<vec3f, 2>,
     s: array<Slabs, 2>,
 }
 
-fn two_from(origin: vec3f, first: vec3f, second: vec3f, pad: f32) -> Two {
-    return Two(array(first, second), array(slabs(origin, first, pad), slabs(origin, second, pad)));
+fn ray_pair(origin: vec3f, first: vec3f, second: vec3f, pad: f32) -> RayPair {
+    return RayPair(array(first, second), array(slabs(origin, first, pad), slabs(origin, second, pad)));
 }
 
 // The children of a node whose boxes any of the two passes that are not hidden.
-fn children_passed_by(node: Node, two: Two, hidden: u32, reach: f32) -> u32 {
-    return children_passed(node, two.s[0], select(reach, -1.0, (hidden & 1u) != 0u))
-        | children_passed(node, two.s[1], select(reach, -1.0, (hidden & 2u) != 0u));
+fn children_hit_by_pair(node: Node, pair: RayPair, hidden: u32, t_max: f32) -> u32 {
+    return children_hit(node, pair.s[0], select(t_max, -1.0, (hidden & 1u) != 0u))
+        | children_hit(node, pair.s[1], select(t_max, -1.0, (hidden & 2u) != 0u));
 }
 
 // Bit i is set where an item of the tree hides sample i of the block from a surface, or the bit was set before.
-fn hidden_by_tree(before: u32, surface: Surface, light: Light, block: Block) -> u32 {
+fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlock) -> u32 {
     let all = select((1u << block.count) - 1u, 0xffffffffu, block.count >= 32u);
     var bits = before & all;
-    let to = segments_to_light(light, surface.start);
-    let pad = item_pad(surface.start);
+    let to = segments_to_light(light, surface.ray_origin);
+    let pad = item_pad(surface.ray_origin);
     // Most often no ray to the light comes near anything.
-    let fan = fan_to_light(surface.start, to, pad);
-    let some = children_in_fan(load_node(0u), fan, light.reach) != 0u;
+    let fan = interval_to_light(surface.ray_origin, to, pad);
+    let some = children_in_interval(load_node(0u), fan, light.t_max) != 0u;
     var wanted = select(0u, all & ~bits, some);
     while wanted != 0u {
         let first = firstTrailingBit(wanted);
         wanted &= wanted - 1u;
         let second = select(firstTrailingBit(wanted), first, wanted == 0u);
         wanted &= wanted - 1u;
-        let hidden = hidden_two(surface, to, light, block, vec2u(first, second), pad);
+        let hidden = occluded_pair(surface, to, light, block, vec2u(first, second), pad);
         bits |= ((hidden & 1u) << first) | ((hidden >> 1u) << second);
     }
     return bits;
 }
 
 // The fan of all shadow rays from a point to a light.
-fn fan_to_light(origin: vec3f, to: Segments, pad: f32) -> Fan {
-    return fan(origin, to.towards - abs(to.u) - abs(to.v), to.towards + abs(to.u) + abs(to.v), pad);
+fn interval_to_light(origin: vec3f, to: Segments, pad: f32) -> RayInterval {
+    return ray_interval(origin, to.towards - abs(to.u) - abs(to.v), to.towards + abs(to.u) + abs(to.v), pad);
 }
 
 // The vectors to two samples of a block.
-fn segments_to_two(to: Segments, block: Block, samples: vec2u) -> array<vec3f, 2> {
+fn segments_to_two(to: Segments, block: SampleBlock, samples: vec2u) -> array<vec3f, 2> {
     return array(segment(to, block_sample(block, samples.x)), segment(to, block_sample(block, samples.y)));
 }
 
 // Which of two samples of a block an item hides, as bits 0 and 1.
-fn hidden_two(surface: Surface, to: Segments, light: Light, block: Block, samples: vec2u, pad: f32) -> u32 {
+fn occluded_pair(surface: Surface, to: Segments, light: Light, block: SampleBlock, samples: vec2u, pad: f32) -> u32 {
     let directions = segments_to_two(to, block, samples);
-    let two = two_from(surface.start, directions[0], directions[1], pad);
+    let pair = ray_pair(surface.ray_origin, directions[0], directions[1], pad);
     var hidden = 0u;
-    start_walk(&items_walk, octant_of(directions[0]));
+    traversal_begin(&items_walk, octant_of(directions[0]));
     while items_walk.depth > 0u && hidden != 3u {
-        let node = load_node(5u * next_node(&items_walk));
-        var leaves = children_wait(&items_walk, node, children_passed_by(node, two, hidden, light.reach));
+        let node = load_node(5u * pop_node(&items_walk));
+        var leaves = push_children(&items_walk, node, children_hit_by_pair(node, pair, hidden, light.t_max));
         while leaves != 0u && hidden != 3u {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
             for (var k = 0u; k < items.y; k++) {
                 let item = load_item(items.x + k);
-                let passing = select(0u, 1u, is_passed(box_passage(item.low, item.high, two.s[0]), light.reach))
-                    | select(0u, 2u, is_passed(box_passage(item.low, item.high, two.s[1]), light.reach));
+                let passing = select(0u, 1u, interval_hits(box_interval(item.low, item.high, pair.s[0]), light.t_max))
+                    | select(0u, 2u, interval_hits(box_interval(item.low, item.high, pair.s[1]), light.t_max));
                 let may = select(0u, passing & ~hidden, (item.kind & CASTS_SHADOW) != 0u);
-                hidden |= hidden_by_item(item, may, surface, light, block, samples);
+                hidden |= occluded_by_item(item, may, surface, light, block, samples);
             }
         }
     }
@@ -200,42 +200,42 @@ fn hidden_two(surface: Surface, to: Segments, light: Light, block: Block, sample
 }
 
 // Of the two samples in `may`, those that an item hides.
-fn hidden_by_item(item: Item, may: u32, surface: Surface, light: Light, block: Block, samples: vec2u) -> u32 {
+fn occluded_by_item(item: Item, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
     var bits = 0u;
     for (var once = has_kind(item, INSTANCE) & (may != 0u); once; once = false) {
-        bits = may & hidden_by_mesh(item.index, may, surface, light, block, samples);
+        bits = may & occluded_by_mesh(item.index, may, surface, light, block, samples);
     }
     let i = item.index;
-    let p = surface.start;
-    let is_wall = i == by_itself(surface.below);
-    var other = select(may, 0u, i == by_itself(surface.above));
-    if (IN_TREE & ~(1u << INSTANCE)) == 0u {
+    let p = surface.ray_origin;
+    let is_inside = i == by_itself(surface.exclude_back);
+    var other = select(may, 0u, i == by_itself(surface.exclude_front));
+    if (TLAS_KINDS & ~(1u << INSTANCE)) == 0u {
         other = 0u;
     }
     for (; other != 0u; other &= other - 1u) {
         let sample = select(samples.y, samples.x, (other & 1u) != 0u);
-        let one = Block(block.pattern, block.side, block.first + sample, 1u, block.group, block.key);
-        let bit = hidden_by_primitive_item(item, p, is_wall, light, one);
+        let one = SampleBlock(block.pattern, block.side, block.first + sample, 1u, block.group, block.key);
+        let bit = occluded_by_primitive_item(item, p, is_inside, light, one);
         bits |= select(0u, other & (~other + 1u), bit != 0u);
     }
     return bits;
 }
 
 // Of the two samples in `may`, those that a triangle of instance `number` hides; not the triangle that the surface is of.
-fn hidden_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: Block, samples: vec2u) -> u32 {
+fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
     let i = load_instance(number);
-    let origin = point_to_mesh(i, surface.start);
-    let to = segments_to_light(light, surface.start);
+    let origin = point_to_mesh(i, surface.ray_origin);
+    let to = segments_to_light(light, surface.ray_origin);
     let to_mesh = Segments(vector_to_mesh(i, to.towards), vector_to_mesh(i, to.u), vector_to_mesh(i, to.v));
     let directions = segments_to_two(to_mesh, block, samples);
-    let two = two_from(origin, directions[0], directions[1], mesh_pad(i, origin));
+    let pair = ray_pair(origin, directions[0], directions[1], mesh_pad(i, origin));
     let first_shear = shear_of(directions[0]);
     let second_shear = shear_of(directions[1]);
     var hidden = 3u & ~may;
-    start_walk(&mesh_walk, octant_of(directions[0]));
+    traversal_begin(&mesh_walk, octant_of(directions[0]));
     while mesh_walk.depth > 0u && hidden != 3u {
-        let node = load_node(i.nodes + 5u * next_node(&mesh_walk));
-        var leaves = children_wait(&mesh_walk, node, children_passed_by(node, two, hidden, light.reach));
+        let node = load_node(i.nodes + 5u * pop_node(&mesh_walk));
+        var leaves = push_children(&mesh_walk, node, children_hit_by_pair(node, pair, hidden, light.t_max));
         while leaves != 0u && hidden != 3u {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -245,11 +245,11 @@ fn hidden_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: 
                 let v0 = load_position(i, corners.x);
                 let v1 = load_position(i, corners.y);
                 let v2 = load_position(i, corners.z);
-                let first = triangle_crossing(v0, v1, v2, origin, first_shear, two.s[0]);
-                let second = triangle_crossing(v0, v1, v2, origin, second_shear, two.s[1]);
-                let crosses = select(0u, 1u, first.met & (first.t > 0.0) & (first.t < light.reach))
-                    | select(0u, 2u, second.met & (second.t > 0.0) & (second.t < light.reach));
-                let own = all(surface.above == vec2u(number + 1u, corners.w));
+                let first = triangle_crossing(v0, v1, v2, origin, first_shear, pair.s[0]);
+                let second = triangle_crossing(v0, v1, v2, origin, second_shear, pair.s[1]);
+                let crosses = select(0u, 1u, first.met & (first.t > 0.0) & (first.t < light.t_max))
+                    | select(0u, 2u, second.met & (second.t > 0.0) & (second.t < light.t_max));
+                let own = all(surface.exclude_front == vec2u(number + 1u, corners.w));
                 hidden |= select(0u, crosses, !own & triangle_casts(i, slot));
             }
         }
@@ -257,22 +257,22 @@ fn hidden_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: 
     return hidden;
 }
 
-// Whether an item of the tree lies between a surface and `reach` times `to`, but for the primitive `goal`; or `before`.
-fn is_hidden_by_tree(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+// Whether an item of the tree lies between a surface and `t_max` times `to`, but for the primitive `target_prim`; or `before`.
+fn is_occluded_by_bvh(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     var hidden = before;
-    let s = slabs(surface.start, to, item_pad(surface.start));
-    start_walk(&items_walk, octant_of(to));
+    let s = slabs(surface.ray_origin, to, item_pad(surface.ray_origin));
+    traversal_begin(&items_walk, octant_of(to));
     while items_walk.depth > 0u && !hidden {
-        let node = load_node(5u * next_node(&items_walk));
-        var leaves = children_wait(&items_walk, node, children_passed(node, s, reach));
+        let node = load_node(5u * pop_node(&items_walk));
+        var leaves = push_children(&items_walk, node, children_hit(node, s, t_max));
         while leaves != 0u && !hidden {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
             for (var k = 0u; k < items.y && !hidden; k++) {
                 let item = load_item(items.x + k);
-                let passed = is_passed(box_passage(item.low, item.high, s), reach);
+                let passed = interval_hits(box_interval(item.low, item.high, s), t_max);
                 for (var once = passed & ((item.kind & CASTS_SHADOW) != 0u); once; once = false) {
-                    hidden = is_cut_by_item(item, surface, to, reach, goal);
+                    hidden = is_occluded_by_item(item, surface, to, t_max, target_prim);
                 }
             }
         }
@@ -280,27 +280,27 @@ fn is_hidden_by_tree(before: bool, surface: Surface, to: vec3f, reach: f32, goal
     return hidden;
 }
 
-fn is_cut_by_item(item: Item, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+fn is_occluded_by_item(item: Item, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     var cut = false;
     let i = item.index;
     for (var once = has_kind(item, INSTANCE); once; once = false) {
-        cut = is_cut_by_mesh(i, surface, to, reach);
+        cut = is_occluded_by_mesh(i, surface, to, t_max);
     }
-    return cut | is_cut_by_primitive_item(item, surface, to, reach, goal);
+    return cut | is_occluded_by_primitive_item(item, surface, to, t_max, target_prim);
 }
 
 // Of the triangles of instance `number`; not the one that the surface is of.
-fn is_cut_by_mesh(number: u32, surface: Surface, to: vec3f, reach: f32) -> bool {
+fn is_occluded_by_mesh(number: u32, surface: Surface, to: vec3f, t_max: f32) -> bool {
     let i = load_instance(number);
-    let origin = point_to_mesh(i, surface.start);
+    let origin = point_to_mesh(i, surface.ray_origin);
     let direction = vector_to_mesh(i, to);
     let s = slabs(origin, direction, mesh_pad(i, origin));
     let shear = shear_of(direction);
     var cut = false;
-    start_walk(&mesh_walk, octant_of(direction));
+    traversal_begin(&mesh_walk, octant_of(direction));
     while mesh_walk.depth > 0u && !cut {
-        let node = load_node(i.nodes + 5u * next_node(&mesh_walk));
-        var leaves = children_wait(&mesh_walk, node, children_passed(node, s, reach));
+        let node = load_node(i.nodes + 5u * pop_node(&mesh_walk));
+        var leaves = push_children(&mesh_walk, node, children_hit(node, s, t_max));
         while leaves != 0u && !cut {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -308,8 +308,8 @@ fn is_cut_by_mesh(number: u32, surface: Surface, to: vec3f, reach: f32) -> bool 
                 let corners = meshes[i.triangles + triangles.x + k];
                 let found = triangle_crossing(load_position(i, corners.x), load_position(i, corners.y),
                                               load_position(i, corners.z), origin, shear, s);
-                let own = all(surface.above == vec2u(number + 1u, corners.w));
-                cut |= found.met & !own & (found.t > 0.0) & (found.t < reach);
+                let own = all(surface.exclude_front == vec2u(number + 1u, corners.w));
+                cut |= found.met & !own & (found.t > 0.0) & (found.t < t_max);
             }
         }
     }

@@ -2,23 +2,23 @@
 // looked at: software Vulkan cannot skip a branch, but it leaves a loop as soon as none of its lanes goes on.
 
 // Bit i is set where a primitive of a kind, from `range.x` to before `range.y`, hides sample i of the block from a surface.
-fn hidden_by(kind: u32, range: vec2u, surface: Surface, cone: Cone, light: Light, block: Block) -> u32 {
+fn occluded_by(kind: u32, range: vec2u, surface: Surface, cone: Cone, light: Light, block: SampleBlock) -> u32 {
     var bits = 0u;
     for (var first = range.x; first < range.y; first += 32u) {
-        let own = by_itself(surface.above) - first;
+        let own = by_itself(surface.exclude_front) - first;
         var candidates = shadow_candidates(first, range.y, cone);
         candidates &= ~select(0u, 1u << (own & 31u), own < 32u);
         while candidates != 0u {
             let i = first + firstTrailingBit(candidates);
             candidates &= candidates - 1u;
-            bits |= shadow_bits(kind, load_blocker(kind, i), cone.apex, i == by_itself(surface.below), light, block);
+            bits |= occlusion_mask(kind, load_blocker(kind, i), cone.apex, i == by_itself(surface.exclude_back), light, block);
         }
     }
     return bits;
 }
 
-// Whether primitive i, which is q, cuts the way from a surface to `reach` times `to`.
-fn is_cut(kind: u32, q: Primitive, i: u32, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
-    let is_wall = i == by_itself(surface.below);
-    return (i != by_itself(surface.above)) & (i != goal) & cuts(kind, q, surface.start, is_wall, to, reach);
+// Whether primitive i, which is q, cuts the way from a surface to `t_max` times `to`.
+fn is_occluded_by_primitive(kind: u32, q: Primitive, i: u32, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
+    let is_inside = i == by_itself(surface.exclude_back);
+    return (i != by_itself(surface.exclude_front)) & (i != target_prim) & occludes_segment(kind, q, surface.ray_origin, is_inside, to, t_max);
 }

@@ -1,20 +1,20 @@
-//! The trees: what `shaders/tree.wgsl` finds, by walks of their own (`walk`).
+//! The trees: what `shaders/bvh.wgsl` finds, by walks of their own (`walk`).
 
 use bytemuck::cast_slice;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
 
 use super::geometry::triangle_casts;
 use super::light::{Segments, segments_to_light};
+use super::linear_primitives::is_occluded_by_primitive;
 use super::math::max;
 use super::mesh::{Crossing, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
 use super::primitive::intersect;
 use super::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
 use super::samples::{LEVEL, Samples};
-use super::shadow::{Block, shadow_bits};
-use super::slab::{Slabs, box_passage, is_passed, slabs};
+use super::shadow::{SampleBlock, occlusion_mask};
+use super::slab::{Slabs, box_interval, interval_hits, slabs};
 use super::surface::{Surface, largest};
-use super::traverse::is_cut;
-use super::walk::{self, Line, Nearest};
+use super::traversal::{self, Line, Nearest};
 use crate::bvh::{Aabb, Node};
 use crate::records::{
     CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Item, Light, NO_INDEX, Packed, PackedMesh, SOME_SHADOWS,
@@ -29,46 +29,54 @@ fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
 }
 
 /// The nearest hit of the scene's tree, if it is nearer than `before`.
-pub fn closest_in_tree(scene: &Packed, before: Hit, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
+pub fn closest_in_tree(scene: &Packed, before: Hit, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {
     let mut hit = before;
     let pad = item_pad(scene, ray.origin);
     let s = slabs(ray.origin, ray.direction, pad);
     if scene.bvh.items.len() <= FEW_ITEMS {
         for item in &scene.bvh.items {
-            hit = closest_of_item(scene, hit, item, ray, s, left, wall);
+            hit = closest_of_item(scene, hit, item, ray, s, origin_prim, inside_prim);
         }
         return hit;
     }
     let line = Line::new(ray.origin, ray.direction, pad);
     let nodes: &[Node] = cast_slice(&scene.bvh.nodes);
-    walk::leaves(*LEVEL, nodes, &line, hit.t, |items, _| {
+    traversal::leaves(*LEVEL, nodes, &line, hit.t, |items, _| {
         for item in &scene.bvh.items[items] {
-            hit = closest_of_item(scene, hit, item, ray, s, left, wall);
+            hit = closest_of_item(scene, hit, item, ray, s, origin_prim, inside_prim);
         }
         hit.t
     });
     hit
 }
 
-fn closest_of_item(scene: &Packed, before: Hit, item: &Item, ray: Ray, s: Slabs, left: UVec2, wall: UVec2) -> Hit {
-    let passage = box_passage(item.low, item.high, s);
-    if !is_passed(passage, before.t) {
+fn closest_of_item(
+    scene: &Packed,
+    before: Hit,
+    item: &Item,
+    ray: Ray,
+    s: Slabs,
+    origin_prim: UVec2,
+    inside_prim: UVec2,
+) -> Hit {
+    let passage = box_interval(item.low, item.high, s);
+    if !interval_hits(passage, before.t) {
         return before;
     }
     let i = item.index;
-    let is_wall = i == by_itself(wall);
+    let is_inside = i == by_itself(inside_prim);
     let t = match item.kind & 0xff {
-        INSTANCE => return closest_of_mesh(scene, before, i, ray, max(passage.x, 0.0), left),
+        INSTANCE => return closest_of_mesh(scene, before, i, ray, max(passage.x, 0.0), origin_prim),
         kind => with_primitive_kind!(kind, |kind| intersect(
             kind,
             &scene.primitives[i as usize],
-            is_wall,
+            is_inside,
             ray,
             INFINITE_T
         )),
     };
     let found = Hit {
-        t: if i == by_itself(left) {
+        t: if i == by_itself(origin_prim) {
             INFINITE_T
         } else {
             max(t, passage.x)
@@ -79,7 +87,7 @@ fn closest_of_item(scene: &Packed, before: Hit, item: &Item, ray: Ray, s: Slabs,
     nearer_hit(before, found)
 }
 
-fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f32, left: UVec2) -> Hit {
+fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f32, origin_prim: UVec2) -> Hit {
     let i = &scene.bvh.instances[number as usize];
     let packed = &*scene.bvh.meshes[i.mesh as usize];
     let direction = vector_to_mesh(i, ray.direction);
@@ -91,9 +99,13 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
         number: if number + 1 < before.instance { NO_INDEX } else { 0 },
         slot: NO_INDEX,
     };
-    let skip = if left.x == number + 1 { left.y } else { NO_INDEX };
+    let skip = if origin_prim.x == number + 1 {
+        origin_prim.y
+    } else {
+        NO_INDEX
+    };
     let line = Line::new(origin, direction, pad);
-    let found = walk::closest(*LEVEL, &walked(packed), &line, start, skip, best);
+    let found = traversal::closest(*LEVEL, &walked(packed), &line, start, skip, best);
     if found.slot == NO_INDEX {
         return before;
     }
@@ -110,8 +122,8 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
 }
 
 /// A mesh as walks want it.
-fn walked(mesh: &PackedMesh) -> walk::Mesh<'_> {
-    walk::Mesh {
+fn walked(mesh: &PackedMesh) -> traversal::Mesh<'_> {
+    traversal::Mesh {
         nodes: cast_slice(&mesh.nodes),
         vertices: cast_slice(&mesh.vertices),
         triangles: cast_slice(&mesh.triangles),
@@ -128,7 +140,7 @@ fn corners(mesh: &PackedMesh, slot: usize) -> [Vec3; 3] {
 struct Rays<'a> {
     surface: &'a Surface,
     light: &'a Light,
-    block: Block,
+    block: SampleBlock,
     to: Segments,
     samples: Samples,
 }
@@ -143,7 +155,7 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
 }
 
 /// Bit i is set where an item of the tree hides sample i of the block from a surface, or the bit was set before.
-pub fn hidden_by_tree(scene: &Packed, before: u32, surface: &Surface, light: &Light, block: Block) -> u32 {
+pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
     let all = u32::MAX >> (32 - block.count);
     let wanted = all & !before;
     if wanted == 0 {
@@ -153,73 +165,79 @@ pub fn hidden_by_tree(scene: &Packed, before: u32, surface: &Surface, light: &Li
         surface,
         light,
         block,
-        to: segments_to_light(light, surface.start),
+        to: segments_to_light(light, surface.ray_origin),
         samples: Samples::of(block),
     };
-    let segments = walk::Segments {
-        o: surface.start,
-        pad: item_pad(scene, surface.start),
+    let segments = traversal::Segments {
+        o: surface.ray_origin,
+        pad: item_pad(scene, surface.ray_origin),
         directions: &rays.samples.segments(*LEVEL, rays.to),
-        reach: light.reach,
+        t_max: light.t_max,
         skip: NO_INDEX,
     };
     let bounds = |i: usize| {
         let Item { low, high, kind, .. } = scene.bvh.items[i];
         (kind & CASTS_SHADOW != 0).then_some(Aabb { low, high })
     };
-    let visit = |i: usize, passing| hidden_by_item(scene, &scene.bvh.items[i], passing, &rays);
-    (before & all) | walk::hidden_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, wanted, bounds, visit)
+    let visit = |i: usize, passing| occluded_by_item(scene, &scene.bvh.items[i], passing, &rays);
+    (before & all) | traversal::occluded_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, wanted, bounds, visit)
 }
 
 /// Of the samples in `wanted`, those that an item hides.
-fn hidden_by_item(scene: &Packed, item: &Item, wanted: u32, rays: &Rays) -> u32 {
+fn occluded_by_item(scene: &Packed, item: &Item, wanted: u32, rays: &Rays) -> u32 {
     let i = item.index;
     let kind = item.kind & 0xff;
-    if kind != INSTANCE && i == by_itself(rays.surface.above) {
+    if kind != INSTANCE && i == by_itself(rays.surface.exclude_front) {
         return 0;
     }
-    let is_wall = i == by_itself(rays.surface.below);
+    let is_inside = i == by_itself(rays.surface.exclude_back);
     let q = scene.primitives.get(i as usize);
     wanted
         & match kind {
-            INSTANCE => hidden_by_mesh(scene, i, wanted, rays),
+            INSTANCE => occluded_by_mesh(scene, i, wanted, rays),
             kind => with_primitive_kind!(kind, |kind| {
-                let start = rays.surface.start;
-                q.map_or(0, |q| shadow_bits(kind, q, start, is_wall, rays.light, rays.block))
+                let start = rays.surface.ray_origin;
+                q.map_or(0, |q| occlusion_mask(kind, q, start, is_inside, rays.light, rays.block))
             }),
         }
 }
 
-fn hidden_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u32 {
+fn occluded_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u32 {
     let i = &scene.bvh.instances[number as usize];
     let mesh = &*scene.bvh.meshes[i.mesh as usize];
-    let origin = point_to_mesh(i, rays.surface.start);
+    let origin = point_to_mesh(i, rays.surface.ray_origin);
     let to = Segments {
         towards: vector_to_mesh(i, rays.to.towards),
         u: vector_to_mesh(i, rays.to.u),
         v: vector_to_mesh(i, rays.to.v),
     };
-    let own = rays.surface.above;
-    let segments = walk::Segments {
+    let own = rays.surface.exclude_front;
+    let segments = traversal::Segments {
         o: origin,
         pad: mesh_pad(i, origin),
         directions: &rays.samples.segments(*LEVEL, to),
-        reach: rays.light.reach,
+        t_max: rays.light.t_max,
         skip: if own.x == number + 1 { own.y } else { NO_INDEX },
     };
     if i.shadows == SOME_SHADOWS {
-        return hidden_by_groups(scene, i, mesh, &segments, wanted);
+        return occluded_by_groups(scene, i, mesh, &segments, wanted);
     }
-    walk::hidden(*LEVEL, &walked(mesh), &segments, wanted)
+    traversal::occluded(*LEVEL, &walked(mesh), &segments, wanted)
 }
 
-/// [`walk::hidden`] where some groups of a mesh cast no shadow.
-fn hidden_by_groups(scene: &Packed, i: &Instance, mesh: &PackedMesh, segments: &walk::Segments, wanted: u32) -> u32 {
+/// [`traversal::occluded`] where some groups of a mesh cast no shadow.
+fn occluded_by_groups(
+    scene: &Packed,
+    i: &Instance,
+    mesh: &PackedMesh,
+    segments: &traversal::Segments,
+    wanted: u32,
+) -> u32 {
     let bounds = |slot: usize| {
         let casts = mesh.triangles[slot].w != segments.skip && triangle_casts(scene, i, slot as u32);
         casts.then(|| Aabb::around(&corners(mesh, slot)))
     };
-    walk::hidden_items(
+    traversal::occluded_items(
         *LEVEL,
         cast_slice(&mesh.nodes),
         segments,
@@ -232,7 +250,7 @@ fn hidden_by_groups(scene: &Packed, i: &Instance, mesh: &PackedMesh, segments: &
                 let d = segments.directions.get(sample as usize);
                 let s = slabs(segments.o, d, segments.pad);
                 let found = triangle_crossing(v0, v1, v2, segments.o, shear_of(d), s);
-                if found.met & (found.t > 0.0) & (found.t < segments.reach) {
+                if found.met & (found.t > 0.0) & (found.t < segments.t_max) {
                     hidden |= 1 << sample;
                 }
             }
@@ -241,43 +259,43 @@ fn hidden_by_groups(scene: &Packed, i: &Instance, mesh: &PackedMesh, segments: &
     )
 }
 
-/// Whether an item of the tree lies between a surface and `reach` times `to`, but for the primitive `goal`.
-pub fn is_hidden_by_tree(scene: &Packed, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
-    let pad = item_pad(scene, surface.start);
-    let s = slabs(surface.start, to, pad);
+/// Whether an item of the tree lies between a surface and `t_max` times `to`, but for the primitive `target_prim`.
+pub fn is_occluded_by_bvh(scene: &Packed, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
+    let pad = item_pad(scene, surface.ray_origin);
+    let s = slabs(surface.ray_origin, to, pad);
     let cuts = |item: &Item| {
         let casts = item.kind & CASTS_SHADOW != 0;
         casts
-            && is_passed(box_passage(item.low, item.high, s), reach)
-            && is_cut_by_item(scene, item, surface, to, reach, goal)
+            && interval_hits(box_interval(item.low, item.high, s), t_max)
+            && is_occluded_by_item(scene, item, surface, to, t_max, target_prim)
     };
     if scene.bvh.items.len() <= FEW_ITEMS {
         return scene.bvh.items.iter().any(cuts);
     }
-    let line = Line::new(surface.start, to, pad);
+    let line = Line::new(surface.ray_origin, to, pad);
     let mut hidden = false;
-    walk::leaves(*LEVEL, cast_slice(&scene.bvh.nodes), &line, reach, |items, limit| {
+    traversal::leaves(*LEVEL, cast_slice(&scene.bvh.nodes), &line, t_max, |items, limit| {
         hidden |= scene.bvh.items[items].iter().any(cuts);
         if hidden { f32::NEG_INFINITY } else { limit }
     });
     hidden
 }
 
-fn is_cut_by_item(scene: &Packed, item: &Item, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
+fn is_occluded_by_item(scene: &Packed, item: &Item, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
     let i = item.index;
     match item.kind & 0xff {
-        INSTANCE => is_cut_by_mesh(scene, i, surface, to, reach),
+        INSTANCE => is_occluded_by_mesh(scene, i, surface, to, t_max),
         kind => with_primitive_kind!(kind, |kind| {
-            is_cut(kind, &scene.primitives[i as usize], i, surface, to, reach, goal)
+            is_occluded_by_primitive(kind, &scene.primitives[i as usize], i, surface, to, t_max, target_prim)
         }),
     }
 }
 
-fn is_cut_by_mesh(scene: &Packed, number: u32, surface: &Surface, to: Vec3, reach: f32) -> bool {
+fn is_occluded_by_mesh(scene: &Packed, number: u32, surface: &Surface, to: Vec3, t_max: f32) -> bool {
     let i = &scene.bvh.instances[number as usize];
-    let origin = point_to_mesh(i, surface.start);
+    let origin = point_to_mesh(i, surface.ray_origin);
     let line = Line::new(origin, vector_to_mesh(i, to), mesh_pad(i, origin));
-    let own = surface.above;
+    let own = surface.exclude_front;
     let skip = if own.x == number + 1 { own.y } else { NO_INDEX };
-    walk::any(*LEVEL, &walked(&scene.bvh.meshes[i.mesh as usize]), &line, skip, reach)
+    traversal::any(*LEVEL, &walked(&scene.bvh.meshes[i.mesh as usize]), &line, skip, t_max)
 }

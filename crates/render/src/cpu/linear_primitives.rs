@@ -1,0 +1,80 @@
+//! Intersection and occlusion by the primitives outside of the BVH: the same results as `shaders/buffers.wgsl` and `shaders/linear_primitives.wgsl`.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::primitive::intersect;
+use super::ray::{Hit, Ray, by_itself, closer, no_hit};
+use super::shadow::{Cone, SampleBlock, light_frustum, may_block, occludes_segment, occlusion_mask};
+use super::surface::Surface;
+use crate::records::{Light, Packed, Primitive, with_primitive_kind};
+
+pub fn closest_primitive(scene: &Packed, ray: Ray, origin_prim: u32, inside_prim: u32) -> Hit {
+    let mut hit = no_hit();
+    for (kind, range) in scene.kinds() {
+        with_primitive_kind!(kind, |kind| for i in range {
+            let t = intersect(kind, &scene.primitives[i], i as u32 == inside_prim, ray, hit.t);
+            hit = closer(hit, t, i as u32, origin_prim);
+        });
+    }
+    hit
+}
+
+pub fn occluded_by_primitives(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
+    let cone = light_frustum(light, surface.ray_origin);
+    let mut bits = 0;
+    for (kind, range) in scene.shadow_casters() {
+        bits |= with_primitive_kind!(kind, |kind| occluded_by(
+            scene, kind, range, surface, &cone, light, block
+        ));
+    }
+    bits
+}
+
+pub fn is_occluded_by_primitives(scene: &Packed, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
+    for (kind, range) in scene.shadow_casters() {
+        with_primitive_kind!(kind, |kind| for i in range {
+            if is_occluded_by_primitive(kind, &scene.primitives[i], i as u32, surface, to, t_max, target_prim) {
+                return true;
+            }
+        });
+    }
+    false
+}
+
+#[inline(always)] // compiled for each kind
+pub fn is_occluded_by_primitive(
+    kind: u32,
+    q: &Primitive,
+    i: u32,
+    surface: &Surface,
+    to: Vec3,
+    t_max: f32,
+    target_prim: u32,
+) -> bool {
+    let is_inside = i == by_itself(surface.exclude_back);
+    (i != by_itself(surface.exclude_front)) & (i != target_prim)
+        && occludes_segment(kind, q, surface.ray_origin, is_inside, to, t_max)
+}
+
+#[inline(always)] // compiled for each kind
+fn occluded_by(
+    scene: &Packed,
+    kind: u32,
+    range: Range<usize>,
+    surface: &Surface,
+    cone: &Cone,
+    light: &Light,
+    block: SampleBlock,
+) -> u32 {
+    let mut bits = 0;
+    for i in range {
+        let (q, sphere) = (&scene.primitives[i], &scene.bounds[i]);
+        let i = i as u32;
+        if (i != by_itself(surface.exclude_front)) & may_block(sphere, cone) {
+            bits |= occlusion_mask(kind, q, cone.apex, i == by_itself(surface.exclude_back), light, block);
+        }
+    }
+    bits
+}
