@@ -210,7 +210,7 @@ probes! {
     plane_distance(q: &Primitive, ray: Ray) -> f32;
     crosses_plane(o: Vec3, d: Vec3, t_max: f32) -> bool;
     scaled_crossing(o: Vec3, d: Vec3) -> Vec2;
-    closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit;
+    closer(hit: Hit, t: f32, i: u32, origin_prim: u32) -> Hit;
     intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
     rectangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool;
     intersect_disk(q: &Primitive, ray: Ray, limit: f32) -> f32;

@@ -15,7 +15,7 @@ use crate::sources::{self, Signature, differences, parse, rust_functions, rust_r
 /// Files without a twin, and why.
 const WITHOUT_TWIN: &[(&str, &str)] = &[
     ("bindings.wgsl", "buffers only"),
-    ("receipt.wgsl", "the CPU cuts no loop short"),
+    ("completion.wgsl", "the CPU truncates no loop"),
     (
         "rounding.wgsl",
         "Rust's own quotients and square roots are rounded correctly",
@@ -28,7 +28,7 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
     ),
     (
         "bvh.wgsl",
-        "the CPU walks trees in its own way (tree.rs, walk), to the same hits, as tests/meshes proves",
+        "the CPU traverses BVHs with kernels of its own (bvh.rs, traversal), to the same hits, as tests/meshes proves",
     ),
     (
         "buffers.wgsl",
@@ -48,7 +48,7 @@ const NO_TWIN: &[&str] = &[
     "integrators",
     "lobes.rs",
     "samples.rs",
-    "walk",
+    "traversal",
 ];
 
 /// Functions and records that only one side has, or that differ, and why: file, name, reason.
@@ -257,7 +257,7 @@ mod opcode {
         164..=168,
         170..=179,
         194..=205,
-        228..=228, // atomic store and addition: the receipt of a call
+        228..=228, // atomic store and addition: the completion of a dispatch
         234..=234,
     ];
     /// Comparisons of floats, but for `!=`: naga makes it an ordered one, false where either is no number.
