@@ -24,8 +24,8 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
     if hit.primitive == NO_INDEX {
         return environment.background;
     }
-    let spot = fetch_hit_primitive(hit);
-    let surface = surface_of(spot, hit, ray);
+    let prim = fetch_hit_primitive(hit);
+    let surface = surface_of(prim, hit, ray);
     let bits = decision_bits(pixel, camera.seed, sample, 1u, 77u);
     let random = vec3f(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
     let up = normalize(surface.shading_normal + random);
@@ -38,7 +38,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
         let to = segment(segments_to_light(light, surface.position), sample_square(RANDOM, 1u, 0u, sample, block.key));
         sum += light.color * select(0.0, abs(dot(normalize(to), surface.normal)), seen);
     }
-    return sum * material_of(spot).diffuse;
+    return sum * material_of(prim).diffuse;
 }
 ";
 
@@ -48,8 +48,8 @@ fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     if hit.primitive == NO_INDEX {
         return scene.environment.background;
     }
-    let spot = fetch_hit_primitive(scene, hit);
-    let surface = surface_of(scene, &spot, hit, ray);
+    let prim = fetch_hit_primitive(scene, hit);
+    let surface = surface_of(scene, &prim, hit, ray);
     let bits = decision_bits(pixel, scene.camera.seed, sample, 1, 77);
     let random = Vec3::new(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
     let up = Ray {
@@ -74,7 +74,7 @@ fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
         let cosine = dot(normalize(to), surface.normal).abs();
         sum += light.color * if seen { cosine } else { 0.0 };
     }
-    sum * material_of(scene, &spot).diffuse
+    sum * material_of(scene, &prim).diffuse
 }
 
 #[test]

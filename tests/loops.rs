@@ -81,7 +81,7 @@ fn looping(rounds: u32) -> Shaders {
     let (file, store) = ("kernels/render.wgsl", "    film[index] = sum;");
     let looping = format!(
         "    var rounds = 0u;
-    for (var i = 0u; i < work.proof.y * work.samples.y * {}u; i++) {{
+    for (var i = 0u; i < params.loop_probe.y * params.samples.y * {}u; i++) {{
         rounds++;
     }}
     sum.r += f32(rounds);

@@ -696,7 +696,7 @@ fn inputs_take_both_ways_of_every_decision() {
             let yes = results.iter().step_by(kinds.len()).filter(|word| **word != 0).count() as f64 / CALLS as f64;
             assert!(
                 (0.05..0.95).contains(&yes),
-                "{file}: {name} is true for {yes} of the inputs"
+                "{file}: {name} is true for {yes} of the inputs; it must be 0.05 to 0.95: see tests/inputs.rs"
             );
         }
         if name.starts_with("intersect_") {
@@ -710,7 +710,7 @@ fn inputs_take_both_ways_of_every_decision() {
             let hits = hits as f64 / CALLS as f64;
             assert!(
                 (0.1..0.9).contains(&hits),
-                "{file}: {name} hits for {hits} of the inputs"
+                "{file}: {name} hits for {hits} of the inputs; it must be 0.1 to 0.9: see `local_point` in tests/inputs.rs"
             );
         }
         let nan = share(&|word| f32::from_bits(word).is_nan());

@@ -28,7 +28,7 @@ fn faults_of_a_shader_are_counted_and_marked() {
     files.edit(
         KERNEL,
         "film[index] = sum;",
-        "let zero = f32(work.samples.x) * 0.0;
+        "let zero = f32(params.samples.x) * 0.0;
         if pixel.y == 3u && pixel.x == 0u { sum.x = zero / zero; }
         if pixel.y == 3u && pixel.x == 1u { sum.y = 1.0 / zero; }
         if pixel.y == 3u && pixel.x == 2u { sum.z = -1.0 / zero; }

@@ -65,7 +65,7 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
 /// Adds a million rounds to a shader, which no compiler can leave out; they change nothing.
 fn long_loop(files: &Files, file: &str, before: &str) {
     let rounds = "var rounds = 0u;
-    for (var i = 0u; i < 1000000u + 0u * work.origin.x; i++) { rounds += (rounds ^ i) & work.proof.y; }
+    for (var i = 0u; i < 1000000u + 0u * params.origin.x; i++) { rounds += (rounds ^ i) & params.loop_probe.y; }
     if rounds == 0xffffffffu { return; }\n    ";
     files.edit(file, before, &format!("{rounds}{before}"));
 }
@@ -111,7 +111,7 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
     running.wait_rendered(&files);
 
     // In a kernel of another view: only that view reports the error.
-    long_loop(&files, FIRST_HITS, "let pixel = work.origin");
+    long_loop(&files, FIRST_HITS, "let pixel = params.origin");
     running.wait_well();
     running.session.send(Command::View(View::Normal));
     running.wait("a problem or the normals", |running| {

@@ -57,7 +57,7 @@ fn light_alone_and_materials_alone_find_the_same() {
         return;
     }
     const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
-    const OF_MATERIAL: &str = "power_heuristic(state.pdf, emitter_pdf(spot, seen, density, ray, surface.normal));";
+    const OF_MATERIAL: &str = "power_heuristic(state.pdf, emitter_pdf(prim, seen, density, ray, surface.normal));";
     let light_alone = path_with(&[(OF_LIGHT, "1.0"), (OF_MATERIAL, "0.0;")]);
     let material_alone = path_with(&[(OF_LIGHT, "0.0"), (OF_MATERIAL, "1.0;")]);
     let wrong = path_with(&[(
@@ -82,6 +82,8 @@ fn light_alone_and_materials_alone_find_the_same() {
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
     ];
     let many = many_lamps();
+    // The last of the list, and many lights, are combined with all materials; each of the others with one.
+    let (with_one, number_of_many) = (shapes.len() - 1, shapes.len());
     let shapes = shapes.into_iter().chain([many.as_str()]);
     for (i, shape) in shapes.enumerate() {
         let materials = [
@@ -91,18 +93,17 @@ fn light_alone_and_materials_alone_find_the_same() {
             "type = 'conductor', metal = 'copper', roughness = 0.6, anisotropy = 0.5",
             "type = 'principled', base_color = [0.7, 0.6, 0.5], metallic = 0.3, roughness = 0.6, clearcoat = 0.5, clearcoat_roughness = 0.5, sheen_color = [0.2, 0.3, 0.4], sheen_roughness = 0.5",
         ];
-        // Each with one of them, the last with all.
-        for material in materials
-            .iter()
-            .skip(if i < 6 { i % 5 } else { 0 })
-            .take(if i < 6 { 1 } else { 5 })
-        {
+        let materials = match i < with_one {
+            true => &materials[i % 5..][..1],
+            false => &materials[..],
+        };
+        for material in materials {
             let text = format!("materials.m = {{ {material} }}\n{camera}{shape}");
             let packed = scene(4096, 2, &text);
             assert_eq!(
                 packed.specialization.light_tree != 0,
-                i == 7,
-                "a tree is over many lamps"
+                i == number_of_many,
+                "a light tree is built over many lights"
             );
             // What is seen to shine is left out.
             let seen = mean(&render_with(&scene(4096, 0, &text), Way::Baked, sources::shaders()));

@@ -333,7 +333,11 @@ mod tests {
             ],
         );
         says(
-            &[(FIRST_HITS, "hits[place.y * work.film_size.x + place.x] =", "let hit =")],
+            &[(
+                FIRST_HITS,
+                "hits[place.y * params.film_size.x + place.x] =",
+                "let hit =",
+            )],
             &["kernels/first_hits.wgsl: `first_hits` never writes `hits`"],
         );
     }

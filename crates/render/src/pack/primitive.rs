@@ -137,7 +137,8 @@ pub fn bounding_box(primitive: &Primitive) -> Bounds {
             let zero = DVec3::ZERO;
             return (center + zero.min(a).min(b), center + zero.max(a).max(b));
         }
-        _ => DVec3::INFINITY,
+        PLANE => DVec3::INFINITY,
+        kind => unreachable!("primitive kind {kind}"),
     };
     (center - half, center + half)
 }
@@ -158,7 +159,8 @@ pub fn bounding_sphere(primitive: &Primitive) -> Sphere {
         ELLIPSOID => (center, largest_stretch(DMat3::from_cols(a, b, c))),
         DISK => (center, largest_stretch(DMat3::from_cols(a, b, DVec3::ZERO))),
         CYLINDER => (center, a.length().max(b.length()).hypot(c.length())),
-        _ => (center, UNBOUNDED),
+        PLANE => (center, UNBOUNDED),
+        kind => unreachable!("primitive kind {kind}"),
     };
     Sphere {
         center: center.as_vec3(),
@@ -180,7 +182,8 @@ pub fn area(primitive: &Primitive) -> f64 {
             let squares: f64 = rows.iter().sum();
             4.0 * std::f64::consts::PI * (squares / 3.0).sqrt() / f64::from(primitive.determinant).abs()
         }
-        _ => 0.0,
+        PLANE => 0.0,
+        kind => unreachable!("primitive kind {kind}"),
     }
 }
 

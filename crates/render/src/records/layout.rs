@@ -450,7 +450,7 @@ records! {
         pub film_size: UVec2,
         /// The first sample, and one past the last.
         pub samples: UVec2,
-        /// The range of the loop that proves a pixel whole (`shaders/receipt.wgsl`).
+        /// The range of the loop that proves a pixel whole (`shaders/completion.wgsl`).
         pub loop_probe: UVec2,
     }
 }
