@@ -1,13 +1,13 @@
-// Adaptive sampling: what is known of a pixel's variance, and how many samples it gets by what its neighbours are like.
+// Adaptive sampling: the variance of a pixel, and its sample count from its neighbors' pilot samples.
 
-// The moments of a pixel after another sample, of which `sum` is the sum before: xyz the sum of squared deviations from
-// the mean, w the number of samples. By Welford's update ("Note on a Method for Calculating Corrected Sums of Squares and
-// Products", Technometrics 4(3), 1962), for weighted samples.
+// Returns a pixel's moments after a sample, where `sum` precedes it: xyz the sums of squared deviations from the mean,
+// w the sample count. Welford's update for weighted samples ("Note on a Method for Calculating Corrected Sums of
+// Squares and Products", Technometrics 4(3), 1962).
 fn moments_with(moments: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     return moments + vec4f(squared_deviation(sum, sample), 1.0);
 }
 
-// What a sample adds to the sum of squared deviations; not below 0, which weights of either sign would make of it.
+// Returns the sum's increment, clamped at 0: weights of mixed sign can make it negative.
 fn squared_deviation(sum: vec4f, sample: vec4f) -> vec3f {
     let before = sample.rgb - mean_of(sum) * sample.w;
     let after = sample.rgb - mean_of(sum + sample) * sample.w;
@@ -19,15 +19,15 @@ fn mean_of(sum: vec4f) -> vec3f {
     return select(vec3f(0.0), sum.rgb / sum.w, abs(sum.w) > 0.0);
 }
 
-// The variance of a pixel's value, if its samples were independent.
+// Assumes independent samples.
 fn variance_of_mean(sum: vec4f, moments: vec4f) -> vec3f {
     let n = moments.w;
     let scale = n / ((n - 1.0) * sum.w * sum.w);
     return moments.rgb * scale;
 }
 
-// The square of a pixel's standard error as displayed: the mean over the channels, each magnified by the slope of the
-// display curve, x to the power 1/2.2, where x is from 0.01 to 1.
+// Returns a pixel's squared standard error as displayed: the mean over the channels, each scaled by the squared slope
+// of the display curve x^(1/2.2), x in 0.01..1.
 fn display_variance(sum: vec4f, moments: vec4f) -> f32 {
     let mean = mean_of(sum);
     let variance = variance_of_mean(sum, moments);
@@ -43,22 +43,22 @@ fn display_slope_squared(value: f32) -> f32 {
     return slope * slope;
 }
 
-// A first look at a pixel after another sample: y the sum over samples and channels of squared deviations, z the sum
-// over samples of their squares.
-fn pilot_add(shading: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
+// Adds a sample to a pixel's pilot statistics: y sums squared deviations over samples and channels, z their squares
+// over samples.
+fn pilot_add(pilot: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     let deviation = squared_deviation(sum, sample);
     let total = deviation.x + deviation.y + deviation.z;
-    return vec4f(shading.x, shading.y + total, shading.z + total * total, shading.w);
+    return vec4f(pilot.x, pilot.y + total, pilot.z + total * total, pilot.w);
 }
 
-// A first look at its end: x the square of the standard error that the pixel then has as displayed, w one pixel.
-fn pilot_finish(shading: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
-    return vec4f(display_variance(sum, moments), shading.y, shading.z, 1.0);
+// Completes the pilot statistics: x is the squared standard error as displayed, w the number of pixels.
+fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
+    return vec4f(display_variance(sum, moments), pilot.y, pilot.z, 1.0);
 }
 
-// The samples of a pixel, at most so many, by the sum of its neighbours' first looks of `first` samples each: twice as
-// many until their mean square error would be small enough, as far as there is evidence for it. y y / z is the number
-// of samples that the estimate rests on: one where a single sample differs, all of them where half do.
+// Returns a pixel's sample count from its neighbors' pilot statistics over `first` samples each. Doubles it until the
+// mean square error is small enough, if the evidence allows: the effective sample size y^2 / z is 1 where a single
+// sample deviates, and the full count where half of them do.
 fn samples_wanted(looks: vec4f, first: u32, squared_error: f32, most: u32) -> u32 {
     if !(looks.w > 0.0) | !(squared_error > 0.0) {
         return most;

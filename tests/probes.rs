@@ -198,8 +198,8 @@ probes! {
     filter_offset(u: f32, bin: u32, bins: u32, low: f32, high: f32) -> f32;
     moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
     squared_deviation(sum: Vec4, sample: Vec4) -> Vec3;
-    pilot_add(look: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
-    pilot_finish(look: Vec4, sum: Vec4, moments: Vec4) -> Vec4;
+    pilot_add(pilot: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
+    pilot_finish(pilot: Vec4, sum: Vec4, moments: Vec4) -> Vec4;
     samples_wanted(looks: Vec4, first: u32, squared_error: f32, most: u32) -> u32;
     mean_of(sum: Vec4) -> Vec3;
     variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;

@@ -1,7 +1,7 @@
-// Renders like `render.wgsl`, but after a first look at all pixels gives further samples only to those that need them,
-// as their neighbours' first looks tell. The film has two further parts: each pixel's moments, and its first look. A
-// dispatch is for samples of the first look or for later ones, and these come after all first looks of the film. A
-// pixel's own samples have no say in how many there are of them: a mean of samples that decide on themselves is biased.
+// Adaptive rendering: like `render.wgsl`, but beyond the pilot samples only where the neighbors' pilot statistics ask
+// for more. Two further parts of the film hold each pixel's moments and pilot statistics. A dispatch renders either
+// pilot samples or later ones, which require all pilot samples of the film. A pixel's own samples do not affect their
+// number: a mean with such a stopping rule is biased.
 
 @compute @workgroup_size(8, 8)
 fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -14,7 +14,7 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     let pixels = params.film_size.x * params.film_size.y;
     var sum = film[index];
     var moments = film[pixels + index];
-    var shading = film[2u * pixels + index];
+    var pilot = film[2u * pixels + index];
     var end = params.samples.y;
     let looks = params.samples.x < PILOT_SAMPLES;
     if !looks {
@@ -30,7 +30,7 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
         path = advance(path, pixel);
         if path.ended {
             let value = path_value(path);
-            shading = pilot_add(shading, sum, value);
+            pilot = pilot_add(pilot, sum, value);
             moments = moments_with(moments, sum, value);
             sum += value;
             if LAYERS != 0u {
@@ -46,12 +46,12 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     }
     film[pixels + index] = moments;
     if looks {
-        film[2u * pixels + index] = pilot_finish(shading, sum, moments);
+        film[2u * pixels + index] = pilot_finish(pilot, sum, moments);
     }
     report_completion(local);
 }
 
-// The sum of the first looks at a pixel's four neighbours, as far as they are in the picture.
+// Returns the summed pilot statistics of the up to four neighbors in the film.
 fn neighbor_pilot_sum(place: vec2u) -> vec4f {
     let width = params.film_size.x;
     let index = 2u * width * params.film_size.y + place.y * width + place.x;

@@ -1,5 +1,4 @@
-//! Twin of `shaders/adaptive.wgsl`: what is known of a pixel's variance, and how many samples it gets by what its
-//! neighbours are like.
+//! Twin of `shaders/adaptive.wgsl`: adaptive sampling by variance estimates of neighboring pixels.
 
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
@@ -45,18 +44,18 @@ pub fn display_slope_squared(value: f32) -> f32 {
     slope * slope
 }
 
-pub fn pilot_add(look: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
+pub fn pilot_add(pilot: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
     let deviation = squared_deviation(sum, sample);
     let total = deviation.x + deviation.y + deviation.z;
-    Vec4::new(look.x, look.y + total, look.z + total * total, look.w)
+    Vec4::new(pilot.x, pilot.y + total, pilot.z + total * total, pilot.w)
 }
 
-pub fn pilot_finish(look: Vec4, sum: Vec4, moments: Vec4) -> Vec4 {
-    Vec4::new(display_variance(sum, moments), look.y, look.z, 1.0)
+pub fn pilot_finish(pilot: Vec4, sum: Vec4, moments: Vec4) -> Vec4 {
+    Vec4::new(display_variance(sum, moments), pilot.y, pilot.z, 1.0)
 }
 
 pub fn samples_wanted(looks: Vec4, first: u32, squared_error: f32, most: u32) -> u32 {
-    // not <=, which lets what is no number pass
+    // Not `<=`, which is false for NaN.
     if !(looks.w > 0.0) | !(squared_error > 0.0) {
         return most;
     }

@@ -1,4 +1,4 @@
-//! The twins over threads.
+//! CPU backend: evaluates the twin functions of the kernels on a thread pool.
 
 use std::ops::Range;
 
@@ -14,17 +14,16 @@ use crate::film::{Film, Layer};
 use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
 
-/// A scene on the CPU. A call does its work in [`Backend::poll`] or [`Backend::wait`], on the current pool of threads.
+/// The CPU backend of a scene. A submitted dispatch runs in [`Backend::poll`] or [`Backend::wait`], on the current
+/// rayon pool.
 pub struct Cpu<'a> {
     scene: &'a Packed,
     rules: Rules,
     film: Option<(Film, Started)>,
-    /// The call that was submitted.
     pending: Option<(Region, Range<u32>)>,
 }
 
 impl<'a> Cpu<'a> {
-    /// A renderer of a scene.
     pub fn new(scene: &'a Packed) -> Cpu<'a> {
         Cpu {
             scene,
@@ -34,7 +33,6 @@ impl<'a> Cpu<'a> {
         }
     }
 
-    /// The film, not copied.
     pub fn into_film(self) -> Option<Film> {
         self.film.map(|(film, _)| film)
     }
@@ -47,7 +45,7 @@ impl<'a> Cpu<'a> {
     }
 }
 
-/// Pixels of a row that one thread takes at a time.
+/// Maximum number of pixels of a row per task.
 const RUN: usize = 32;
 
 impl Backend for Cpu<'_> {
@@ -116,7 +114,7 @@ impl Backend for Cpu<'_> {
     }
 }
 
-/// Adds samples to a tile of a film: either first ones or further ones, where that makes a difference.
+/// Adds samples to a tile of a film. Under adaptive sampling they are either pilot samples or later ones.
 fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32>) {
     let Film {
         region,
@@ -172,7 +170,7 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
     });
 }
 
-/// A piece of a row of a film: its lists, which are empty where the film's are, or where they are only read.
+/// A segment of a row of the film. Lists are empty if the film has none or if they are read-only.
 struct Run<'a> {
     first: UVec2,
     sums: &'a mut [Vec4],
@@ -199,7 +197,8 @@ impl Run<'_> {
     }
 }
 
-/// The records of a tile's pixels, of a film's region, in pieces of a row, each with its first pixel; none of an empty list.
+/// Splits the records of a tile, whose film covers `region`, into segments of rows, each with its first pixel. Returns
+/// no segments if `records` is empty.
 fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut [Vec4])> {
     let rows = records.chunks_mut(region.width() as usize).enumerate();
     let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
@@ -211,7 +210,7 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
     .collect()
 }
 
-/// What `shaders/kernels/adaptive.wgsl` does to a pixel at first.
+/// Adds pilot samples to a pixel, like `shaders/kernels/adaptive.wgsl`.
 fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
     for sample in samples {
         let (value, layers) = pixel_radiance(scene, pixel, sample);
@@ -223,7 +222,7 @@ fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, 
     run.looks[x] = pilot_finish(run.looks[x], run.sums[x], run.moments[x]);
 }
 
-/// What it does to a pixel later on.
+/// Adds samples after the pilot samples to a pixel, as many as its neighbors' pilot samples require.
 fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, looks: Vec4) {
     let s = &scene.specialization;
     let end = samples_wanted(looks, s.first_look, f32::from_bits(s.squared_error), samples.end);
