@@ -1,11 +1,10 @@
-// Surfaces that rays pass by their alpha: whether one is there for a ray is a function of pixel, sample, bounce and what is met, so that no
-// order in which a tree is walked decides on it.
+// Surfaces with alpha. Acceptance depends on pixel, sample, bounce and hit only, not on the BVH's traversal order.
 
-// Rays to lights and rays to go on decide apart.
+// Ray purposes, which decide independently.
 const RAY_BSDF: u32 = 0u;
 const RAY_SHADOW: u32 = 1u;
 
-// Whether a surface of this opacity, which the ray `purpose` of bounce `bounce` has met, is there for it.
+// Returns true if the surface accepts the ray that hit it.
 fn alpha_accepts(material: Material, pixel: vec2u, sample: u32, bounce: u32, purpose: u32, hit: Hit, side: f32) -> bool {
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, sample));
     let face = select(0u, 1u, side > 0.0);
@@ -15,7 +14,6 @@ fn alpha_accepts(material: Material, pixel: vec2u, sample: u32, bounce: u32, pur
     return whole | (material.alpha_mode == OPAQUE);
 }
 
-// What is there at a point, by its texture if it has one, and by the colours of its vertices.
 fn with_opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> Material {
     var material = before;
     for (var i = 0u; i < LOOKUPS; i++) {
@@ -34,7 +32,7 @@ fn with_opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) ->
     return material;
 }
 
-// The share of rays that a surface is there for, at texture coordinates.
+// Returns the fraction of rays that a surface accepts.
 fn opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> f32 {
     let material = with_opacity_at(before, prim, hit, uv);
     let whole = select(0.0, 1.0, material.opacity >= material.cutoff);
@@ -42,7 +40,7 @@ fn opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> f32 
     return select(share, 1.0, material.alpha_mode == OPAQUE);
 }
 
-// `is_occluded`, where surfaces may be there or not: from one to the next.
+// Variant of `is_occluded` for surfaces with alpha; true after more than MAX_ALPHA_SKIPS skipped ones.
 fn is_occluded_alpha(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32, pixel: vec2u, sample: u32,
              bounce: u32) -> bool {
     if before {
@@ -73,7 +71,8 @@ fn is_occluded_alpha(before: bool, surface: Surface, to: vec3f, t_max: f32, targ
     return true;
 }
 
-// The first thing on a ray, from what it meets on, that is rather there than not; by its distance from the ray's start.
+// Returns the first hit from `met` on that reaches its cutoff or is half opaque; t is measured from the origin of
+// `ray`.
 fn first_seen(ray: Ray, met: Hit) -> Hit {
     var hit = met;
     var onward = ray;

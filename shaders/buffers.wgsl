@@ -1,16 +1,15 @@
-// The scene from buffers, by loops over all primitives outside of the BVH. The functions that call a loop for each kind of primitive are
+// Scene access in storage buffers, and loops over the primitives outside the BVH. Their callers for each kind are
 // generated (crates/render/src/gpu/dispatch.rs).
 
 fn load_primitive(i: u32) -> Primitive {
     return primitives[i];
 }
 
-// How many lights there are: x of those with an area, which come first, y of all.
+// Returns the number of area lights, which come first (x), and of all lights (y).
 fn light_counts() -> vec2u {
     return counts.lights;
 }
 
-// Of the hit so far and the primitives of a kind.
 fn closest_of(kind: u32, before: Hit, ray: Ray, origin_prim: u32, inside_prim: u32) -> Hit {
     var hit = before;
     let range = counts.primitives[kind];
@@ -20,7 +19,8 @@ fn closest_of(kind: u32, before: Hit, ray: Ray, origin_prim: u32, inside_prim: u
     return hit;
 }
 
-// Returns whether any primitive of a kind except `target_prim` occludes the segment from a surface to `t_max` times `to`, or `before`.
+// Returns true if `before`, or if a primitive except `target_prim` occludes the segment from the surface to
+// `t_max * to`.
 fn is_occluded_by(kind: u32, before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let range = counts.primitives[kind];
     var hidden = before;
@@ -30,12 +30,11 @@ fn is_occluded_by(kind: u32, before: bool, surface: Surface, to: vec3f, t_max: f
     return hidden;
 }
 
-// How many things shine that light is sampled of.
 fn emitter_count() -> u32 {
     return counts.emitters.y;
 }
 
-// Which of the primitives from `first` to before `end` may hide a light: bit i stands for first + i, up to 32 of them.
+// Returns a mask of the at most 32 primitives in `first..end` that may occlude a light: bit i is `first + i`.
 fn shadow_candidates(first: u32, end: u32, cone: Cone) -> u32 {
     var candidates = 0u;
     for (var i = 0u; i < 32u && first + i < end; i++) {
@@ -44,7 +43,7 @@ fn shadow_candidates(first: u32, end: u32, cone: Cone) -> u32 {
     return candidates;
 }
 
-// One of those that can cast a shadow, of a kind that is known when compiled.
+// Loads a shadow caster whose kind is known at compile time.
 fn load_blocker(kind: u32, i: u32) -> Primitive {
     return primitives[i];
 }

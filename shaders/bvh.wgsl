@@ -1,15 +1,15 @@
-// The trees: one over the scene's items, which are instances of meshes and primitives by themselves, and one over each mesh's
-// triangles. What is found does not depend on the trees (docs/decisions/trees.md).
+// Traversal of the BVH over the items of the scene, mesh instances and standalone primitives, and of the BVHs over the
+// triangles of meshes. Hits do not depend on the BVHs (docs/decisions/trees.md).
 
-// Children of one node that wait for their visit: x is where the node's children start, bits 0 to 7 of y which slots are nodes,
-// bits 8 to 15 which of them wait, in the order of visits.
+// Pending children of a node, per level. x: index of the first child node; y: bits 0 to 7 mark the slots that are
+// nodes, bits 8 to 15 those pending, in visiting order.
 struct TraversalStack {
     octant: u32,
     depth: u32,
     waiting: array<vec2u, BVH_MAX_DEPTH>,
 }
 
-// Outside of functions, where they are not set to zero for each ray: that took software Vulkan a fifth of the time.
+// Not in functions, where they are zeroed for each ray: a fifth of the time on software Vulkan.
 var<private> items_walk: TraversalStack;
 var<private> mesh_walk: TraversalStack;
 
@@ -19,7 +19,7 @@ fn traversal_begin(walk: ptr<private, TraversalStack>, octant: u32) {
     (*walk).waiting[0] = vec2u(0u, 1u | (256u << octant)); // the root, as the only child
 }
 
-// The number, in its tree, of the next node to visit. There is one.
+// Returns the index of the next node in its BVH. One must be pending.
 fn pop_node(walk: ptr<private, TraversalStack>) -> u32 {
     let top = (*walk).depth - 1u;
     let group = (*walk).waiting[top];
@@ -31,7 +31,7 @@ fn pop_node(walk: ptr<private, TraversalStack>) -> u32 {
     return group.x + countOneBits(group.y & ((1u << slot) - 1u));
 }
 
-// The children of a node wait that are nodes and were passed; returned are those that are leaves.
+// Pushes the hit children that are nodes, and returns those that are leaves.
 fn push_children(walk: ptr<private, TraversalStack>, node: Node, passed: u32) -> u32 {
     let inner = node.scales >> 24u;
     let waiting = in_order(passed & inner, (*walk).octant);
@@ -42,12 +42,11 @@ fn push_children(walk: ptr<private, TraversalStack>, node: Node, passed: u32) ->
     return passed & ~inner;
 }
 
-// How far from the boxes of items a ray counts as passing them.
 fn item_pad(origin: vec3f) -> f32 {
     return counts.room.x * (largest(origin) + counts.room.y);
 }
 
-// The nearest hit of the scene's tree, if it is nearer than `before`.
+// Returns the nearer of `before` and the nearest hit among the items.
 fn closest_in_tree(before: Hit, ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     var hit = before;
     let s = slabs(ray.origin, ray.direction, item_pad(ray.origin));
@@ -72,14 +71,14 @@ fn closest_of_item(before: Hit, item: Item, ray: Ray, s: Slabs, origin_prim: vec
     if !interval_hits(passage, hit.t) {
         return hit;
     }
-    // A loop where an `if` would do: software Vulkan skips it.
+    // A loop instead of an `if`: software Vulkan skips it.
     for (var once = has_kind(item, INSTANCE); once; once = false) {
         hit = closest_of_mesh(hit, item.index, ray, max(passage.x, 0.0), origin_prim);
     }
     return closest_of_primitive_item(hit, item, ray, passage.x, origin_prim, inside_prim);
 }
 
-// Whether an item is of a kind; false without a look at it where no item of the scene is.
+// Returns true if an item is of a kind, at no cost if no item of the scene is.
 fn has_kind(item: Item, kind: u32) -> bool {
     if (TLAS_KINDS & (1u << kind)) == 0u {
         return false;
@@ -87,18 +86,19 @@ fn has_kind(item: Item, kind: u32) -> bool {
     return (item.kind & 0xffu) == kind;
 }
 
-// The hit on primitive i, no nearer than its box.
+// Returns the hit on primitive i, no nearer than its box.
 fn hit_by_itself(kind: u32, i: u32, ray: Ray, near: f32, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     let t = max(intersect(kind, primitives[i], i == by_itself(inside_prim), ray, INFINITE_T), near);
     return Hit(select(INFINITE_T, t, i != by_itself(origin_prim)), 0u, i, 0u, vec2f(0.0));
 }
 
-// How far beyond `start` what is nearer than t can be: more than t - start by what the sum of both may be rounded.
+// Returns an upper bound, rounding included, of the distance beyond `start` of hits nearer than t.
 fn limit_from(start: f32, t: f32) -> f32 {
     return (t - start) + t * 4.7683716e-7;
 }
 
-// Of the triangles of instance `number`. The ray is looked at from `start` on: so its origin is near the mesh.
+// Returns the nearer of `before` and the nearest hit on instance `number`. The ray is traced from `start`, near the
+// mesh.
 fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, origin_prim: vec2u) -> Hit {
     var hit = before;
     let i = load_instance(number);
@@ -128,7 +128,7 @@ fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, origin_prim: 
     return hit;
 }
 
-// Two shadow rays from one point: software Vulkan takes longer to load a node or a triangle than to test it.
+// Two shadow rays from one point: on software Vulkan, loading a node or triangle takes longer than testing it.
 struct RayPair {
     direction: array<vec3f, 2>,
     s: array<Slabs, 2>,
@@ -138,13 +138,13 @@ fn ray_pair(origin: vec3f, first: vec3f, second: vec3f, pad: f32) -> RayPair {
     return RayPair(array(first, second), array(slabs(origin, first, pad), slabs(origin, second, pad)));
 }
 
-// The children of a node whose boxes any of the two passes that are not hidden.
+// Returns the children whose boxes a ray of the pair hits that is not yet occluded.
 fn children_hit_by_pair(node: Node, pair: RayPair, hidden: u32, t_max: f32) -> u32 {
     return children_hit(node, pair.s[0], select(t_max, -1.0, (hidden & 1u) != 0u))
         | children_hit(node, pair.s[1], select(t_max, -1.0, (hidden & 2u) != 0u));
 }
 
-// Bit i is set where an item of the tree hides sample i of the block from a surface, or the bit was set before.
+// Returns the mask of the samples of a block that any item occludes from a surface, and `before`.
 fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlock) -> u32 {
     let all = select((1u << block.count) - 1u, 0xffffffffu, block.count >= 32u);
     var bits = before & all;
@@ -165,17 +165,15 @@ fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlo
     return bits;
 }
 
-// The fan of all shadow rays from a point to a light.
 fn interval_to_light(origin: vec3f, to: Segments, pad: f32) -> RayInterval {
     return ray_interval(origin, to.towards - abs(to.u) - abs(to.v), to.towards + abs(to.u) + abs(to.v), pad);
 }
 
-// The vectors to two samples of a block.
 fn segments_to_two(to: Segments, block: SampleBlock, samples: vec2u) -> array<vec3f, 2> {
     return array(segment(to, block_sample(block, samples.x)), segment(to, block_sample(block, samples.y)));
 }
 
-// Which of two samples of a block an item hides, as bits 0 and 1.
+// Returns the mask, bits 0 and 1, of two samples that any item occludes.
 fn occluded_pair(surface: Surface, to: Segments, light: Light, block: SampleBlock, samples: vec2u, pad: f32) -> u32 {
     let directions = segments_to_two(to, block, samples);
     let pair = ray_pair(surface.ray_origin, directions[0], directions[1], pad);
@@ -199,7 +197,7 @@ fn occluded_pair(surface: Surface, to: Segments, light: Light, block: SampleBloc
     return hidden;
 }
 
-// Of the two samples in `may`, those that an item hides.
+// Returns the samples in the mask `may` that an item occludes.
 fn occluded_by_item(item: Item, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
     var bits = 0u;
     for (var once = has_kind(item, INSTANCE) & (may != 0u); once; once = false) {
@@ -221,7 +219,8 @@ fn occluded_by_item(item: Item, may: u32, surface: Surface, light: Light, block:
     return bits;
 }
 
-// Of the two samples in `may`, those that a triangle of instance `number` hides; not the triangle that the surface is of.
+// Returns the samples in the mask `may` that triangles of instance `number` occlude, except that of the surface. Bits
+// outside of `may` are set too.
 fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
     let i = load_instance(number);
     let origin = point_to_mesh(i, surface.ray_origin);
@@ -257,7 +256,8 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
     return hidden;
 }
 
-// Whether an item of the tree lies between a surface and `t_max` times `to`, but for the primitive `target_prim`; or `before`.
+// Returns true if `before`, or if any item except `target_prim` occludes the segment from a surface to `t_max` times
+// `to`.
 fn is_occluded_by_bvh(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     var hidden = before;
     let s = slabs(surface.ray_origin, to, item_pad(surface.ray_origin));
@@ -289,7 +289,7 @@ fn is_occluded_by_item(item: Item, surface: Surface, to: vec3f, t_max: f32, targ
     return cut | is_occluded_by_primitive_item(item, surface, to, t_max, target_prim);
 }
 
-// Of the triangles of instance `number`; not the one that the surface is of.
+// Returns true if a triangle of instance `number`, except that of the surface, occludes the segment.
 fn is_occluded_by_mesh(number: u32, surface: Surface, to: vec3f, t_max: f32) -> bool {
     let i = load_instance(number);
     let origin = point_to_mesh(i, surface.ray_origin);

@@ -1,12 +1,11 @@
-// A node of a tree of boxes: eight children whose boxes are counted in steps from the node's corner, after Ylitie, Karras and
-// Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.
+// A node of an 8-wide BVH with quantized child boxes: Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on
+// GPUs Through Compressed Wide BVHs", HPG 2017, section 3.
 
-// The steps of four children.
+// Unpacks the quantized coordinates of four children.
 fn steps(word: u32) -> vec4f {
     return vec4f(f32(word & 0xffu), f32((word >> 8u) & 0xffu), f32((word >> 16u) & 0xffu), f32(word >> 24u));
 }
 
-// The length of a step along an axis, by the number of the axis.
 fn step_length(node: Node, axis: u32) -> f32 {
     return bitcast<f32>(((node.scales >> (8u * axis)) & 0xffu) << 23u);
 }
@@ -19,13 +18,13 @@ fn smaller(a: vec4f, b: vec4f) -> vec4f {
     return select(b, a, a < b);
 }
 
-// Bit i is set where the interval of child i is not empty and lies between 0 and `limit`.
+// Returns the mask of the intervals that are not empty and overlap [0, limit].
 fn passed_bits(near: vec4f, far: vec4f, limit: f32) -> u32 {
     let passed = (near <= far) & (far >= vec4f(0.0)) & (near <= vec4f(limit));
     return select(0u, 1u, passed.x) | select(0u, 2u, passed.y) | select(0u, 4u, passed.z) | select(0u, 8u, passed.w);
 }
 
-// Bit i is set where the ray passes the box of child i, as `box_interval` says.
+// Returns the mask of the children whose boxes the ray hits.
 fn children_hit(node: Node, s: Slabs, limit: f32) -> u32 {
     let first = four_passed(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
                             vec3u(node.high_x.x, node.high_y.x, node.high_z.x), s, limit);
@@ -49,7 +48,7 @@ fn four_passed(node: Node, low: vec3u, high: vec3u, s: Slabs, limit: f32) -> u32
     return passed_bits(near, far, limit);
 }
 
-// Bit i is set where any ray of the fan may pass the box of child i, as `ray_interval_box` says.
+// Returns the mask of the children whose boxes any ray of the interval may hit.
 fn children_in_interval(node: Node, f: RayInterval, limit: f32) -> u32 {
     let first = four_in_fan(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
                             vec3u(node.high_x.x, node.high_y.x, node.high_z.x), f, limit);
@@ -77,14 +76,14 @@ fn four_in_fan(node: Node, low: vec3u, high: vec3u, f: RayInterval, limit: f32) 
     return passed_bits(larger(larger(near_x, near_y), near_z), smaller(smaller(far_x, far_y), far_z), limit);
 }
 
-// The latest that any ray of a fan leaves a box along an axis.
+// Returns the largest t at which a ray of the interval leaves a box along an axis.
 fn far_side(low: vec4f, high: vec4f, far_low: f32, far_high: f32) -> vec4f {
     let none = (far_low == 0.0) & (far_high == 0.0);
     return select(low * far_low + high * far_high, vec4f(INFINITE_T), none);
 }
 
-// The eight bits of slots in the order in which a ray of this octant visits them: bit i is slot i ^ octant's. Bit k of an octant
-// is set where the ray goes down along axis k; slot i's box lies on the upper side of axis k where bit k of i is set.
+// Permutes the bits of slots to visiting order: bit i becomes that of slot i ^ octant. Bit k of an octant is set if the
+// direction is negative along axis k; bit k of a slot, if its box is on the upper side.
 fn in_order(bits: u32, octant: u32) -> u32 {
     let by_x = select(bits, ((bits & 0x55u) << 1u) | ((bits >> 1u) & 0x55u), (octant & 1u) != 0u);
     let by_y = select(by_x, ((by_x & 0x33u) << 2u) | ((by_x >> 2u) & 0x33u), (octant & 2u) != 0u);
@@ -95,7 +94,7 @@ fn octant_of(direction: vec3f) -> u32 {
     return select(0u, 1u, direction.x < 0.0) | select(0u, 2u, direction.y < 0.0) | select(0u, 4u, direction.z < 0.0);
 }
 
-// A leaf's items: x is the first of them, y how many there are. An empty slot is a leaf of none.
+// Returns the first item and the number of items, 0 for an empty slot.
 fn leaf_items(node: Node, slot: u32) -> vec2u {
     let word = select(node.leaves.x, node.leaves.y, slot >= 4u);
     let leaf = (word >> (8u * (slot & 3u))) & 0xffu;

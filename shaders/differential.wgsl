@@ -1,7 +1,7 @@
-// Ray differentials: how a ray changes with the point of the picture that it belongs to. Homan Igehy, "Tracing Ray
-// Differentials", SIGGRAPH 1999; sections are those of that paper.
+// Ray differentials: derivatives of a ray by the image coordinates. Igehy, "Tracing Ray Differentials", SIGGRAPH 1999;
+// sections are those of that paper.
 
-// Of a ray with respect to one coordinate of the picture, times the distance of two samples.
+// Derivative by one image coordinate, times the sample spacing.
 struct Derivative {
     position: vec3f,
     direction: vec3f,
@@ -12,15 +12,15 @@ struct Differential {
     y: Derivative,
 }
 
-// Along the ray to its hit at t, on a surface with this normal: section 3.1, transfer.
+// Transfers a derivative to a hit at t (section 3.1).
 fn transferred(derivative: Derivative, ray: Ray, t: f32, normal: vec3f) -> Derivative {
     let moved = derivative.position + derivative.direction * t;
     let dt = dot(moved, normal) / dot(ray.direction, normal);
     return Derivative(moved - ray.direction * dt, derivative.direction);
 }
 
-// Of an outward unit normal where the position on the primitive has the derivative `dp`: section 3.2. The gradient of
-// |M (P - c)|^2 / 2 is g = M^T M (P - c), on the side of a cylinder without the third row of M; with N = g / |g|,
+// Returns the derivative of the outward unit normal for that of the position, `dp` (section 3.2). The gradient of
+// |M (P - c)|^2 / 2 is g = M^T M (P - c), on a cylinder's side without the third row of M; with N = g / |g|,
 // dN = (dg - N (N . dg)) / |g|.
 fn normal_derivative(q: Primitive, local: vec3f, dp: vec3f) -> vec3f {
     let dl = vector_to_local(q, dp);
@@ -33,14 +33,13 @@ fn normal_derivative(q: Primitive, local: vec3f, dp: vec3f) -> vec3f {
     return select(vec3f(0.0), (dg - n * dot(n, dg)) * scale, is_solid(q.kind));
 }
 
-// By a mirror with the normal n: section 3.1, reflection.
+// Reflects a derivative at the normal n (section 3.1).
 fn reflected_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f) -> Derivative {
     let d_n = dot(derivative.direction, n) + dot(d, dn);
     return Derivative(derivative.position, derivative.direction - (dn * dot(d, n) + n * d_n) * 2.0);
 }
 
-// Into a medium, eta the ratio of the indices of refraction and `cosine` that of the refracted ray: section 3.1,
-// refraction.
+// Refracts a derivative (section 3.1): eta is the index ratio, `cosine` that of the refracted ray.
 fn refracted_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f, eta: f32, cosine: f32) -> Derivative {
     let d_n = dot(d, n);
     let mu = eta * d_n + cosine;
@@ -48,7 +47,7 @@ fn refracted_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f, e
     return Derivative(derivative.position, derivative.direction * eta - (dn * mu + n * dmu));
 }
 
-// A ray's differential at a surface: the positions on it, the directions still those before it, and the normal's.
+// A differential at a hit, before scattering, with the derivatives of the normal.
 struct HitDifferential {
     x: Derivative,
     y: Derivative,

@@ -1,23 +1,23 @@
-// The material `diffuse`: Lambert's reflection, and where it is rough the energy-preserving Oren-Nayar model.
+// The material `diffuse`: Lambertian, or energy-preserving Oren-Nayar (EON) if rough.
 
-// The cosines of the angles between a normal, the direction to the light and the one to the viewer.
+// Cosines between normal, wi and wo.
 struct Angles {
     wi: f32,
     wo: f32,
-    between: f32,          // wi and wo
+    between: f32,          // between wi and wo
 }
 
 fn angles_at(normal: vec3f, wo: vec3f, wi: vec3f) -> Angles {
     return Angles(dot(normal, wi), dot(normal, wo), dot(wi, wo));
 }
 
-// The BRDF times the cosine of wi.
+// Returns the BRDF times the cosine of wi.
 fn diffuse_eval(material: Material, angles: Angles) -> vec3f {
     return material.diffuse * (max(angles.wi, 0.0) * 0.31830988618379067);
 }
 
-// Portsmouth, Kutz and Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF", 2024: Fujii's form of the model of Oren and
-// Nayar, and what it loses given back. Times the cosine of wi. For the roughness 0 it is Lambert's.
+// Returns the BRDF times the cosine of wi, Lambertian at roughness 0: Fujii's Oren-Nayar model with multiple
+// scattering. Portsmouth, Kutz and Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF", 2024.
 fn rough_diffuse_eval(material: Material, angles: Angles) -> vec3f {
     let wi = max(angles.wi, 0.0);
     let wo = max(angles.wo, 0.0);
@@ -34,8 +34,7 @@ fn rough_diffuse_eval(material: Material, angles: Angles) -> vec3f {
     return (color * once + often) * (wi * 0.31830988618379067);
 }
 
-// How the share of light that a rough surface reflects at once grows with its roughness, by the cosine of the light's angle: G / pi
-// of the same paper.
+// Returns G / pi of that paper: the growth of the single-scattering albedo with roughness.
 fn rough_share(cosine: f32) -> f32 {
     let s = sqrt(max(1.0 - cosine * cosine, 0.0));
     let angle = atan2(s, cosine);
@@ -43,12 +42,11 @@ fn rough_share(cosine: f32) -> f32 {
     return (s * (angle - s * cosine) + 0.6666667 * (tangent - s)) * 0.31830988618379067;
 }
 
-// The density of `diffuse_sample`, per solid angle.
+// Returns the pdf per solid angle.
 fn diffuse_pdf(angles: Angles) -> f32 {
     return max(angles.wi, 0.0) * 0.31830988618379067;
 }
 
-// A direction wi.
 fn diffuse_sample(normal: vec3f, u: vec2f) -> vec3f {
     return hemisphere_sample(normal, u);
 }

@@ -1,14 +1,13 @@
 // The ellipsoid: the unit sphere of local space.
 
-// |l|^2 - 1 of a point's local position l: below 0 inside. `from_anchor` is (x, y, z) (p - anchor), which is short where
-// the point is near the anchor; 1 does not come into it, so that it keeps its digits.
+// Returns |l|^2 - 1 of a point's local position l; negative inside. `from_anchor`, (x, y, z) (p - anchor), is short
+// near the anchor, and the 1 is part of `q.level`: digits are kept.
 fn ellipsoid_level(q: Primitive, from_anchor: vec3f) -> f32 {
     return dot(from_anchor, from_anchor - q.middle * 2.0) + q.level;
 }
 
-// a times the discriminant of |o + s d|^2 = 1, for a = d.d, b = o.d and start = |o|^2 - 1: (o.d)^2 - a (|o|^2 - 1), or
-// a - |o x d|^2, which is the same (Lagrange's identity). The first keeps its digits near the surface, the second far
-// from it.
+// Returns the quarter discriminant of |o + s d|^2 = 1, where start = |o|^2 - 1: (o.d)^2 - d.d start, equal to
+// d.d - |o x d|^2 (Lagrange). The first keeps its digits near the surface, the second far from it.
 fn ellipsoid_discriminant(o: vec3f, d: vec3f, start: f32) -> f32 {
     let a = dot(d, d);
     let b = dot(o, d);
@@ -16,15 +15,15 @@ fn ellipsoid_discriminant(o: vec3f, d: vec3f, start: f32) -> f32 {
     return select(a - dot(moment, moment), b * b - a * start, start < 1.0);
 }
 
-// The angle around the third axis from the first towards the second one, from 0 to 1.
+// Returns the angle about the third axis, from the first towards the second, in turns.
 fn longitude(local: vec3f) -> f32 {
     let turn = atan2(local.y, local.x) * 0.15915494309189535;
     return select(turn, turn + 1.0, turn < 0.0);
 }
 
-// The distance of the nearest hit in (0, limit), else `limit`. `inside_prim` says that the ray starts on the surface and goes
-// through the inside: then the other end of the chord is the hit. The nearer root avoids cancellation: Haines, Guenther
-// and Akenine-Moeller, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.
+// Returns the distance of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray starts on the surface
+// and goes inside: the hit is the chord's other end. The nearer root avoids cancellation: Haines, Guenther and
+// Akenine-Moeller, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.
 fn intersect_ellipsoid(q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let o = from_anchor - q.middle;
@@ -42,9 +41,8 @@ fn intersect_ellipsoid(q: Primitive, inside_prim: bool, ray: Ray, limit: f32) ->
     return select(limit, t, (discriminant >= 0.0) & (t > 0.0) & (t < limit));
 }
 
-// Whether its surface cuts the segment o + s d, s in (0, reach), of local space; `start` is |o|^2 - 1. It does if the ends
-// lie on different sides; or if both are outside, the nearest point to the centre is between them, and the line comes
-// within the sphere.
+// Returns true if the surface cuts the segment o + s d, s in (0, t_max): if the ends lie on different sides, or if both
+// are outside, the point nearest to the center is in between, and the line hits the sphere.
 fn ellipsoid_occludes(o: vec3f, d: vec3f, start: f32, t_max: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);

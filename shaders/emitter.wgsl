@@ -1,17 +1,17 @@
-// What shines: which of it a sample of light is taken from, and at which point.
+// Emitter selection and light sampling for next-event estimation (NEE).
 
 // Light that may arrive at a point.
 struct LightSample {
-    to: vec3f,             // from the point to that of the light; of distant light the direction that it comes from
-    radiance: vec3f,       // of a light without extent, what its light weighs there for a density of 1
-    pdf: f32,              // per solid angle, with the light's choice; the choice's alone of a light without extent
-    is_delta: bool,        // has no extent, so that no other ray finds it
-    t_max: f32,            // where shadow rays end, as a multiple of `to`
-    primitive: u32,        // the emissive primitive, which does not occlude itself, or NO_INDEX
+    to: vec3f,             // to the light's point; towards distant light
+    radiance: vec3f,       // of a delta light: its contribution for a pdf of 1
+    pdf: f32,              // per solid angle, with the selection; of a delta light the selection alone
+    is_delta: bool,        // cannot be hit by other rays
+    t_max: f32,            // end of shadow rays, as a multiple of `to`
+    primitive: u32,        // the emitter, which does not occlude itself, or NO_INDEX
 }
 
-// One of all that shines, by its power: Walker, "An Efficient Method for Generating Discrete Random Variables with General
-// Distributions", ACM TOMS 3(3), 1977. Two numbers of 32 random bits.
+// Selects an emitter by power with two 32-bit random numbers: Walker's alias method, "An Efficient Method for
+// Generating Discrete Random Variables with General Distributions", ACM TOMS 3(3), 1977.
 fn select_emitter(bits: vec2u) -> Emitter {
     let count = emitter_count();
     if EMITTERS == 1u {
@@ -22,8 +22,7 @@ fn select_emitter(bits: vec2u) -> Emitter {
     return load_emitter(select(emitter.other, first, unit_float(bits.y) < emitter.threshold));
 }
 
-// A sample of the light that arrives at p from what was chosen, for a uniform u. `normal` is that of a surface which light from its side
-// alone can reach, or 0.
+// Samples the light that arrives at p from an emitter. `normal` is that of a surface lit from its side only, else 0.
 fn sample_emitter(chosen: EmitterSelection, p: vec3f, normal: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     if (EMITTER_KINDS & (1u << INSTANCE)) != 0u {
@@ -103,12 +102,12 @@ fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
     return LightSample(to, radiance, pdf, is_delta, light.t_max, light.primitive);
 }
 
-// A hit on a primitive by itself, for what asks for no more of it.
+// Returns a hit that identifies a standalone primitive and nothing else.
 fn hit_on_primitive(primitive: u32) -> Hit {
     return Hit(0.0, 0u, primitive, 0u, vec2f(0.0));
 }
 
-// Of a triangle of a mesh.
+// Samples an emissive triangle of a mesh.
 fn sample_face(chosen: EmitterSelection, p: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     let b = triangle_sample(u);
@@ -136,7 +135,7 @@ fn sample_face(chosen: EmitterSelection, p: vec3f, u: vec2f) -> LightSample {
     return LightSample(to, radiance, pdf, false, environment.t_max, NO_INDEX);
 }
 
-// What a surface radiates at texture coordinates, the colours of its vertices aside.
+// Returns the textured emission, without vertex colors.
 fn emission_at(material: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> vec3f {
     var emission = material.emission;
     for (var i = 0u; i < LOOKUPS; i++) {
@@ -151,7 +150,7 @@ fn emission_at(material: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> v
     return emission;
 }
 
-// The density that `sample_emitter` gives to what a ray has met, with the emitter's choice, where samples have this density per area.
+// Returns the pdf of `sample_emitter` for a hit, per solid angle; `density` is per area. Both include the selection.
 fn emitter_pdf(prim: HitPrimitive, hit: Hit, density: f32, ray: Ray, normal: vec3f) -> f32 {
     if (EMITTER_KINDS & (1u << ELLIPSOID)) != 0u {
         if prim.primitive.kind == ELLIPSOID {

@@ -1,6 +1,6 @@
-// Directional albedo of microfacet lobes by single scattering, from tables (`crates/render/src/pack/energy.rs`).
+// Single-scattering directional albedo of microfacet lobes, from tables (`crates/render/src/pack/energy.rs`).
 
-// Directional albedo of rough glass, reflected and transmitted: interpolated in its table, rows by roughness and columns by the cosine.
+// Returns the albedo of rough glass, reflection plus transmission. Rows are by roughness, columns by the cosine of wo.
 fn single_scatter_albedo(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     let last = f32(ENERGY_SIZE - 1u);
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
@@ -15,8 +15,8 @@ fn single_scatter_albedo(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32
     return both.x + (both.y - both.x) * (column - j);
 }
 
-// The same of facets that are rougher along one axis: from one of the parts of their table, between its rows by roughness and by anisotropy,
-// where textures give these, its lines and its columns.
+// Returns the albedo of an anisotropic lobe from one part of its table. Interpolates over roughness and anisotropy if
+// these are textured, and over the direction.
 fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part: u32) -> f32 {
     let start = material.aniso_table - 1u;
     let rows = vec2u(texel_word(start), texel_word(start + 1u));
@@ -46,11 +46,11 @@ fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part
     return sum;
 }
 
-// What rough glass reflects and lets pass at once, by whichever table it has.
+// Returns the albedo of rough glass from whichever table it has.
 fn single_scatter_albedo_glass(material: Material, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     if ANISOTROPIC != 0u {
         if material.aniso_table != 0u {
-            // Those of the two sides come last.
+            // The last two parts are the two sides of glass.
             let behind = select(2u, 0u, material.kind == ROUGH_GLASS) + select(1u, 0u, side > 0.0);
             return single_scatter_albedo_aniso(material, alpha, wo, behind);
         }
@@ -58,8 +58,8 @@ fn single_scatter_albedo_glass(material: Material, alpha: vec2f, wo: vec3f, side
     return single_scatter_albedo(material.energy, alpha, wo, side);
 }
 
-// What is known of a principled material's facets: the two parts of what those reflect that are rougher along one axis, as `ggx_albedo` has
-// them, x and y; and what it reflects and lets pass as rough glass, z.
+// Returns a principled material's albedos from tables, else 1: x and y of the anisotropic specular lobe as in
+// `ggx_albedo`, z as rough glass.
 fn principled_energy(material: Material, wo: vec3f, side: f32) -> vec3f {
     var found = vec3f(1.0);
     let alpha = facet_alpha(material);

@@ -1,20 +1,20 @@
-// The environment map: the light that arrives from a direction, and samples of it by the map and the clamped cosine.
+// The environment map and its importance sampling by radiance and clamped cosine.
 //
-// The map's cells lie in blocks, at most 32 x 32. A block is chosen by the light that it sends to a surface of a given normal, which
-// cumulative distributions list for 256 bins of normals; the cell in it by its radiance alone. So the pdf is known exactly, and a pixel's
-// stratified samples stay stratified over the blocks.
+// The map is divided into at most 32 x 32 blocks of cells. A block is chosen by its irradiance on a surface, from
+// cumulative distributions for 290 bins of normals; a cell in it by radiance alone. So the pdf is exact, and a pixel's
+// samples stay stratified over the blocks.
 
-// The light that arrives from a direction.
+// The light from a direction.
 struct EnvironmentEval {
     radiance: vec3f,
-    pdf: f32,              // of samples of light there, per solid angle, with the choice of the map among all emitters
+    pdf: f32,              // of `sample_environment`, per solid angle, including the selection
 }
 
-// One interval of a cumulative distribution.
+// An interval of a cumulative distribution.
 struct Interval {
     index: u32,
-    width: f32,            // its probability
-    position: f32,         // of the number that chose it, from 0 to 1
+    width: f32,            // probability
+    position: f32,         // of the random number in it, 0 to 1
 }
 
 fn environment_texel(row: u32, column: u32) -> vec3f {
@@ -26,13 +26,13 @@ fn environment_float(at: u32) -> f32 {
     return bitcast<f32>(texel_word(at));
 }
 
-// The rows' distribution for surfaces of this normal. Those of the rows' blocks follow it.
+// Returns the offset of the rows' distribution for a normal. Those of the blocks in each row follow.
 fn block_distributions(normal: vec3f) -> u32 {
     let rows = (environment.height >> (environment.shifts >> 8u)) + 1u;
     return environment.blocks + rows * ENVIRONMENT_BLOCKS + normal_bin(normal) * (rows + 1u) * (ENVIRONMENT_BLOCKS + 1u);
 }
 
-// The interval that holds u, by binary search. Every distribution has 32, empty ones at the end. u has 24 binary digits, `digits` the next.
+// Finds the interval that holds u among 32, empty ones last, by binary search. `digits` extends u's 24 binary digits.
 fn interval_at(distribution: u32, u: f32, digits: f32) -> Interval {
     var at = distribution;
     at += select(0u, 16u, u >= environment_float(at + 16u));
@@ -50,7 +50,7 @@ fn interval_width(distribution: u32, index: u32) -> f32 {
     return environment_float(distribution + index + 1u) - environment_float(distribution + index);
 }
 
-// Bilinear between the centres of texels. The pdf is that of samples at a surface of this normal: the block's probability, by the cell's mean.
+// Returns the bilinear radiance, and the pdf at a surface with this normal: the block's probability by the cell's mean.
 fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     let d = vec3f(dot(environment.x, direction), dot(environment.y, direction), dot(environment.z, direction));
     let cell = cell_towards(d, environment.width, environment.height);
@@ -71,16 +71,15 @@ fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     return EnvironmentEval(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
 }
 
-// The light that a ray which leaves the scene finds, weighed against the samples of light that find the same. `pdf` is that of the ray's
-// direction, `normal` that of the surface which it left.
+// Returns the radiance of a ray that leaves the scene, with its MIS weight; `pdf` is the ray's, `normal` its surface's.
 fn environment_mis(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
     let arriving = environment_eval(direction, normal);
     return arriving.radiance * select(1.0, power_heuristic(pdf, arriving.pdf), pdf > 0.0);
 }
 
-// A sample of the map for a surface of this normal; 0 where light may arrive from both sides. Rows and columns of blocks are chosen by
-// inversion, and a cell of the block by Walker's method, for which the place in the block says which cell is looked at. The radiance is looked
-// up as for any other ray, so that both have one pdf for it.
+// Samples the map for a surface with this normal, or 0 if light may arrive from both sides. Inverts the distributions
+// of rows and blocks, then picks a cell by Walker's alias method, the position in the block selecting the entry. The
+// radiance is evaluated as for other rays, so that the pdfs agree.
 fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
     let more = hash4(vec4u(bitcast<u32>(u.x), bitcast<u32>(u.y), 0u, 0u));
     let rows = block_distributions(normal);

@@ -1,19 +1,18 @@
-// The footprint of a sample on a surface, in texture coordinates.
+// Sample footprints on surfaces, in texture coordinates.
 
 struct Footprint {
     uv: vec2f,
-    dx: vec2f,             // the edges of the parallelogram that the sample stands for
+    dx: vec2f,             // edges of the sample's parallelogram
     dy: vec2f,
 }
 
-// On a surface of the primitive q, whose position has the derivatives `dx` and `dy`.
+// Returns the footprint on q for the derivatives `dx` and `dy` of the position.
 fn surface_footprint(q: Primitive, surface: Surface, dx: vec3f, dy: vec3f) -> Footprint {
     let local = point_to_local(q, surface.position);
     return Footprint(surface.uv, uv_derivative(q, local, vector_to_local(q, dx)),
                      uv_derivative(q, local, vector_to_local(q, dy)));
 }
 
-// What a texture is beyond its edges along u, and along v.
 fn wrap_u(t: Texture) -> u32 {
     return t.wrap & 3u;
 }
@@ -22,8 +21,8 @@ fn wrap_v(t: Texture) -> u32 {
     return t.wrap >> 2u;
 }
 
-// A surface's footprint in a texture's own coordinates. Beyond an edge that is clamped nothing changes across the edge: the footprint
-// is a point there in that direction, so that no coarse level brings in what is far from the edge.
+// Transforms a footprint to the texture's coordinates. Beyond a clamped edge it has no extent across the edge, so that
+// coarse levels bring in nothing from afar.
 fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
     let dx = vec2f(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
     let dy = vec2f(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);
@@ -34,15 +33,15 @@ fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
                      vec2f(select(dy.x, 0.0, x), select(dy.y, 0.0, y)));
 }
 
-// An ellipse: the points p with p^T M^-1 p <= 1.
+// An ellipse p^T M^-1 p <= 1.
 struct Ellipse {
-    m: vec3f,              // M's elements xx, xy and yy
-    major: f32,            // the half axes' lengths
+    m: vec3f,              // xx, xy and yy of M
+    major: f32,            // semi-axes
     minor: f32,
 }
 
-// The ellipse with the conjugate half axes dx and dy, its minor axis made at least 1 / `anisotropy` of the major one.
-// The eigenvalues of J J^T for J = (dx, dy) are the squares of the half axes.
+// Returns the ellipse with the conjugate semi-axes dx and dy, the minor one at least 1 / `anisotropy` of the major one.
+// The eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
 fn footprint_ellipse(dx: vec2f, dy: vec2f, anisotropy: f32) -> Ellipse {
     let p = dx.x * dx.x + dy.x * dy.x;
     let q = dx.x * dx.y + dy.x * dy.y;
@@ -53,7 +52,7 @@ fn footprint_ellipse(dx: vec2f, dy: vec2f, anisotropy: f32) -> Ellipse {
     let area = dx.x * dy.y - dx.y * dy.x;
     let least = large / (anisotropy * anisotropy);
     let small = min(max(area * area / max(large, 1e-30), least), large);
-    // M = small I + (large - small) e e^T with the unit vector e of the major axis.
+    // M = small I + (large - small) e e^T, e the unit vector of the major axis.
     let wide = half >= 0.0;
     let e = vec2f(select(q, half + root, wide), select(root - half, q, wide));
     let e2 = e.x * e.x + e.y * e.y;

@@ -1,8 +1,7 @@
-// The scene's geometry, as integrators know it. A ray meets it by `closest_hit`, and light is hidden by it as
-// `occluded_samples` says. Primitives that are few are looked at one by one, in buffers (`buffers.wgsl`) or as constants; all else
-// by trees (`bvh.wgsl`). What a hit is like is here.
+// Ray queries of integrators: closest hits, occlusion and the surface at a hit. Few primitives are tested one by one,
+// in buffers (`buffers.wgsl`) or as constants; all others by BVHs (`bvh.wgsl`).
 
-// The nearest thing that a ray meets; not what it has left. It may start on the wall of a round primitive, inside of it.
+// Returns the closest hit except on `origin_prim`. `inside_prim` is a solid from whose surface the ray goes inside.
 fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     if TLAS_KINDS == 0u {
         return closest_primitive(ray, origin_prim.y, inside_prim.y);
@@ -10,9 +9,8 @@ fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     return closest_in_tree(closest_primitive(ray, by_itself(origin_prim), by_itself(inside_prim)), ray, origin_prim, inside_prim);
 }
 
-// Bit i is set where anything hides sample i of the block from a surface. What the surface is of hides none that are above it,
-// unless it is round and seen from inside. What is hidden or not of the samples whose bits are set in `unlit` does not matter:
-// trees are not asked.
+// Returns the mask of a block's occluded samples. The surface's own primitive occludes none above it, unless it is a
+// solid seen from inside. Bits in `unlit` do not matter: the BVH is not traversed for these.
 fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u32) -> u32 {
     let bits = occluded_by_primitives(surface, light, block);
     if TLAS_KINDS == 0u {
@@ -21,8 +19,8 @@ fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u
     return occluded_by_bvh(bits | unlit, surface, light, block);
 }
 
-// Whether it is so `before`, or anything lies between where rays leave a surface on the viewer's side and `t_max` times the vector `to` from there, but for
-// the primitive `target_prim`. What the surface is of does not, as for `occluded_samples`.
+// Returns true if `before`, or if a primitive except `target_prim` occludes the segment from the surface to
+// `t_max * to`. The surface's own primitive counts as in `occluded_samples`.
 fn is_occluded(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let hidden = is_occluded_by_primitives(before, surface, to, t_max, target_prim);
     if TLAS_KINDS == 0u {
@@ -31,7 +29,6 @@ fn is_occluded(before: bool, surface: Surface, to: vec3f, t_max: f32, target_pri
     return is_occluded_by_bvh(hidden, surface, to, t_max, target_prim);
 }
 
-// Whether a hit is on a mesh.
 fn is_on_mesh(hit: Hit) -> bool {
     if (TLAS_KINDS & (1u << INSTANCE)) == 0u {
         return false;
@@ -39,7 +36,6 @@ fn is_on_mesh(hit: Hit) -> bool {
     return hit.instance != 0u;
 }
 
-// What was hit.
 fn fetch_hit_primitive(hit: Hit) -> HitPrimitive {
     if is_on_mesh(hit) {
         return face_of(load_instance(hit.instance - 1u), hit);
@@ -47,7 +43,7 @@ fn fetch_hit_primitive(hit: Hit) -> HitPrimitive {
     return standalone_hit_primitive(load_primitive(hit.primitive));
 }
 
-// The point of a surface where a ray met it.
+// Returns the surface at a hit.
 fn surface_of(prim: HitPrimitive, hit: Hit, ray: Ray) -> Surface {
     if is_on_mesh(hit) {
         let place = vec2u(hit.instance, hit.primitive);
@@ -61,12 +57,12 @@ fn surface_of(prim: HitPrimitive, hit: Hit, ray: Ray) -> Surface {
     return with_coordinates(surface, q);
 }
 
-// What it is made of, textures aside.
+// Returns the untextured material.
 fn material_of(prim: HitPrimitive) -> Material {
     return load_material(prim.primitive.material);
 }
 
-// How the hit changes with the point of the picture.
+// Returns the derivatives of the hit by the image coordinates.
 fn hit_differential(prim: HitPrimitive, hit: Hit, surface: Surface, ray: Ray, differential: Differential) -> HitDifferential {
     if DIFFERENTIALS == 0u {
         return HitDifferential();
@@ -77,7 +73,7 @@ fn hit_differential(prim: HitPrimitive, hit: Hit, surface: Surface, ray: Ray, di
     return arrival(prim.primitive, differential, ray, hit.t, surface);
 }
 
-// The part of the surface that the hit stands for, in texture coordinates.
+// Returns the hit's footprint in texture coordinates.
 fn footprint_of(prim: HitPrimitive, hit: Hit, surface: Surface, at: HitDifferential) -> Footprint {
     if is_on_mesh(hit) {
         return face_footprint(prim, surface, at.x.position, at.y.position);
@@ -85,7 +81,7 @@ fn footprint_of(prim: HitPrimitive, hit: Hit, surface: Surface, at: HitDifferent
     return surface_footprint(prim.primitive, surface, at.x.position, at.y.position);
 }
 
-// The camera's ray through a point of the picture, and the middle of its lens.
+// Returns the camera ray through an image point and the lens center.
 fn view_ray(place: vec2f) -> Ray {
     if PANORAMIC != 0u {
         return panorama_ray(camera, place);
@@ -93,7 +89,7 @@ fn view_ray(place: vec2f) -> Ray {
     return camera_ray(camera, place);
 }
 
-// A path from the camera, from behind the last surface that is hidden from it and before all others.
+// Moves a camera path behind the surfaces in front that are invisible to the camera.
 fn skip_camera_invisible(start: Path) -> Path {
     var path = start;
     for (var i = 0u; i < MAX_CAMERA_SKIPS; i++) {
@@ -115,7 +111,7 @@ fn skip_camera_invisible(start: Path) -> Path {
     return path;
 }
 
-// What the ray through a pixel's centre meets.
+// Returns the first hit through a pixel's center.
 fn pixel_first_hit(pixel: vec2u) -> FirstHit {
     let start = view_ray(vec2f(pixel) + 0.5);
     var path = Path(start, Differential(), vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);
@@ -129,7 +125,6 @@ fn pixel_first_hit(pixel: vec2u) -> FirstHit {
     return found;
 }
 
-// What a path meets first.
 fn path_first_hit(path: Path) -> FirstHit {
     let ray = path.ray;
     var hit = closest_hit(ray, path.origin_prim, path.inside_prim);

@@ -1,9 +1,9 @@
-// Microfacets of the distribution GGX: how the facets of a rough surface lie, which of them are seen, and how much light they reflect.
-// Vectors are local: z is along the normal, x and y along the axes of the two `alpha`, which are at least SMALLEST_ALPHA.
+// The GGX microfacet distribution: normals, masking, sampling and albedo. In local vectors z is along the normal, x and
+// y along the axes of the two `alpha`, which are at least SMALLEST_ALPHA.
 
-// The density of the facets' normals, per solid angle, on a unit of the surface: Trowbridge and Reitz, "Average irregularity
-// representation of a rough surface for ray reflection", JOSA 65(5), 1975. By the parts of m along the surface, which are exact where
-// it is smooth; 1 - cos^2 is not.
+// Returns the density of normals, per solid angle and area: Trowbridge and Reitz, "Average irregularity representation
+// of a rough surface for ray reflection", JOSA 65(5), 1975. The tangential components of m are exact where the surface
+// is smooth; 1 - cos^2 is not.
 fn ggx_d(alpha: vec2f, m: vec3f) -> f32 {
     let x = m.x / alpha.x;
     let y = m.y / alpha.y;
@@ -11,28 +11,28 @@ fn ggx_d(alpha: vec2f, m: vec3f) -> f32 {
     return select(0.0, 0.31830988618379067 / (alpha.x * alpha.y * s * s), m.z > 0.0);
 }
 
-// The length of w where the facets are stretched to a hemisphere.
+// Returns the length of w stretched to the hemispherical configuration.
 fn ggx_length(alpha: vec2f, w: vec3f) -> f32 {
     let x = w.x * alpha.x;
     let y = w.y * alpha.y;
     return sqrt(x * x + y * y + w.z * w.z);
 }
 
-// The share of the facets that face w and are seen from there: Smith's, as in Heitz, "Understanding the Masking-Shadowing Function in
-// Microfacet-Based BRDFs", JCGT 3(2), 2014, equations 43 and 86.
+// Returns Smith's masking function: Heitz, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs",
+// JCGT 3(2), 2014, equations 43 and 86.
 fn ggx_g1(alpha: vec2f, w: vec3f) -> f32 {
     let cosine = abs(w.z);
     return 2.0 * cosine / max(cosine + ggx_length(alpha, w), 1e-30);
 }
 
-// Of those that face both directions the share that is seen from both, where what is high is seen by both: the same paper, equation 99.
+// Returns the height-correlated masking-shadowing function: the same paper, equation 99.
 fn ggx_g2(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     let o = abs(wo.z);
     let i = abs(wi.z);
     return 2.0 * i * o / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
 }
 
-// The normal of a facet that is seen from wo: Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", HPG 2023.
+// Samples a normal visible from wo: Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", HPG 2023.
 fn ggx_sample(alpha: vec2f, wo: vec3f, u: vec2f) -> vec3f {
     let stretched = normalize(vec3f(wo.x * alpha.x, wo.y * alpha.y, wo.z));
     let middle = cap_sample(disk_sample(u), 1.0 + stretched.z) + stretched;
@@ -41,28 +41,28 @@ fn ggx_sample(alpha: vec2f, wo: vec3f, u: vec2f) -> vec3f {
     return select(vec3f(0.0, 0.0, 1.0), m * (1.0 / sqrt(length2)), length2 > 1e-20);
 }
 
-// The density of `ggx_sample`, per solid angle of m.
+// Returns the pdf of `ggx_sample`, per solid angle of m.
 fn ggx_pdf(alpha: vec2f, wo: vec3f, m: vec3f) -> f32 {
     return 2.0 * max(dot(wo, m), 0.0) * ggx_d(alpha, m) / max(wo.z + ggx_length(alpha, wo), 1e-30);
 }
 
-// The share of light from everywhere that facets reflect once to a direction at the cosine mu: F0 x + F90 y, by the Fresnel term of
-// Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", Eurographics 1994.
+// Returns the single-scattering albedo at the cosine mu, F0 x + F90 y, for the Fresnel term of Schlick, "An Inexpensive
+// BRDF Model for Physically-based Rendering", Eurographics 1994.
 fn ggx_albedo(alpha: f32, mu: f32) -> vec2f {
     let length = sqrt(alpha * alpha * (1.0 - mu * mu) + mu * mu);
     return ggx_albedo_fit(alpha, mu / length, length);
 }
 
-// About the same for two alpha: what the viewer sees is by the one along w, what the light does by their mean square. Within 7 % where one
-// of them is 1 and the other small, within 2 % elsewhere.
+// Approximates the albedo for two alpha: masking by the one along w, shadowing by the root mean square. Within 7 %
+// where one is 1 and the other small, within 2 % elsewhere.
 fn ggx_albedo_along(alpha: vec2f, w: vec3f) -> vec2f {
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
     let length = sqrt(square * (1.0 - w.z * w.z) + w.z * w.z);
     return ggx_albedo_fit(sqrt(square), abs(w.z) / ggx_length(alpha, w), length);
 }
 
-// Both as functions of `alpha`, of the cosine divided by the length of `ggx_length`, t, and of that length, l: fits of what
-// `scripts/fit-albedo` integrates. y is within 0.004, x + y within 0.005 of itself.
+// Evaluates the fits of `scripts/fit-albedo`, where l is `ggx_length` and t the cosine divided by it. y is within
+// 0.004, x + y within 0.5 % (relative).
 fn ggx_albedo_fit(alpha: f32, t: f32, l: f32) -> vec2f {
     let a = alpha;
     let lost_0 = 0.00548034 + t * (0.0632291 + t * (1.18311 - t * 1.24938));

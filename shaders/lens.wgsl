@@ -1,16 +1,16 @@
-// A thin lens: what lies in its focus plane is sharp, and all else is spread over the shape of its opening (Kolb, Mitchell and
-// Hanrahan, "A Realistic Camera Model for Computer Graphics", SIGGRAPH 1995, section 3.1).
+// Thin lens cameras: depth of field by aperture shape (Kolb, Mitchell and Hanrahan, "A Realistic Camera Model for
+// Computer Graphics", SIGGRAPH 1995, section 3.1).
 
-// The ray through the point `at` of the picture that starts at the point p of the lens, whose opening lies in the unit disk. It passes
-// through the same point of the focus plane wherever it starts. Lengths are divided by the focus distance, so that the largest and the
-// smallest have squares.
+// Returns the ray through the image point `at` from the lens point p, in the unit disk. Its point in the focus plane
+// does not depend on p. Lengths are divided by the focus distance, so that squares of extreme ones neither overflow nor
+// vanish.
 fn lens_ray(camera: Camera, at: vec2f, p: vec2f) -> Ray {
     let start = camera.lens_u * p.x + camera.lens_v * p.y;
     let through_middle = camera.forward + image_plane_offset(camera, at);
     return Ray(camera.position + start, normalize(through_middle - start * camera.inverse_focus));
 }
 
-// A uniform point of the opening: of the unit disk if it has no blades, else of a regular polygon in it.
+// Samples the aperture uniformly: the unit disk, or a regular polygon of blades in it.
 fn lens_sample(blades: u32, u: vec2f) -> vec2f {
     if blades == 0u {
         return disk_sample(u);
@@ -18,8 +18,7 @@ fn lens_sample(blades: u32, u: vec2f) -> vec2f {
     return polygon_sample(blades, u);
 }
 
-// A uniform point of the regular polygon whose corners lie on the unit circle, the first at (1, 0): of one of the triangles that its
-// centre makes with its sides.
+// Samples the regular polygon with corners on the unit circle, the first at (1, 0), by its triangles.
 fn polygon_sample(corners: u32, u: vec2f) -> vec2f {
     let scaled = u.x * f32(corners);
     let side = floor(scaled);
@@ -28,7 +27,7 @@ fn polygon_sample(corners: u32, u: vec2f) -> vec2f {
     return circle_point(side * step) * b.x + circle_point((side + 1.0) * step) * b.y;
 }
 
-// The point of the unit circle at an angle, in units of pi.
+// Returns the point of the unit circle at an angle in units of pi.
 fn circle_point(angle: f32) -> vec2f {
     return vec2f(sine(angle + 0.5), sine(angle));
 }

@@ -1,14 +1,12 @@
-// Which of much that shines a sample of light is taken from: the way down the tree over it, and up from what a ray has met.
+// Light selection: descends the light tree to pick an emitter, and ascends it to get the pdf of a hit emitter.
 
-// What was chosen.
 struct EmitterSelection {
     emitter: Emitter,
-    density: f32,          // of samples on it, per area, with its choice; 0 for what was not chosen by the tree
+    density: f32,          // pdf per area, including the selection; 0 if not by the tree
 }
 
-// What light is sampled of at p, where the table of emitters gives `emitter`: this, or what the tree chooses if it stands for the
-// tree. n is as `light_importance` has it. Each level has random numbers of its own: sets over the pixel's samples, for two levels at
-// a time.
+// Returns `emitter`, or a choice of the light tree at p if the entry stands for the tree. n is as in
+// `light_importances`. Two levels at a time share a random point, a set over the pixel's samples.
 fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -> EmitterSelection {
     var chosen = EmitterSelection(emitter, 0.0);
     if emitter.index != NO_INDEX {
@@ -39,7 +37,7 @@ fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u
     return chosen;
 }
 
-// The density of samples, per area, on what the ray from p has met: 0 for what the tree does not know, or unless it is wanted.
+// Returns the pdf, per area, of a sample at a hit from p; 0 if not `wanted` or not in the tree.
 fn light_tree_pdf(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     var at = NO_INDEX;
     if wanted {

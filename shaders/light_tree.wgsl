@@ -1,15 +1,16 @@
-// The tree over what shines: how much light of a node's children may arrive at a point. Conty Estevez and Kulla, "Importance Sampling of Many
-// Lights with Adaptive Tree Splitting", HPG 2018, without the splitting, and with four children.
+// Importance sampling of light-tree nodes: Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive
+// Tree Splitting", HPG 2018, without the splitting and with four children per node.
 
-// The mean of what is above 0 of a height that is evenly spread from m - r to m + r.
+// Returns the mean of max(h, 0) for h uniform on [m - r, m + r].
 fn mean_above(m: vec4f, r: vec4f) -> vec4f {
     return select(max4(m, vec4f(0.0)), 0.25 * (m + r) * ((m + r) / r), abs(m) < r);
 }
 
-// How much light of each child may arrive at p, up to a factor: as section 4.1 has it, but that the cosines there and here are means over the sphere of
-// heights above the lamp's and the surface's planes, by the distance, and no less than 0.03 of the radius, as spheres are wider than what is
-// in them. To the square of the distance a tenth of that of the radius is added. n is the normal of a surface that light from its side
-// alone can reach, or 0. Above 0 where any of it can arrive, with room for all that is rounded.
+// Returns the importances of the children for p, up to a factor: section 4.1, where each cosine is a mean over the
+// bounding sphere, of the height above the plane of emitter or surface, over the distance. The mean height is at least
+// 0.03 of the radius, since spheres are wider than their contents. A tenth of the squared radius is added to the
+// squared distance. n is the normal of a surface lit from its side only, else 0. The result is positive where light can
+// arrive, with a margin for rounding.
 fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
     let x = node.x - p.x;
     let y = node.y - p.y;
@@ -27,14 +28,14 @@ fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
     let faces_by = max4(mean_above(facing, node.radius), least);
     let inverse = 1.0 / max4(sqrt(d2 + 0.1 * node.radius * node.radius), vec4f(1e-15));
     let value = node.intensity * (leaves_by * inverse) * (faces_by * inverse) * (inverse * inverse);
-    // The cosine falls no faster than the angle grows, which the sphere widens by at most pi / 2 times its sine.
+    // The sphere adds at most pi / 2 * radius / d to the angle, which bounds the change of the cosine.
     let leaves = leaving + 1.5707964 * node.radius > (node.edge - 1e-3) * d;
     let arrives = leaves & (facing + node.radius > -1e-3 * d) & (node.intensity > vec4f(0.0));
     return select(vec4f(0.0), max4(value, vec4f(1e-36)), arrives);
 }
 
-// The probabilities of the children, by what may arrive of them; that of the first is 1 where nothing does. None that is worth a look
-// is so rare that the grid of random numbers matters.
+// Returns the probabilities of the children, proportional to their importances; (1, 0, 0, 0) if all are 0. A positive
+// importance counts as at least 2^-12 of the sum, well above the resolution of random numbers.
 fn light_shares(importances: vec4f) -> vec4f {
     let sum = (importances.x + importances.y) + (importances.z + importances.w);
     let least = select(vec4f(0.0), max4(importances, vec4f(sum * 0.00024414063)), importances > vec4f(0.0));
@@ -42,7 +43,7 @@ fn light_shares(importances: vec4f) -> vec4f {
     return select(shares, vec4f(1.0, 0.0, 0.0, 0.0), vec4<bool>(sum == 0.0));
 }
 
-// The child that a random number of [0, 1) chooses: never one whose share is 0.
+// Returns the child that `random` in [0, 1) selects, never one with probability 0.
 fn light_child(shares: vec4f, random: f32) -> u32 {
     let second = shares.x + shares.y;
     let third = second + shares.z;

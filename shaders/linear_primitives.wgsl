@@ -1,7 +1,7 @@
-// Which of a light's samples are hidden. First a cheap test finds the primitives that may hide any, then only these are
-// looked at: software Vulkan cannot skip a branch, but it leaves a loop as soon as none of its lanes goes on.
+// Shadow rays against primitives outside of the BVH. Only candidates of a cheap test are intersected, in a loop:
+// software Vulkan cannot skip a branch, but leaves a loop once no lane needs it.
 
-// Bit i is set where a primitive of a kind, from `range.x` to before `range.y`, hides sample i of the block from a surface.
+// Returns the mask of the samples of a block that primitives of a kind, `range.x` to before `range.y`, occlude.
 fn occluded_by(kind: u32, range: vec2u, surface: Surface, cone: Cone, light: Light, block: SampleBlock) -> u32 {
     var bits = 0u;
     for (var first = range.x; first < range.y; first += 32u) {
@@ -17,7 +17,7 @@ fn occluded_by(kind: u32, range: vec2u, surface: Surface, cone: Cone, light: Lig
     return bits;
 }
 
-// Whether primitive i, which is q, cuts the way from a surface to `t_max` times `to`.
+// Returns true if primitive i, which is q, occludes the segment from a surface to `t_max` times `to`.
 fn is_occluded_by_primitive(kind: u32, q: Primitive, i: u32, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let is_inside = i == by_itself(surface.exclude_back);
     return (i != by_itself(surface.exclude_front)) & (i != target_prim) & occludes_segment(kind, q, surface.ray_origin, is_inside, to, t_max);

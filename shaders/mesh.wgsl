@@ -1,8 +1,7 @@
-// Triangles of meshes: how rays meet them, and what their surface is like. They are intersected in the mesh's own space, by rays
-// whose directions are not made unit vectors there, so that distances are the world's.
+// Mesh triangles: intersection and surface properties. Object-space ray directions are not normalized, so that t is the
+// world-space distance.
 
-// A ray's direction, as the test of triangles wants it: the axis along which it is longest, and how far it goes along the two
-// next ones, and in all, for a step of 1 along that.
+// The shear that maps a ray to the z axis; `axis` is the largest component of its direction.
 struct Shear {
     axis: u32,
     slope: vec2f,
@@ -16,26 +15,25 @@ fn shear_of(direction: vec3f) -> Shear {
     return Shear(axis, vec2f(d.x / d.z, d.y / d.z), 1.0 / d.z);
 }
 
-// The coordinates in the order of the axes after `axis`, which comes last.
+// Returns the coordinates in cyclic order with `axis` last.
 fn permuted(v: vec3f, axis: u32) -> vec3f {
     return select(select(v.xyz, v.zxy, axis == 1u), v.yzx, axis == 0u);
 }
 
-// A point, from the ray's origin, in the space where the ray is the z axis.
 fn sheared(v: vec3f, shear: Shear) -> vec3f {
     let p = permuted(v, shear.axis);
     return vec3f(p.x - shear.slope.x * p.z, p.y - shear.slope.y * p.z, shear.scale * p.z);
 }
 
-// Where a ray meets a triangle.
 struct Crossing {
     met: bool,
     t: f32,
-    barycentric: vec2f,    // of the second and third vertex
+    barycentric: vec2f,    // weights of the second and third vertex
 }
 
-// Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013; what is exactly on an edge is inside. The ray
-// must pass the triangle's own box too, and meets the triangle there: so a tree of boxes leaves no hit out.
+// Intersects a triangle: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013; points
+// exactly on an edge are inside. The ray must hit the box of the triangle too, and t is clamped to that interval, so
+// that a BVH misses no hit (docs/decisions/trees.md).
 fn triangle_crossing(v0: vec3f, v1: vec3f, v2: vec3f, origin: vec3f, shear: Shear, s: Slabs) -> Crossing {
     let a = sheared(v0 - origin, shear);
     let b = sheared(v1 - origin, shear);
@@ -59,7 +57,6 @@ fn highest(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
     return vec3f(max(max(a.x, b.x), c.x), max(max(a.y, b.y), c.y), max(max(a.z, b.z), c.z));
 }
 
-// A point of the world in the space of an instance's mesh.
 fn point_to_mesh(i: Instance, p: vec3f) -> vec3f {
     return vector_to_mesh(i, p - i.anchor);
 }
@@ -72,49 +69,48 @@ fn vector_from_mesh(i: Instance, v: vec3f) -> vec3f {
     return i.u * v.x + i.v * v.y + i.w * v.z;
 }
 
-// A normal of the mesh in the world, unit length; 0 for none.
+// Transforms a normal to world space and normalizes it; 0 stays 0.
 fn normal_from_mesh(i: Instance, n: vec3f) -> vec3f {
     let v = i.x * n.x + i.y * n.y + i.z * n.z;
     let scaled = v / max(largest(v), 1.1754943508222875e-38);
     return scaled / sqrt(max(dot(scaled, scaled), 0.5));
 }
 
-// How far from a mesh's boxes a ray still counts as passing them: the rounding of all that is computed of it in this space.
+// Returns the margin of boxes in object space, which covers the rounding of a ray there.
 fn mesh_pad(i: Instance, origin: vec3f) -> f32 {
     return BOX_PAD * (largest(origin) + i.size);
 }
 
-// What was hit: a primitive by itself, which is all then, or a triangle of a mesh in the world.
+// The primitive of a hit: standalone, with all other fields 0, or a mesh triangle in world space.
 struct HitPrimitive {
-    primitive: Primitive,  // a mesh's triangle as one by itself
-    edge_1: vec3f,         // from the first vertex to the second
+    primitive: Primitive,  // a mesh triangle in the form of a primitive
+    edge_1: vec3f,         // from the first to the second vertex
     edge_2: vec3f,
     uv_0: vec2f,           // texture coordinates of the vertices
     uv_1: vec2f,
     uv_2: vec2f,
-    normal_0: vec3f,       // unit normals of the vertices, outwards; 0 where the mesh has none
+    normal_0: vec3f,       // unit outward vertex normals; 0 if the mesh has none
     normal_1: vec3f,
     normal_2: vec3f,
-    tangents_0: Tangents,  // of the vertices, up to a factor; 0 where the mesh has none
+    tangents_0: Tangents,  // vertex tangents, unnormalized; 0 if the mesh has none
     tangents_1: Tangents,
     tangents_2: Tangents,
-    anchor: vec3f,         // where the mesh's origin is
-    condition: f32,        // by how much its map enlarges what is rounded
+    anchor: vec3f,         // origin of object space
+    condition: f32,        // condition number of the transform
 }
 
-// A primitive by itself.
 fn standalone_hit_primitive(q: Primitive) -> HitPrimitive {
     let zero = vec3f(0.0);
     let none = Tangents(zero, zero);
     return HitPrimitive(q, zero, zero, zero.xy, zero.xy, zero.xy, zero, zero, zero, none, none, none, zero, 0.0);
 }
 
-// The triangle as a primitive: local x and y are the barycentric coordinates of its second and third vertex. Edges are the
-// world's, `v0` is the mesh's.
+// Returns a triangle as a primitive whose local x and y are the barycentric coordinates of the second and third vertex.
+// Edges are in world space, `v0` is in object space.
 fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material: u32) -> Primitive {
     let least = 1.1754943508222875e-38;
     let across = cross(edge_1 / max(largest(edge_1), least), edge_2 / max(largest(edge_2), least));
-    // Of a triangle so thin that nothing of it is left in 32 bits, z stands for the normal.
+    // A triangle too thin for 32 bits has the normal z.
     let normal = select(vec3f(0.0, 0.0, 1.0), normalize(across), dot(across, across) > 1e-30) * i.side;
     let area = dot(cross(edge_1, edge_2), normal);
     let determinant = select(least, area, abs(area) > least);
@@ -123,7 +119,7 @@ fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material
                      TRIANGLE, normal, 1.0 / determinant, vec3f(0.0), 0.0);
 }
 
-// The point of a triangle at barycentric coordinates b, as a ray in direction d meets it.
+// Returns the surface at barycentric coordinates b, hit from direction d.
 fn face_surface(face: HitPrimitive, place: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> Surface {
     let q = face.primitive;
     let from_anchor = face.edge_1 * b.x + face.edge_2 * b.y;
@@ -132,7 +128,7 @@ fn face_surface(face: HitPrimitive, place: vec2u, b: vec2f, d: vec3f, epsilon: f
     let normal = q.z * side;
     let edge = max(max(largest(face.edge_1), largest(face.edge_2)), largest(face.edge_2 - face.edge_1));
     let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition);
-    // A little back towards the viewer too: what is met on an edge is then inside of what else has that edge.
+    // Offset towards the viewer too: a hit on an edge is then inside of the other faces at that edge.
     let start = position + (normal - d) * (epsilon * size);
     let tangents = face_frame(face, b);
     let smooth_normal = face_normal(face, b) * side;
@@ -144,12 +140,12 @@ fn face_uv(face: HitPrimitive, b: vec2f) -> vec2f {
     return face.uv_0 + (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
 }
 
-// A colour between those of the vertices, at barycentric coordinates b; never below 0.
+// Returns the interpolated vertex color at barycentric coordinates b, at least 0.
 fn color_between(c0: vec4f, c1: vec4f, c2: vec4f, b: vec2f) -> vec4f {
     return max4(c0 + (c1 - c0) * b.x + (c2 - c0) * b.y, vec4f(0.0));
 }
 
-// The unit normal between the vertices' own, on the outer side of the triangle; the triangle's where they have none.
+// Returns the interpolated unit normal on the outer side of the triangle; the geometric normal without vertex normals.
 fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let length2 = dot(n, n);
@@ -157,14 +153,14 @@ fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     return select(face.primitive.z, turned_to(unit, face.primitive.z), length2 > 1e-12);
 }
 
-// A vector or its opposite: files have normals on either side of their triangles.
+// Returns v or -v, towards `side`: normals in files may be on either side of their triangles.
 fn turned_to(v: vec3f, side: vec3f) -> vec3f {
     return v * select(1.0, -1.0, dot(v, side) < 0.0);
 }
 
-// From the triangle to the smooth surface that the vertices' normals tell of, where that is above it: shadow rays start there,
-// so that a coarse mesh does not shadow itself where light grazes it. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems
-// II, 2021, chapter 4.
+// Returns the offset from the triangle up to the smooth surface that its vertex normals imply, so that a coarse mesh
+// does not shadow itself in grazing light: Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, chapter
+// 4.
 fn face_bulge(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
@@ -174,14 +170,15 @@ fn face_bulge(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
 }
 
-// From a point at `way` from a vertex up to the plane through the vertex with normal n; 0 where it is above that. A normal more
-// than 37 degrees off the triangle's, `up`, tells of no surface nearby, as at a cube's corner: what stands there would lose its shadow.
+// Returns the offset from a point, `way` from a vertex, up to the tangent plane of the vertex; 0 if the point is above
+// it. A normal more than 37 degrees off the triangle normal `up` implies no surface nearby, as at the corner of a cube:
+// objects on the cube would lose their contact shadows.
 fn lift(n: vec3f, way: vec3f, up: vec3f) -> vec3f {
     return n * select(0.0, max(-dot(n, way), 0.0), dot(n, up) > 0.8);
 }
 
-// Whether light that comes from the direction of `to` passes the triangle itself on its way to where shadow rays start: from behind
-// it may come past the edges up to a bulge, but not through the triangle.
+// Returns true unless the triangle itself occludes the origin of shadow rays from direction `to`. Light from behind may
+// pass its edges, up to the terminator offset.
 fn face_lets_pass(face: HitPrimitive, surface: Surface, to: vec3f) -> bool {
     let fall = -dot(surface.normal, to);
     let height = dot(surface.normal, surface.terminator_offset);
@@ -190,7 +187,8 @@ fn face_lets_pass(face: HitPrimitive, surface: Surface, to: vec3f) -> bool {
     return (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0);
 }
 
-// The derivatives of a point by u and by v. Where the vertices' texture coordinates give none, some in the triangle's plane.
+// Returns the derivatives of a point by u and v; vectors in the plane of the triangle if its texture coordinates are
+// degenerate.
 fn face_tangents(face: HitPrimitive) -> Tangents {
     let a = face.uv_1 - face.uv_0;
     let b = face.uv_2 - face.uv_0;
@@ -202,8 +200,7 @@ fn face_tangents(face: HitPrimitive) -> Tangents {
     return Tangents(select(face.edge_1, u, whole), select(cross(face.primitive.z, face.edge_1), v, whole));
 }
 
-// The tangents between the vertices' own, so that they do not jump from a triangle to the next; the triangle's where those are
-// none.
+// Returns the interpolated vertex tangents, continuous across edges; without them `face_tangents`.
 fn face_frame(face: HitPrimitive, b: vec2f) -> Tangents {
     let a = 1.0 - b.x - b.y;
     let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;
@@ -213,13 +210,13 @@ fn face_frame(face: HitPrimitive, b: vec2f) -> Tangents {
     return Tangents(select(own.u, u, between), select(own.v, v, between));
 }
 
-// Of `face_uv`, where the position has the derivative d.
+// Returns the change of `face_uv` if the position changes by d.
 fn face_uv_derivative(face: HitPrimitive, d: vec3f) -> vec2f {
     let b = vector_to_local(face.primitive, d);
     return (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
 }
 
-// Of `face_normal`, where the position has the derivative d.
+// Returns the change of `face_normal` if the position changes by d.
 fn face_normal_derivative(face: HitPrimitive, b: vec2f, d: vec3f) -> vec3f {
     let db = vector_to_local(face.primitive, d);
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
@@ -232,7 +229,6 @@ fn face_normal_derivative(face: HitPrimitive, b: vec2f, d: vec3f) -> vec3f {
     return select(vec3f(0.0), outward, length2 > 1e-12);
 }
 
-// A ray's differential at the point of a triangle at barycentric coordinates b.
 fn face_hit_differential(face: HitPrimitive, b: vec2f, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential {
     let x = transferred(differential.x, ray, t, surface.normal);
     let y = transferred(differential.y, ray, t, surface.normal);

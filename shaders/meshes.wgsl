@@ -1,4 +1,4 @@
-// The meshes' buffers: nodes of trees, items and instances in `nodes`; triangles and vertices in `meshes`.
+// Mesh buffers: BVH nodes, items, instances and group words in `nodes`; triangles and vertices in `meshes`.
 
 fn load_position(i: Instance, vertex: u32) -> vec3f {
     return bitcast<vec3f>(meshes[i.vertices + vertex].xyz);
@@ -15,7 +15,7 @@ fn word_of(row: vec4u, i: u32) -> u32 {
     return select(select(row.x, row.y, i == 1u), select(row.z, row.w, i == 3u), i >= 2u);
 }
 
-// The word that a triangle's group has: its material, and whether it casts no shadow.
+// Returns the group word of a triangle: its material and NO_SHADOW.
 fn group_word(i: Instance, slot: u32) -> u32 {
     var group = i.materials;
     if i.groups != NO_INDEX {
@@ -31,7 +31,6 @@ fn triangle_casts(i: Instance, slot: u32) -> bool {
     return (group_word(i, slot) & NO_SHADOW) == 0u;
 }
 
-// The triangle of a mesh that was hit.
 fn face_of(i: Instance, hit: Hit) -> HitPrimitive {
     let corners = meshes[i.triangles + hit.slot];
     let v0 = load_position(i, corners.x);

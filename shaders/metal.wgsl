@@ -1,7 +1,8 @@
-// The material `conductor` where it is rough, or has an index of refraction: Cook and Torrance, "A Reflectance Model for Computer
-// Graphics", ACM TOG 1(1), 1982, with facets of the distribution GGX.
+// The material `conductor` with roughness or an index of refraction: Cook and Torrance, "A Reflectance Model for
+// Computer Graphics", ACM TOG 1(1), 1982, with GGX microfacets.
 
-// The share of unpolarised light that a metal with the index eta + i k reflects: Born and Wolf, "Principles of Optics", 14.2.
+// Returns the reflectance of a metal with the index eta + i k for unpolarized light: Born and Wolf, "Principles of
+// Optics", 14.2.
 fn conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32 {
     let c2 = cosine * cosine;
     let s2 = 1.0 - c2;
@@ -13,7 +14,7 @@ fn conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32 {
     return max(0.5 * (s + p), 0.0);
 }
 
-// What a facet reflects: by the index where there is one, else the same share from everywhere.
+// Returns the tint, times Fresnel if the material has an index.
 fn metal_fresnel(material: Material, cosine: f32) -> vec3f {
     let eta = material.eta;
     let k = material.k;
@@ -22,20 +23,19 @@ fn metal_fresnel(material: Material, cosine: f32) -> vec3f {
     return material.tint * select(vec3f(1.0), exact, eta.x > 0.0);
 }
 
-// With what further bounces between facets add: Turquin, "Practical Multiple Scattering Compensation for Microfacet Models", 2019,
-// equation 14.
+// Returns `metal_fresnel` with multiple scattering: Turquin, "Practical Multiple Scattering Compensation for Microfacet
+// Models", 2019, equation 14.
 fn metal_factor(material: Material, cosine: f32) -> vec3f {
     return metal_fresnel(material, cosine) * (vec3f(1.0) + metal_fresnel(material, 1.0) * material.loss);
 }
 
-// The BRDF times the cosine of wi.
+// Returns the BRDF times the cosine of wi.
 fn metal_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     let lit = (wo.z > 0.0) & (wi.z > 0.0);
     let value = metal_factor(material, dot(wo, half_vector(wo, wi))) * facet_eval(facet_alpha(material), wo, wi);
     return select(vec3f(0.0), value, lit);
 }
 
-// The density of `metal_sample`, per solid angle.
 fn metal_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
     return select(0.0, facet_pdf(facet_alpha(material), wo, wi), (wo.z > 0.0) & (wi.z > 0.0));
 }

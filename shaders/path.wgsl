@@ -1,23 +1,21 @@
-// Paths from the camera through mirrors and glass.
+// Specular paths from the camera: reflection, refraction, and splitting at glass.
 
 struct Path {
     ray: Ray,
     differential: Differential,
-    throughput: vec3f,     // factor of the light that comes along the ray
-    depth: u32,            // bounces so far
-    branch: u32,           // bit i is set if this is the reflection at the split of bounce i
-    origin_prim: vec2u,           // the instance and primitive that the ray starts on and cannot meet again, else NOWHERE
-    inside_prim: vec2u,           // the ellipsoid that it starts on and goes through
+    throughput: vec3f,     // factor of its radiance
+    depth: u32,            // number of bounces
+    branch: u32,           // bit i is set for the reflection at the split of bounce i
+    origin_prim: vec2u,    // instance and primitive that the ray cannot hit again, else NO_PRIMITIVE
+    inside_prim: vec2u,    // solid that it starts on and passes through, likewise
 }
 
-// What becomes of a path at a mirror or at glass.
 struct SpecularSplit {
     primary: Path,
-    secondary: Path,           // the second branch, if there is one
+    secondary: Path,       // the other branch, if it splits
     splits: bool,
 }
 
-// Whether a material mirrors or refracts light, and does nothing else.
 fn is_specular(material: Material) -> bool {
     return (material.kind == MIRROR) | (material.kind == GLASS);
 }
@@ -27,19 +25,19 @@ fn mirrored_path(path: Path, surface: Surface, at: HitDifferential, material: Ma
     return SpecularSplit(primary, primary, false);
 }
 
-// A normal map's normal, if it is usable; else the smooth one, else the surface's own.
+// Returns the first usable normal of the mapped one, the smooth one and the geometric one.
 fn usable_normal(surface: Surface, normal: vec3f) -> vec3f {
     let own = select(surface.normal, surface.smooth_normal, is_usable(surface, surface.smooth_normal));
     return select(own, normal, is_usable(surface, normal));
 }
 
-// Whether a normal faces the viewer and reflects to the surface's outer side.
+// Returns true if a normal faces the viewer and reflects to that side of the surface.
 fn is_usable(surface: Surface, normal: vec3f) -> bool {
     let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
     return outward & (dot(surface.wo, normal) > 0.0);
 }
 
-// Both branches at the first bounces; then the one that `random`, in [0, 1), chooses.
+// Returns both branches at the first bounces, then the one that `random` in [0, 1) selects.
 fn glass_path(path: Path, surface: Surface, at: HitDifferential, material: Material, random: f32) -> SpecularSplit {
     let eta = select(material.ior, 1.0 / material.ior, surface.side > 0.0);
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
@@ -76,7 +74,7 @@ fn refracted_path(path: Path, surface: Surface, at: HitDifferential, throughput:
     return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.exclude_back, surface.exclude_front);
 }
 
-// The path behind a surface that it does not see.
+// Continues a path in the same direction behind a surface that it ignores.
 fn pass_through_path(path: Path, surface: Surface, at: HitDifferential) -> Path {
     let below = surface.position - (surface.ray_origin - surface.position);
     let ray = Ray(below, path.ray.direction);

@@ -1,8 +1,7 @@
-// The samples of a pixel, whatever the integrator. An integrator takes a sample's path from surface to surface: `begin_path`, then
-// `advance` until it has `ended`; then `path_value` and `path_layers` say what it adds. So lanes that run in step need not wait for
-// the longest path: each begins its next sample.
+// Camera samples of a pixel, for any integrator: it traces a path by `begin_path` and, one surface at a time, `advance`
+// until it has `ended`; then `path_value` and `path_layers` return its contribution. Lanes in lockstep thus begin their
+// next samples without waiting for the longest path.
 
-// The camera's ray of one sample, and its weight.
 struct CameraSample {
     ray: Ray,
     differential: Differential,
@@ -22,7 +21,7 @@ fn camera_sample(pixel: vec2u, sample: u32) -> CameraSample {
     return CameraSample(ray, differential_at(place), at.z);
 }
 
-// Where on the lens a sample's ray starts: a decision of its own, and so a set over the pixel's samples.
+// Returns the lens position of a sample, from a point set of its own over the samples of the pixel.
 fn lens_place(pixel: vec2u, sample: u32) -> vec2f {
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 0u)).zw;
     var u = sobol_sample(sample, key);
@@ -32,16 +31,16 @@ fn lens_place(pixel: vec2u, sample: u32) -> vec2f {
     return lens_sample(camera.blades, u);
 }
 
-// What a pixel's samples show besides their sum, each a sum of weighted colours.
+// Outputs of a pixel besides its radiance, as sums of weighted colors.
 struct Layers {
-    emission: vec4f,       // light that was not reflected; w the share of the pixel where anything is hit
-    direct: vec4f,         // light that was reflected once
-    indirect: vec4f,       // light that was reflected more often
-    albedo: vec4f,         // the share of light that the surface reflects
-    normal: vec4f,         // the shading normal, outwards
+    emission: vec4f,       // radiance without reflection; w: coverage of the pixel
+    direct: vec4f,         // radiance after one reflection
+    indirect: vec4f,       // radiance after more reflections
+    albedo: vec4f,         // albedo of the first surface that is not specular
+    normal: vec4f,         // outward shading normal of the first hit
 }
 
-// How the camera's ray, that through the middle of its lens, changes with its place in the picture.
+// Returns the differential of the camera ray through the center of the lens, by image position.
 fn differential_at(place: vec2f) -> Differential {
     if DIFFERENTIALS == 0u {
         return Differential();
@@ -53,7 +52,7 @@ fn differential_at(place: vec2f) -> Differential {
     return camera_differential(camera, place, spacing);
 }
 
-// A uniform position as one that is distributed like the filter, from the pixel's corner, and its weight.
+// Warps a uniform position to the filter distribution, relative to the pixel corner; z is the weight.
 fn filtered(u: vec2f) -> vec3f {
     if FILTER_BINS == 0u {
         return vec3f(u, 1.0);

@@ -1,8 +1,8 @@
-// What is different from one kind of primitives to the next. A kind has a file of its own for how rays meet it; all else
-// is here. `kind` is known when compiled, or is the primitive's own.
+// Dispatch by the kind of a primitive: intersection, normals, texture coordinates and tangents. `kind` may be a
+// compile-time constant.
 
-// The distance of the nearest hit in (0, limit), else `limit`. `inside_prim` says that the ray starts on the primitive and goes
-// through its inside.
+// Returns the t of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray starts on the primitive,
+// inwards.
 fn intersect(kind: u32, q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
@@ -22,7 +22,8 @@ fn intersect(kind: u32, q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -
     return intersect_plane(q, ray, limit);
 }
 
-// Returns whether a primitive cuts the segment o + s d, s in (0, reach), of local space; `levels` are the `solid_levels` of o.
+// Returns true if a primitive occludes the local segment o + s d, s in (0, t_max); `levels` are the `solid_levels` of
+// o.
 fn occludes(kind: u32, o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     if kind == RECTANGLE {
         return rectangle_occludes(o, d, t_max);
@@ -42,18 +43,18 @@ fn occludes(kind: u32, o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     return plane_occludes(o, d, t_max);
 }
 
-// Returns whether primitives of a kind are the surfaces of convex solids: a ray that leaves one through the inside hits it again.
+// Returns true for surfaces of convex solids: a ray that leaves one through the inside hits it again.
 fn is_solid(kind: u32) -> bool {
     return ((SOLID_KINDS >> kind) & 1u) == 1u;
 }
 
-// Whether its local space goes from -1 to 1 where its texture coordinates go from 0 to 1.
+// Returns true if local -1 to 1 is 0 to 1 in texture coordinates.
 fn is_centered(kind: u32) -> bool {
     return (kind == RECTANGLE) | (kind == DISK);
 }
 
-// The levels of a point of local space for `blocks`, below 0 inside of a solid; y is used by cylinders only. `inside_prim` says that the point is on the
-// surface and counts as inside, by the least amount: rays inwards are occluded if they end outside.
+// Returns the levels of a local point for `occludes`, negative inside; y is for cylinders only. With `inside_prim` a
+// point on the surface counts as barely inside: segments inwards are occluded if they end outside.
 fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, inside_prim: bool) -> vec2f {
     if kind == CYLINDER {
         let levels = cylinder_levels(q, from_anchor);
@@ -62,24 +63,24 @@ fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, inside_prim: bool) 
     return vec2f(select(ellipsoid_level(q, from_anchor), -1e-30, inside_prim), 0.0);
 }
 
-// The gradient, at a point of local space, of what is 0 on a primitive: of z, of (x^2 + y^2 + z^2 - 1) / 2, or that of a cylinder.
+// Returns the world-space gradient, at a local point, of a function that is 0 on the primitive: z, (x^2 + y^2 + z^2 -
+// 1) / 2, or that of a cylinder.
 fn primitive_gradient(q: Primitive, local: vec3f) -> vec3f {
     let solid = solid_gradient(q.kind, local);
     let gradient = q.x * solid.x + q.y * solid.y + q.z * solid.z;
     return select(q.z, gradient, is_solid(q.kind));
 }
 
-// The gradient of a solid in local space.
 fn solid_gradient(kind: u32, local: vec3f) -> vec3f {
     return select(local, cylinder_gradient(local), kind == CYLINDER);
 }
 
-// The change of `solid_gradient` where the local point changes by d.
+// Returns the change of `solid_gradient` if the local point changes by d.
 fn solid_gradient_derivative(kind: u32, local: vec3f, d: vec3f) -> vec3f {
     return select(d, cylinder_gradient_derivative(local, d), kind == CYLINDER);
 }
 
-// The function whose gradient `primitive_gradient` is, 0 on the primitive.
+// Returns the function whose gradient is `primitive_gradient`.
 fn primitive_height(q: Primitive, from_anchor: vec3f) -> f32 {
     let round = 0.5 * ellipsoid_level(q, from_anchor);
     let solid = select(round, cylinder_height(q, from_anchor), q.kind == CYLINDER);
@@ -90,9 +91,10 @@ fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
     return normalize(primitive_gradient(q, local));
 }
 
-// Texture coordinates of a point of local space. Rectangle and disk: 0 to 1 along tangent and bitangent. Triangle: barycentric
-// coordinates of the second and third vertex. Plane: lengths along tangent and bitangent. Ellipsoid: longitude from
-// the first towards the second axis and latitude from the third axis' foot, each from 0 to 1. Cylinder: `cylinder_uv`.
+// Returns the texture coordinates of a local point. Rectangle, disk: 0 to 1 along tangent and bitangent. Triangle:
+// barycentric coordinates of the second and third vertex. Plane: lengths along tangent and bitangent. Ellipsoid:
+// longitude from the first towards the second axis, latitude from the foot of the third, each 0 to 1. Cylinder:
+// `cylinder_uv`.
 fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
     if is_centered(q.kind) {
         return vec2f(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
@@ -107,7 +109,7 @@ fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
     return local.xy;
 }
 
-// Of `primitive_uv`, where the local point has the derivative d.
+// Returns the change of `primitive_uv` if the local point changes by d.
 fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
     if is_centered(q.kind) {
         return d.xy * 0.5;
@@ -125,13 +127,14 @@ fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
     return d.xy;
 }
 
-// The derivatives of a point by u and by v.
+// Derivatives of a point by u and by v.
 struct Tangents {
     u: vec3f,
     v: vec3f,
 }
 
-// The derivatives of a point of local space by u and by v. Where an ellipsoid's u has no direction, at its poles, that of the nearest meridian is taken.
+// Returns the tangents of a local point. At the poles of an ellipsoid, where u has no direction, that of the nearest
+// meridian is used.
 fn local_tangents(q: Primitive, local: vec3f) -> Tangents {
     if q.kind == ELLIPSOID {
         let r = sqrt(max(local.x * local.x + local.y * local.y, 1e-12));

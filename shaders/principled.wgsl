@@ -1,34 +1,34 @@
-// The material `principled`: glTF 2.0's metallic-roughness model with its extensions (Khronos, "glTF 2.0 Specification", 2021, appendix B;
-// KHR_materials_anisotropy, _clearcoat, _ior, _sheen, _specular, _transmission, _volume). A coat lies over sheen, which lies over what
-// is metal, or a dielectric with its diffuse ground or the light that it passes. Metal and ground are the same from both sides. A layer takes of what is below it the share that it
-// reflects by itself towards the viewer, so that no light is made and none is lost. Light passes as through the material `dielectric`: by Fresnel's
-// equations, not by Schlick's formula, and with what its facets lose given back. Directions are in a local frame: z is the shading normal on the
-// viewer's side, x the tangent.
+// The material `principled`: the metallic-roughness model of glTF 2.0 with extensions (Khronos, "glTF 2.0
+// Specification", 2021, appendix B; KHR_materials_anisotropy, _clearcoat, _ior, _sheen, _specular, _transmission,
+// _volume). Clearcoat lies over sheen, and sheen over metal or a dielectric that is diffuse or transmissive. Metal and
+// the diffuse base are the same from both sides. A layer attenuates those below by its albedo towards the viewer, which
+// conserves energy. Transmission is that of `dielectric`: by the Fresnel equations, with multiple scattering. In the
+// local frame, z is the shading normal on the viewer's side, x the tangent.
 
-// What is there of a material where it is looked at from one direction.
+// The lobes of a material as seen from one direction.
 struct PrincipledLobes {
-    diffuse: vec3f,        // share of the light that the ground spreads
+    diffuse: vec3f,        // albedo of the diffuse base
     alpha: vec2f,          // of the specular lobe, along x and y
-    f0: vec3f,             // what of light it reflects head-on, with what is lost between facets given back
-    f90: vec3f,            // and at grazing angles
-    glass: f32,            // factor of what is glass, with what is lost between its facets given back
-    passed: vec3f,         // the same of the light that passes it
-    glass_f0: vec3f,       // its reflectance head-on
-    glass_f90: f32,        // and at grazing angles
-    head_on: f32,          // that of its index alone, head-on
-    ratio: f32,            // of the indices before and behind it, also where it is thin
-    eta: f32,              // the same for what changes its direction: 1 where it is thin
-    thin: bool,            // whether light that passes keeps its direction
-    coat: f32,             // factor of the coat's lobe
+    f0: vec3f,             // its reflectance at normal incidence, with multiple scattering
+    f90: vec3f,            // the same at grazing angles
+    glass: f32,            // weight of glass, with multiple scattering
+    passed: vec3f,         // the same for transmitted light
+    glass_f0: vec3f,       // reflectance of glass at normal incidence
+    glass_f90: f32,        // the same at grazing angles
+    head_on: f32,          // reflectance by the index alone, at normal incidence
+    ratio: f32,            // of the indices before and behind the surface, thin or not
+    eta: f32,              // the same for refraction: 1 if thin
+    thin: bool,            // transmission keeps the direction
+    coat: f32,             // weight of the clearcoat lobe
     coat_alpha: f32,
     coat_normal: vec3f,
-    sheen: vec3f,          // factor of the sheen's lobe
+    sheen: vec3f,          // weight of the sheen lobe
     sheen_alpha: f32,
-    chances: vec4f,        // of ground, specular lobe, glass and coat; the rest is the sheen's
+    chances: vec4f,        // probabilities of diffuse, specular, glass and coat; the rest is that of sheen
 }
 
-// The lobes that a kernel has are bits of `lobes`, so that it computes no others. `energy` is what tables know of the facets: of those that are
-// rougher along one axis the two parts of `ggx_albedo`, x and y; of rough glass, z, the share of light that it reflects and lets pass at once.
+// Returns the lobes seen from wo, only those with a bit in `lobes`. `energy` has tabulated albedos: x and y are the
+// terms of `ggx_albedo` for anisotropic lobes, z is the single-scattering albedo of rough glass.
 fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal: vec3f, lobes: u32, energy: vec3f) -> PrincipledLobes {
     var m = PrincipledLobes();
     let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);
@@ -81,8 +81,8 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
         // Turquin, "Practical multiple scattering compensation for microfacet models", 2019.
         lost = max(1.0 / max(share.x + share.y, 1e-3) - certain, 0.0);
         let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
-        // Where the index is that of air nothing reflects, at no angle: Lagarde and de Rousiers, "Moving Frostbite to Physically Based
-        // Rendering", SIGGRAPH 2014 course, section 3.
+        // With the index of air nothing reflects at any angle: Lagarde and de Rousiers, "Moving Frostbite to Physically
+        // Based Rendering", SIGGRAPH 2014 course, section 3.
         let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
         let inner_gain = vec3f(1.0) + inner_f0 * lost;
         let metal_gain = (vec3f(1.0) + base * lost) * (material.metallic * left);
@@ -113,12 +113,11 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
     return m;
 }
 
-// A colour of at most 1.
 fn bounded_color(color: vec3f) -> vec3f {
     return vec3f(min(color.x, 1.0), min(color.y, 1.0), min(color.z, 1.0));
 }
 
-// How bright a colour is: ITU-R BT.709.
+// ITU-R BT.709.
 fn luminance(color: vec3f) -> f32 {
     return 0.2126 * color.x + 0.7152 * color.y + 0.0722 * color.z;
 }
@@ -134,7 +133,7 @@ fn schlick(f0: vec3f, f90: vec3f, cosine: f32) -> vec3f {
     return f0 + (f90 - f0) * (x2 * x2 * x);
 }
 
-// What glass reflects: as its index says, or a sheet's two sides; with another reflectance head-on, or at grazing angles, the same in between.
+// Returns the reflectance of glass, or of both sides of a thin sheet, rescaled to `glass_f0` and `glass_f90`.
 fn glass_fresnel(m: PrincipledLobes, cosine: f32) -> vec3f {
     let c = min(max(cosine, 1e-6), 1.0);
     let behind = refracted_cosine(c, m.ratio);
@@ -145,12 +144,12 @@ fn glass_fresnel(m: PrincipledLobes, cosine: f32) -> vec3f {
     return select(bounded_color(vec3f(max(f.x, 0.0), max(f.y, 0.0), max(f.z, 0.0))), vec3f(1.0), behind == 0.0);
 }
 
-// How likely a facet of glass mirrors.
+// Returns the probability that a microfacet of glass reflects.
 fn glass_chance(m: PrincipledLobes, cosine: f32) -> f32 {
     return min(luminance(glass_fresnel(m, cosine)), 1.0);
 }
 
-// Whether light passes in one direction alone: where facets are flat, or what is behind the surface bends nothing.
+// Returns true if transmission is a delta: smooth, or without a change of the index.
 fn passes_straight(m: PrincipledLobes) -> bool {
     return is_flat(m.alpha) | (!m.thin & (abs(m.eta - 1.0) < 1e-3));
 }
@@ -159,7 +158,7 @@ fn is_flat(alpha: vec2f) -> bool {
     return max(alpha.x, alpha.y) <= SMALLEST_ALPHA;
 }
 
-// The specular lobe by itself, for a reflectance of 1, times the cosine of wi.
+// Returns the specular lobe for F = 1 times the cosine of wi.
 fn facets_eval(alpha: vec2f, wo: vec3f, wi: vec3f, half: vec3f) -> f32 {
     return ggx_d(alpha, half) * ggx_g2(alpha, wo, wi) / (4.0 * max(wo.z, 1e-6));
 }
@@ -169,15 +168,15 @@ fn half_between(wo: vec3f, wi: vec3f) -> vec3f {
     return sum * (1.0 / sqrt(max(dot(sum, sum), 1e-20)));
 }
 
-// The normal of facets that refract wi, below the surface, to wo: Walter et al., "Microfacet Models for Refraction through Rough
-// Surfaces", EGSR 2007, equation 16.
+// Returns the microfacet normal that refracts wi, below the surface, to wo: Walter et al., "Microfacet Models for
+// Refraction through Rough Surfaces", EGSR 2007, equation 16.
 fn refracting_half(wo: vec3f, wi: vec3f, eta: f32) -> vec3f {
     let sum = wo * eta + wi;
     let unit = sum * (1.0 / sqrt(max(dot(sum, sum), 1e-20)));
     return select(-unit, unit, unit.z > 0.0);
 }
 
-// How many facets' normals lie in a direction of passing light: equation 17 there; 0 where no facet refracts so.
+// Returns the Jacobian from transmitted directions to microfacet normals: equation 17 there; 0 if none refracts so.
 fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
     let o = dot(wo, half);
     let i = dot(wi, half);
@@ -186,7 +185,7 @@ fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
     return select(0.0, density, (o > 0.0) & (i < 0.0));
 }
 
-// The BSDF times the cosine of wi, of what is no delta.
+// Returns the BSDF times the cosine of wi, without delta lobes.
 fn principled_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> vec3f {
     var value = m.diffuse * (max(wi.z, 0.0) * 0.31830988618379067);
     if (lobes & LOBE_SPECULAR) != 0u {
@@ -213,7 +212,7 @@ fn principled_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> vec3
     return value;
 }
 
-// What is glass, by the facets of `rough_dielectric.wgsl` and `thin.wgsl`.
+// Evaluates glass as in `rough_dielectric.wgsl` and `thin.wgsl`.
 fn glass_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> vec3f {
     let above = wi.z > 0.0;
     if above | m.thin {
@@ -230,7 +229,6 @@ fn glass_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> vec3f {
     return m.passed * (vec3f(1.0) - reflected) * density;
 }
 
-// How densely its samples lie, per solid angle.
 fn glass_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> f32 {
     let above = wi.z > 0.0;
     if above | m.thin {
@@ -260,7 +258,7 @@ fn to_frame_around(n: vec3f, v: vec3f) -> vec3f {
     return vec3f(dot(frame.u, v), dot(frame.v, v), dot(n, v));
 }
 
-// The density of `principled_sample`, per solid angle, but for deltas.
+// Returns the PDF of `principled_sample`, per solid angle, without delta lobes.
 fn principled_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
     var pdf = m.chances.x * (max(wi.z, 0.0) * 0.31830988618379067);
     if (lobes & LOBE_SPECULAR) != 0u {
@@ -287,23 +285,22 @@ fn principled_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
     return pdf;
 }
 
-// The density of a mirrored direction, by that of its facet's normal.
+// Returns the PDF of a reflected direction from that of its microfacet normal.
 fn mirrored_pdf(alpha: vec2f, wo: vec3f, half: vec3f) -> f32 {
     let cosine = dot(wo, half);
     return select(0.0, ggx_pdf(alpha, wo, half) / (4.0 * max(cosine, 1e-6)), cosine > 0.0);
 }
 
-// A sample that is worth nothing.
 fn nowhere() -> LobeSample {
     return LobeSample(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 0.0, 1.0);
 }
 
-// A direction wi, by a lobe that `random` chooses.
+// Samples wi from the lobe that `random` selects.
 fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes: u32) -> LobeSample {
     let p = disk_sample(u);
     var wi = vec3f(p, sqrt(max(1.0 - p.x * p.x - p.y * p.y, 0.0)));
     var is_delta = false;
-    var weight = vec3f(0.0); // of a delta
+    var weight = vec3f(0.0); // of a delta lobe
     var eta = 1.0;
     var rest = random - m.chances.x;
     if (lobes & LOBE_SPECULAR) != 0u {
@@ -370,8 +367,9 @@ fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes
     return LobeSample(wi, value * factor, pdf, eta);
 }
 
-// Estevez and Kulla, "Production Friendly Microfacet Sheen BRDF", SIGGRAPH 2017 course: the distribution "Charlie"; and between fibres the
-// visibility of Neubelt and Pettineo, "Crafting a Next-Gen Material Pipeline for The Order: 1886", 2013. Without the cosine.
+// Returns the sheen BRDF: the distribution "Charlie" of Estevez and Kulla, "Production Friendly Microfacet Sheen BRDF",
+// SIGGRAPH 2017 course, with the visibility of Neubelt and Pettineo, "Crafting a Next-Gen Material Pipeline for The
+// Order: 1886", 2013.
 fn sheen_lobe(alpha: f32, wo: vec3f, wi: vec3f) -> f32 {
     let half = half_between(wo, wi);
     let sine = sqrt(min(half.x * half.x + half.y * half.y, 1.0));
@@ -379,8 +377,8 @@ fn sheen_lobe(alpha: f32, wo: vec3f, wi: vec3f) -> f32 {
     return d / (4.0 * max(wi.z + wo.z - wi.z * wo.z, 1e-4));
 }
 
-// The share of light that it reflects towards a direction with this cosine, which grows beyond 1 where rough cloth is not: within
-// 2 % from above of a quadrature (a fit of its logarithm by the root of the cosine).
+// Returns the directional albedo of sheen, above 1 at grazing angles for low roughness: a fit of its logarithm by the
+// square root of the cosine, within 2 % above quadrature.
 fn sheen_albedo(roughness: f32, cosine: f32) -> f32 {
     let r = roughness;
     let q = 1.0 / r;

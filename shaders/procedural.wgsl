@@ -1,8 +1,8 @@
-// Textures that are computed: a checker and a grid of lines. Both are made of one function along u and one along v: the
-// pulse, 1 on a part `on` of each period of 1 and 0 on the rest. Less its mean it is a wave; the wave's first and second
-// integrals have a closed form, and so has the mean of both waves' product over a parallelogram.
+// Checker and line textures, filtered analytically. They combine a pulse in u and one in v: 1 on a part `on` of each
+// period of 1, else 0. A wave is a pulse less its mean. Its integrals, and the mean of the product of both over a
+// parallelogram, have closed forms.
 
-// The share of the second colour in a footprint: its mean over the parallelogram.
+// Returns the mean fraction of the second color over a footprint.
 fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let checker = kind == CHECKER;
     let scale = select(1.0, 0.5, checker);
@@ -18,7 +18,7 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let t_max = vec2f(abs(long.x) + abs(short.x), abs(long.y) + abs(short.y));
     let at = vec2f(phase(f.uv.x * scale + shift), phase(f.uv.y * scale + shift));
 
-    // A footprint that meets at most one step of a pulse is looked at from there: that keeps the digits of small ones.
+    // A footprint with at most one step is evaluated relative to it, which keeps the precision of small ones.
     let least = min(on, 1.0 - on);
     let near_x = t_max.x < least;
     let near_y = t_max.y < least;
@@ -29,7 +29,7 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let mean_x = select(select(on + wave.x, 0.5 + rise.x * wave.x, near_x), on, wide_x);
     let mean_y = select(select(on + wave.y, 0.5 + rise.y * wave.y, near_y), on, wide_y);
 
-    // The mean of the product is the product of the means where one of the two is constant.
+    // If one pulse is constant, the mean of the product is the product of the means.
     let apart = wide_x | wide_y | (near_x & (abs(offset.x) >= 0.5 * t_max.x)) | (near_y & (abs(offset.y) >= 0.5 * t_max.y));
     let crossed = max(min(abs(long.x), abs(long.y)), min(abs(short.x), abs(short.y)));
     var together = 0.0;
@@ -46,13 +46,13 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     return min(max(share, 0.0), 1.0);
 }
 
-// The place in a period.
+// Returns the position in a period.
 fn phase(x: f32) -> f32 {
     let small = select(0.0, x, abs(x) < 8388608.0); // larger ones have no fraction
     return small - floor(small);
 }
 
-// The shorter edge, moved away from the longer one's line if it is near to it: a footprint has an area, or is a point.
+// Returns the shorter edge, moved off the line of the longer one: a footprint has an area, or is a point.
 fn widened_edge(long: vec2f, short: vec2f) -> vec2f {
     let length = sqrt(long.x * long.x + long.y * long.y);
     let across = vec2f(-long.y, long.x) / max(length, 1e-30);
@@ -62,25 +62,24 @@ fn widened_edge(long: vec2f, short: vec2f) -> vec2f {
     return short + across * select(0.0, more, abs(width) < least);
 }
 
-// From the nearest of the pulse's steps, which are at 0, `on` and 1, to x in [0, 1).
+// Returns the offset of x in [0, 1) from the nearest step of the pulse: 0, `on` or 1.
 fn nearest_step(x: f32, on: f32) -> f32 {
     let outer = select(x - 1.0, x, x < 0.5);
     let inner = x - on;
     return select(outer, inner, abs(inner) < abs(outer));
 }
 
-// The wave; `near`: the sign of x, a step seen from itself.
+// Returns the wave; if `near`, the sign of x, an offset from a step.
 fn wave_value(x: f32, on: f32, near: bool) -> f32 {
     return select(select(-on, 1.0 - on, x - floor(x) < on), select(1.0, -1.0, x < 0.0), near);
 }
 
-// The wave's integral, with the mean 0 over a period.
+// Returns the integral of the wave, with mean 0 over a period.
 fn wave_integral(x: f32, on: f32, near: bool) -> f32 {
     let r = x - floor(x);
     return select(min(r * (1.0 - on), (1.0 - r) * on) - 0.5 * on * (1.0 - on), abs(x), near);
 }
 
-// The integral of that.
 fn wave_integral_2(x: f32, on: f32, near: bool) -> f32 {
     let r = x - floor(x);
     let s = 1.0 - r;
@@ -88,7 +87,7 @@ fn wave_integral_2(x: f32, on: f32, near: bool) -> f32 {
     return select(far, 0.5 * x * abs(x), near);
 }
 
-// The wave's mean along one axis, over a footprint around x whose edges are a and b along it.
+// Returns the mean of the wave along one axis over a footprint around x with the edges a and b.
 fn wave_mean(x: f32, a: f32, b: f32, on: f32, near: bool) -> f32 {
     let long = max(abs(a), abs(b));
     let short = min(abs(a), abs(b));
@@ -101,8 +100,8 @@ fn wave_mean(x: f32, a: f32, b: f32, on: f32, near: bool) -> f32 {
     return select(mean, wave_value(x, on, near), (long < 1e-6) | (near & (abs(x) >= outer)));
 }
 
-// The integral of both waves' product over the footprint around `at` with the edges a and b. By Green's theorem it is
-// that of W(x) w(y) dy around it, where W is the integral of the wave w.
+// Returns the integral of the product of both waves over the footprint around `at` with the edges a and b: by Green's
+// theorem, that of W(x) w(y) dy along its boundary, where W is the integral of the wave w.
 fn around_footprint(at: vec2f, a: vec2f, b: vec2f, on: f32, near: bool) -> f32 {
     let half = (a + b) * 0.5;
     let other = (a - b) * 0.5;
@@ -116,9 +115,9 @@ fn around_footprint(at: vec2f, a: vec2f, b: vec2f, on: f32, near: bool) -> f32 {
     return sum;
 }
 
-// The integral of W(x) w(y) dy along an edge. Along a flat one it is the slope times that of W(x) w(y) dx: by parts, with
-// the second integral at the ends and where w(y) steps. Along a steep one x and y change places: the integrals of
-// W(x) w(y) dy and of W(y) w(x) dx are together W(x) W(y) at the ends.
+// Returns the integral of W(x) w(y) dy along an edge: if flat, the slope times that of W(x) w(y) dx by parts, from the
+// second integral at the ends and at the steps of w(y). If steep, x and y are swapped: the integrals of W(x) w(y) dy
+// and W(y) w(x) dx sum to the difference of W(x) W(y) at the ends.
 fn along_edge(tail: vec2f, head: vec2f, on: f32, near: bool) -> f32 {
     let steep = abs(head.x - tail.x) < abs(head.y - tail.y);
     let start = select(tail, tail.yx, steep);
@@ -149,8 +148,8 @@ fn along_edge(tail: vec2f, head: vec2f, on: f32, near: bool) -> f32 {
     return select(along, corners - along, steep);
 }
 
-// The mean of both waves' product over a footprint that crosses many periods: of the terms of its Fourier series those
-// that vary least along the longer edge, as the others' mean is next to nothing.
+// Returns the mean of the product of both waves over a footprint of many periods: the terms of the Fourier series that
+// vary least along the longer edge, since the others average to almost 0.
 fn far_product(at: vec2f, long: vec2f, short: vec2f, on: f32) -> f32 {
     let flat = abs(long.x) > abs(long.y);
     let a = select(long, long.yx, flat);
@@ -170,15 +169,16 @@ fn far_product(at: vec2f, long: vec2f, short: vec2f, on: f32) -> f32 {
     return sum;
 }
 
-// sin(pi x) / (pi x).
+// Returns sin(pi x) / (pi x).
 fn sine_ratio(x: f32) -> f32 {
     return select(sine(x) / (3.1415927 * x), 1.0, abs(x) < 0.001);
 }
 
-// Terms of that series; periods that an edge crosses along both axes at most without it, which bounds the work; a
-// footprint's least width, to its length or to a period; the extent along an axis beyond which the mean is that of the
-// whole pattern.
+// Terms of the Fourier series.
 const MOST_HARMONICS: f32 = 8.0;
+// Maximum periods of an edge along both axes without that series, which bounds the work.
 const MOST_PERIODS: f32 = 32.0;
+// Minimum width of a footprint, relative to its length or a period.
 const THINNEST: f32 = 0.001;
+// Extent along an axis beyond which the mean is that of the whole pattern.
 const WIDEST: f32 = 4096.0;

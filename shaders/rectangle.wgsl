@@ -1,6 +1,6 @@
-// The rectangle: |x| <= 1, |y| <= 1, z = 0 in local space.
+// The rectangle |x| <= 1, |y| <= 1, z = 0 of local space.
 
-// The distance of the hit if it lies in (0, limit), else `limit`.
+// Returns the t of the hit in (0, limit), else `limit`.
 fn intersect_rectangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
     let p = ray.origin + ray.direction * t - q.anchor;
@@ -8,7 +8,7 @@ fn intersect_rectangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
     return select(limit, t, (t > 0.0) & (t < limit) & inside);
 }
 
-// Whether it cuts the segment o + s d, s in (0, reach), of local space.
+// Returns true if it occludes the local segment o + s d, s in (0, t_max).
 fn rectangle_occludes(o: vec3f, d: vec3f, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
     return crosses_plane(o, d, t_max) & (abs(p.x) <= abs(d.z)) & (abs(p.y) <= abs(d.z));

@@ -1,20 +1,20 @@
-// The material `dielectric` where it is rough: Walter, Marschner, Li and Torrance, "Microfacet Models for Refraction through Rough
-// Surfaces", EGSR 2007, with facets of the distribution GGX. `ior` is the index behind the surface, relative to that on the viewer's
-// side; radiance grows with its square.
+// The rough material `dielectric`: Walter, Marschner, Li and Torrance, "Microfacet Models for Refraction through Rough
+// Surfaces", EGSR 2007, with GGX microfacets. `ior` is the index behind the surface relative to the viewer's side;
+// radiance scales with its square.
 
-// What is given back of light that further bounces between facets bring: the same share of all of it.
+// Returns the multiple-scattering compensation, which is the same for all light.
 fn dielectric_gain(material: Material) -> f32 {
     return 1.0 + material.loss;
 }
 
-// The normal of the facets that refract wi to wo: equation 16.
+// Returns the microfacet normal that refracts wi to wo: equation 16.
 fn refracting_normal(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     let sum = wo + wi * material.ior;
     let unit = sum * (1.0 / sqrt(max(dot(sum, sum), 1e-20)));
     return unit * select(-1.0, 1.0, unit.z > 0.0);
 }
 
-// The BSDF times the cosine of wi, which may be below the surface: equations 20 and 21.
+// Returns the BSDF times the cosine of wi, which may be below the surface: equations 20 and 21.
 fn rough_dielectric_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     let alpha = facet_alpha(material);
     let eta = 1.0 / material.ior;
@@ -32,7 +32,7 @@ fn rough_dielectric_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     return select(vec3f(0.0), select(refracted, mirrored, above) * dielectric_gain(material), wo.z > 0.0);
 }
 
-// The density of `rough_dielectric_sample`, per solid angle: equations 14 and 17.
+// Returns the PDF of `rough_dielectric_sample`, per solid angle: equations 14 and 17.
 fn rough_dielectric_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
     let alpha = facet_alpha(material);
     let eta = 1.0 / material.ior;
@@ -48,7 +48,7 @@ fn rough_dielectric_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
     return select(0.0, select(select(0.0, bent, passes), mirrored, above), wo.z > 0.0);
 }
 
-// A way on, mirrored or refracted as `random`, in [0, 1), says.
+// Samples reflection or refraction, as selected by `random` in [0, 1).
 fn rough_dielectric_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
     let alpha = facet_alpha(material);
     let eta = 1.0 / material.ior;

@@ -1,13 +1,12 @@
-// What a surface does with light where it bounces, whatever it is made of: the material as it is met, in which directions it lets light go and
-// how much of it, and what lies behind it.
+// Scattering at a surface for all material kinds: effective material, BSDF evaluation and sampling, allowed directions,
+// and the medium behind.
 
-// How a surface reflects light from a direction, and how densely `sampled_direction` gives that.
 struct Reflection {
-    value: vec3f,          // the BRDF times the cosine of wi; 0 where no light passes
+    value: vec3f,          // BSDF times the cosine of wi; 0 if wi is not allowed
     pdf: f32,              // per solid angle
 }
 
-// Of what has no lobes in a frame of its own.
+// Evaluates materials without a local frame.
 fn plain_reflection(surface: Surface, material: Material, wi: vec3f) -> Reflection {
     let angles = angles_at(surface.shading_normal, surface.wo, wi);
     var result = Reflection(vec3f(0.0), 0.0);
@@ -27,7 +26,7 @@ fn plain_reflection(surface: Surface, material: Material, wi: vec3f) -> Reflecti
     return result;
 }
 
-// Of any surface.
+// Evaluates any material, within the allowed directions.
 fn reflection(prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, wi: vec3f) -> Reflection {
     var result = plain_reflection(surface, material, wi);
     if (MATERIALS & FACET_KINDS) != 0u {
@@ -48,7 +47,7 @@ fn reflection(prim: HitPrimitive, surface: Surface, material: Material, mixture:
     return result;
 }
 
-// A material as its textures and vertices make it, none of which makes more light than there is.
+// Clamps a textured or vertex-colored material so that it creates no energy.
 fn bounded(found: Material) -> Material {
     var material = found;
     if (LOOKUPS != 0u) | (VERTEX_COLORS != 0u) {
@@ -71,7 +70,7 @@ fn bounded(found: Material) -> Material {
     return material;
 }
 
-// The normal that light is reflected by: what a normal map makes of it, if that can be.
+// Returns `normal`, from a normal map, if the material can use it, else another one of the surface.
 fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
     if is_delta(material) {
         let usable = usable_normal(surface, normal);
@@ -86,7 +85,7 @@ fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
     return normal;
 }
 
-// The share of light that a surface reflects, about.
+// Returns the approximate albedo.
 fn albedo(material: Material) -> vec3f {
     if material.kind == PHONG {
         let factors = phong_factors(material);
@@ -100,13 +99,13 @@ fn albedo(material: Material) -> vec3f {
     return select(vec3f(0.0), material.diffuse, (material.kind == DIFFUSE) | (material.kind == PRINCIPLED));
 }
 
-// Whether light may be on its way through what is behind the surface.
+// Returns true if the material encloses a medium.
 fn has_inside(material: Material) -> bool {
     let is_volume = (material.kind == PRINCIPLED) & (material.thin == 0u) & (material.transmission > 0.0);
     return (material.kind == GLASS) | (material.kind == ROUGH_GLASS) | is_volume;
 }
 
-// Whether a material does nothing but mirror or refract light, here.
+// Returns true if the material only reflects and refracts specularly here.
 fn is_delta(material: Material) -> bool {
     if (DELTA_KINDS & FACET_KINDS) != 0u {
         return is_specular(material) | (has_facets(material) & is_polished(material));
@@ -114,12 +113,11 @@ fn is_delta(material: Material) -> bool {
     return is_specular(material);
 }
 
-// Whether it is one of those with facets, polished or not.
+// Returns true for microfacet materials, polished or not.
 fn has_facets(material: Material) -> bool {
     return ((FACET_KINDS >> material.kind) & 1u) != 0u;
 }
 
-// The axes that its facets lie along.
 fn facet_frame(surface: Surface, material: Material) -> Tangents {
     if ANISOTROPIC != 0u {
         return lobe_frame(surface, material.rotation);
@@ -127,8 +125,8 @@ fn facet_frame(surface: Surface, material: Material) -> Tangents {
     return frame_around(surface.shading_normal);
 }
 
-// A material as the viewer sees its facets, in the frame of the surface's du and dv: with the index behind the surface relative to that
-// before it, and with what is lost between facets.
+// Returns a microfacet material as seen by the viewer, in the frame of du and dv: the index behind the surface relative
+// to that before it, and the energy lost to multiple scattering.
 fn facets_of(surface: Surface, found: Material) -> Material {
     var material = found;
     let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
@@ -153,7 +151,7 @@ fn facets_of(surface: Surface, found: Material) -> Material {
     return material;
 }
 
-// What facets do with light from wi, in their frame, and how densely they choose that.
+// Evaluates a microfacet material in its frame.
 fn facet_reflection(material: Material, wo: vec3f, wi: vec3f) -> Reflection {
     var result = Reflection(vec3f(0.0), 0.0);
     if (MATERIALS & (1u << METAL)) != 0u {
@@ -174,7 +172,7 @@ fn facet_reflection(material: Material, wo: vec3f, wi: vec3f) -> Reflection {
     return result;
 }
 
-// A way on from facets, in their frame.
+// Samples a microfacet material in its frame.
 fn facet_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
     var result = LobeSample(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 0.0, 1.0);
     if (MATERIALS & (1u << METAL)) != 0u {
@@ -195,13 +193,12 @@ fn facet_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSam
     return result;
 }
 
-// To the viewer, in the frame of the surface's lobe; never below the surface.
+// Returns wo in the frame of the lobe, never below the surface.
 fn local_wo(surface: Surface) -> vec3f {
     let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
     return vec3f(wo.x, wo.y, max(wo.z, 1e-6));
 }
 
-// A principled material as the viewer sees it.
 fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> PrincipledLobes {
     var coat = vec3f(0.0, 0.0, 1.0);
     if ((LOBES & LOBE_COAT) != 0u) & (NORMAL_MAPS == 1u) {
@@ -212,7 +209,7 @@ fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Princ
     return principled_mixture(material, wo, surface.side > 0.0, coat, LOBES, energy);
 }
 
-// Whether light may come from wi, by what the surface is and what it is taken for: not where the two are at odds about the side.
+// Returns true if light may arrive from wi: not where shading and geometric normal disagree about its side.
 fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, wi: vec3f) -> bool {
     var lit = is_lit(surface, wi);
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
@@ -225,7 +222,7 @@ fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, w
     return lit;
 }
 
-// Whether light comes through a material in many directions.
+// Returns true if the material transmits light other than by a delta.
 fn is_transmissive(material: Material) -> bool {
     var passes = ((PASSING_KINDS >> material.kind) & 1u) != 0u;
     if (LOBES & LOBE_TRANSMISSION) != 0u {
@@ -234,12 +231,12 @@ fn is_transmissive(material: Material) -> bool {
     return passes;
 }
 
-// The normal of a surface that reflects no light from behind it; 0 of others.
+// Returns the normal of a surface that is lit from its side only, else 0.
 fn lit_normal(surface: Surface, material: Material) -> vec3f {
     return select(surface.shading_normal, vec3f(0.0), is_transmissive(material));
 }
 
-// The surface as rays leave it on the other side.
+// Returns the surface for rays that leave it on the other side.
 fn flipped(surface: Surface) -> Surface {
     var result = surface;
     result.ray_origin = surface.position - (surface.ray_origin - surface.position);
@@ -251,7 +248,7 @@ fn flipped(surface: Surface) -> Surface {
     return result;
 }
 
-// How strongly light is absorbed behind a surface that is `before`, on the viewer's side.
+// Returns the absorption behind a surface; `before` is that on the viewer's side.
 fn absorption_after(before: vec3f, surface: Surface, material: Material) -> vec3f {
     return select(before, select(vec3f(0.0), material.absorption, surface.side > 0.0), has_inside(material));
 }

@@ -1,22 +1,21 @@
-// Low-discrepancy sequences on the unit square, made random by integer hashing.
+// Low-discrepancy sequences on the unit square, randomized by integer hashing.
 
-// Point `index` of Sobol's (0,2)-sequence, Owen-scrambled by hashing: Burley, "Practical Hash-based Owen Scrambling",
-// JCGT 9(4), 2020. Sequences of different keys are independent, since the order of their points is scrambled too.
+// Returns point `index` of the Sobol' (0,2)-sequence, Owen-scrambled by hashing: Burley, "Practical Hash-based Owen
+// Scrambling", JCGT 9(4), 2020. Keys are independent, since the order is scrambled too.
 fn sobol_sample(index: u32, key: vec2u) -> vec2f {
     let bits = sobol_bits(index, key);
     return vec2f(unit_float(bits.x), unit_float(bits.y));
 }
 
-// The same as fractions of 2^32.
+// Returns `sobol_sample` in units of 2^-32.
 fn sobol_bits(index: u32, key: vec2u) -> vec2u {
     let i = shuffled_index(index, key.x ^ key.y);
     return vec2u(reverseBits(scramble(i, key.x)), reverseBits(scramble(sobol_reversed(i), key.y)));
 }
 
-// The second coordinate of Sobol's point i as 32 binary digits, the first in the lowest bit; those of the first
-// coordinate are i itself. Digit j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2, here as
-// the product of its five factors (Ahmed, "An Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and
-// Compact", EGSR 2024).
+// Returns the second coordinate of Sobol' point i as 32 bits, the first digit lowest; i is the first coordinate. Digit
+// j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2 in five factors (Ahmed, "An
+// Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR 2024).
 fn sobol_reversed(i: u32) -> u32 {
     var x = i;
     x ^= (x >> 1u) & 0x55555555u;
@@ -26,9 +25,8 @@ fn sobol_reversed(i: u32) -> u32 {
     return x ^ (x >> 16u);
 }
 
-// Changes every bit in dependence on the lower ones, which is Owen's scrambling of digits in reverse order: the
-// permutation of Laine and Karras, "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of
-// Burley 2020, listing 2.
+// Changes every bit by the lower ones, which is Owen scrambling of reversed digits: the permutation of Laine and
+// Karras, "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of Burley 2020, listing 2.
 fn scramble(digits: u32, seed: u32) -> u32 {
     var x = digits + seed;
     x ^= x * 0x6c50b47cu;
@@ -38,13 +36,13 @@ fn scramble(digits: u32, seed: u32) -> u32 {
     return x;
 }
 
-// A permutation of the indices that takes every aligned run of 2^k of them to another.
+// Permutes indices such that aligned runs of 2^k map to aligned runs.
 fn shuffled_index(index: u32, seed: u32) -> u32 {
     return reverseBits(scramble(reverseBits(index), seed));
 }
 
-// Point `index` of Halton's sequence in bases 2 and 3, in scrambled order and rotated on the torus (Cranley and
-// Patterson, "Randomization of Number Theoretic Methods for Multiple Integration", 1976).
+// Returns point `index` of the Halton sequence in bases 2 and 3, in scrambled order and rotated on the torus (Cranley
+// and Patterson, "Randomization of Number Theoretic Methods for Multiple Integration", 1976).
 fn halton_sample(index: u32, key: vec2u) -> vec2f {
     let i = shuffled_index(index, key.x ^ key.y);
     let x = reverseBits(i) + key.x;
@@ -52,7 +50,7 @@ fn halton_sample(index: u32, key: vec2u) -> vec2f {
     return vec2f(unit_float(x), f32(y) * 6.969171550963438e-8);
 }
 
-// The lowest 15 digits of i in base 3, in reverse order, as a whole number below 3^15.
+// Returns the lowest 15 base-3 digits of i in reverse order, as an integer below 3^15.
 fn radical_inverse_3(i: u32) -> u32 {
     var rest = i;
     var reversed = 0u;

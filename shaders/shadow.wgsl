@@ -1,17 +1,17 @@
-// Shadow rays, from one point to a block of at most 32 samples of one light at a time: what a primitive needs to know
-// of the point and the light is computed once for the block, and no primitive is read inside the loop.
+// Shadow rays from a point to a block of at most 32 samples of a light. Terms of primitive, point and light are
+// computed once per block, and the loop loads no primitive.
 
 struct SampleBlock {
     pattern: u32,
     side: u32,
-    first: u32,            // of the light's samples
-    count: u32,            // 1 to BLOCK
+    first: u32,            // first sample of the light
+    count: u32,            // 1 to SAMPLE_BLOCK
     group: u32,
     key: vec2u,
 }
 
-// Bit i is set where the primitive hides sample i of the block from p. `kind` is the primitive's, known when compiled;
-// `inside_prim` says that p is on a solid seen from inside (`solid_levels`).
+// Returns the mask of the samples of a block that the primitive occludes from p. `kind` is a compile-time constant.
+// With `inside_prim` p is on a solid seen from inside (`solid_levels`).
 fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, light: Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
@@ -25,7 +25,7 @@ fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, light: L
     return bits;
 }
 
-// Whether the primitive cuts the segment p + s to, s in (0, reach).
+// Returns true if the primitive occludes the segment p + s to, s in (0, t_max).
 fn occludes_segment(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, to: vec3f, t_max: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let levels = solid_levels(kind, q, from_anchor, inside_prim);
@@ -36,12 +36,12 @@ fn block_sample(block: SampleBlock, i: u32) -> vec2f {
     return sample_square(block.pattern, block.side, block.first + i, block.group, block.key);
 }
 
-// The cone of all shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
+// The frustum of shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
 struct Cone {
     apex: vec3f,
     to: Segments,
     length2: f32,          // |towards|^2
-    inverse_depth: f32,    // 1 / (the least dot product of towards with a ray), or negative if that is not positive
+    inverse_depth: f32,    // 1 / (the minimum of dot(towards, ray)); negative if that is not positive
 }
 
 fn light_frustum(light: Light, p: vec3f) -> Cone {
@@ -51,9 +51,9 @@ fn light_frustum(light: Light, p: vec3f) -> Cone {
     return Cone(p, to, length2, select(-1.0, 1.0 / depth, depth > 0.0));
 }
 
-// Whether the sphere may reach into the cone. It does not if a plane through the apex has the cone on one side and the
-// sphere on the other: the plane with normal n = m - towards slope, where m is the part of the way to the sphere's
-// centre that is perpendicular to `towards`, and `slope` the least that keeps all rays of the cone below it.
+// Returns false if a plane through the apex separates the sphere from the frustum. Its normal is n = m - towards slope,
+// where m is the part of the vector to the sphere's center perpendicular to `towards`, and `slope` the least that keeps
+// all rays of the frustum below the plane.
 fn may_block(sphere: Sphere, cone: Cone) -> bool {
     let w = sphere.center - cone.apex;
     let along = dot(w, cone.to.towards);

@@ -1,12 +1,12 @@
-// Rays and boxes along the axes. A ray passes a box in the interval that its three slabs have in common: Kay and Kajiya, "Ray
-// Tracing Complex Scenes", SIGGRAPH 1986. A box counts as `pad` larger on all sides.
+// Intersection of rays with boxes, in the interval that the three slabs have in common: Kay and Kajiya, "Ray Tracing
+// Complex Scenes", SIGGRAPH 1986. Boxes are enlarged by `pad` on all sides.
 //
-// Every step is monotone, in 32-bit floats too: of two boxes, one inside of the other, the larger one is entered no later and
-// left no earlier. So a tree of boxes leaves out nothing whose own box a ray passes (docs/decisions/trees.md).
+// Every step is monotone in 32-bit floats: of two nested boxes, the outer one is entered no later and left no earlier.
+// A BVH thus misses nothing whose box a ray hits (docs/decisions/trees.md).
 
-// What all boxes need of a ray.
+// The terms of a ray for box tests, with origins for lower and upper sides.
 struct Slabs {
-    low_origin: vec3f,     // the origin as the lower sides of boxes see it
+    low_origin: vec3f,
     high_origin: vec3f,
     inverse: vec3f,        // of the direction
 }
@@ -16,13 +16,13 @@ fn slabs(origin: vec3f, direction: vec3f, pad: f32) -> Slabs {
     return Slabs(origin + pad, origin - pad, inverse);
 }
 
-// 1 / x, finite for every x: a direction along a side of a box is nearly so.
+// Returns 1 / x, with |x| at least 2^-100 so that it is finite.
 fn inverse_of(x: f32) -> f32 {
     let least = select(7.888609e-31, -7.888609e-31, x < 0.0);
     return 1.0 / select(least, x, abs(x) >= 7.888609e-31);
 }
 
-// Where the ray enters the box, x, and leaves it, y; it does not pass it if x > y.
+// Returns the t where the ray enters the box, x, and leaves it, y; it misses if x > y.
 fn box_interval(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
     let a = (low - s.low_origin) * s.inverse;
     let b = (high - s.high_origin) * s.inverse;
@@ -31,18 +31,18 @@ fn box_interval(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
     return vec2f(near, far);
 }
 
-// Whether a ray passes a box ahead of its start and no farther than `limit`.
+// Returns true if the interval is not empty and overlaps [0, limit].
 fn interval_hits(passage: vec2f, limit: f32) -> bool {
     return (passage.x <= passage.y) & (passage.y >= 0.0) & (passage.x <= limit);
 }
 
-// All rays from one point whose directions lie in a box. Of what any of them passes, they pass all.
+// All rays from one point with directions in a box. Box tests are conservative: they hit what any of the rays hits.
 struct RayInterval {
     low_origin: vec3f,
     high_origin: vec3f,
-    near_low: vec3f,       // the earliest that any ray reaches a lower side, by its distance
-    near_high: vec3f,      // and an upper one
-    far_low: vec3f,        // the latest that any leaves by a lower side; 0 where that is no bound
+    near_low: vec3f,       // factor from the distance of a lower side to the earliest t
+    near_high: vec3f,      // the same for an upper side
+    far_low: vec3f,        // factor from the distance of a lower side to the latest t; 0 if unbounded
     far_high: vec3f,
 }
 
@@ -56,7 +56,7 @@ fn ray_interval(origin: vec3f, least: vec3f, most: vec3f, pad: f32) -> RayInterv
                select(zero, of_most, down), select(zero, of_least, up));
 }
 
-// When any ray of the fan may enter the box, x, and leave it, y.
+// Returns the t where any of the rays may enter the box, x, and leave it, y.
 fn ray_interval_box(low: vec3f, high: vec3f, f: RayInterval) -> vec2f {
     let a = low - f.low_origin;
     let b = high - f.high_origin;

@@ -1,18 +1,18 @@
-// The point where a ray meets a primitive.
+// The point where a ray hits a surface.
 
 struct Surface {
     position: vec3f,
-    normal: vec3f,         // the primitive's own, unit length, towards the viewer: it says on which side a point lies
-    smooth_normal: vec3f,  // the same, but on a mesh between the normals of the vertices: light that is behind it lights nothing
-    shading_normal: vec3f, // what light is reflected and refracted by: a normal map's, else the smooth one
-    wo: vec3f,             // unit vector to the viewer
-    ray_origin: vec3f,     // where rays that leave it begin: a little above it
-    terminator_offset: vec3f, // from there to where shadow rays begin, on a mesh that stands for a smooth surface
-    side: f32,             // 1 where the normal is the outward one, -1 where it is the opposite
-    exclude_front: vec2u,  // the instance and primitive if no ray that leaves it on the viewer's side can meet it again
-    exclude_back: vec2u,   // the same for rays that leave it on the other side; else NOWHERE
-    uv: vec2f,             // texture coordinates
-    du: vec3f,             // the position's derivatives by them, which span the tangent frame
+    normal: vec3f,            // unit geometric normal towards the viewer; it defines the sides of the surface
+    smooth_normal: vec3f,     // interpolated vertex normal of a mesh, else `normal`; light behind it is ignored
+    shading_normal: vec3f,    // from the normal map, else `smooth_normal`
+    wo: vec3f,                // unit vector to the viewer
+    ray_origin: vec3f,        // origin of rays that leave it, a little above it
+    terminator_offset: vec3f, // from there to the origin of shadow rays, on smooth meshes
+    side: f32,                // 1 if `normal` is the outward one, else -1
+    exclude_front: vec2u,     // what rays that leave it on the viewer's side cannot hit again, else NO_PRIMITIVE
+    exclude_back: vec2u,      // the same for rays on the other side
+    uv: vec2f,                // texture coordinates
+    du: vec3f,                // derivatives of the position, which span the tangent frame
     dv: vec3f,
 }
 
@@ -20,9 +20,9 @@ fn largest(v: vec3f) -> f32 {
     return max(max(abs(v.x), abs(v.y)), abs(v.z));
 }
 
-// Where a ray meets primitive i, which is q; without texture coordinates. A step of Newton's method takes the point back onto the primitive, so that it
-// is off it by the rounding of its coordinates and of its way from the anchor alone; rays start `epsilon` times the
-// largest of these above it.
+// Returns the point where a ray hits primitive i, which is q, without texture coordinates. A Newton step moves it back
+// onto the primitive, up to the rounding of its coordinates and of its offset from the anchor. Rays start `epsilon`
+// times the largest of these above it.
 fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let met = ray.origin + ray.direction * t;
     let way = met - q.anchor;
@@ -44,7 +44,7 @@ fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
                    vec3f(0.0), vec3f(0.0));
 }
 
-// A surface of the primitive q with texture coordinates and their frame.
+// Returns a surface of the primitive q with texture coordinates and tangents.
 fn with_coordinates(surface: Surface, q: Primitive) -> Surface {
     let local = point_to_local(q, surface.position);
     let tangents = local_tangents(q, local);

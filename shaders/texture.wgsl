@@ -1,4 +1,4 @@
-// Colours from textures.
+// Texture lookups and filters, and the materials that they modify.
 
 fn texture_color(t: Texture, surface: Footprint) -> vec3f {
     let f = texture_footprint(t, surface);
@@ -26,7 +26,7 @@ fn texture_color(t: Texture, surface: Footprint) -> vec3f {
     return t.first + (t.second - t.first) * x;
 }
 
-// One level of an image.
+// A level of an image pyramid.
 struct Level {
     start: u32,            // of its texels
     width: u32,
@@ -61,15 +61,15 @@ fn nearest_color(t: Texture, uv: vec2f) -> vec3f {
     return load_texel(t, level, i32(x), i32(y));
 }
 
-// The level in whose texels a length, measured in those of the finest level, is from 1 to 2; as a fraction between two.
+// Returns the level, with a fraction, where a length in texels of the finest level is 1 to 2 texels.
 fn level_of_length(t: Texture, length: f32) -> f32 {
     let coarsest = f32(t.levels - 1u);
     let level = max(log2(max(length, 1.0)), 0.0);
     return select(coarsest, level, (length < 1e9) & (level < coarsest));
 }
 
-// Bilinear at the finest level; TRILINEAR: between the two levels whose texels are about as large as the footprint's
-// longer edge, as graphics hardware does: Williams, "Pyramidal Parametrics", SIGGRAPH 1983.
+// Interpolates the finest level bilinearly; TRILINEAR: the two levels whose texels match the longer edge of the
+// footprint, as in graphics hardware: Williams, "Pyramidal Parametrics", SIGGRAPH 1983.
 fn linear_color(t: Texture, f: Footprint) -> vec3f {
     let size = vec2f(f32(t.width), f32(t.height));
     let dx = f.dx * size;
@@ -100,17 +100,17 @@ fn bilinear_color(t: Texture, level: Level, uv: vec2f) -> vec3f {
     return rows[0] + (rows[1] - rows[0]) * (y - y0);
 }
 
-// The elliptical weighted average: Greene and Heckbert, "Creating Raster Omnimax Images from Multiple Perspective Views
-// Using the Elliptical Weighted Average Filter", IEEE CG&A 6(6), 1986; over a pyramid as in Pharr, Jakob and Humphreys,
-// "Physically Based Rendering", 3rd edition, 10.4.5, but on finer levels: in the level's texels half the minor axis is from
-// 2.2 to 4.4. The last quarter of the way to the next level mixes the two.
+// Returns the elliptical weighted average: Greene and Heckbert, "Creating Raster Omnimax Images from Multiple
+// Perspective Views Using the Elliptical Weighted Average Filter", IEEE CG&A 6(6), 1986; over a pyramid as in Pharr,
+// Jakob and Humphreys, "Physically Based Rendering", 3rd edition, 10.4.5, but on finer levels: half the minor axis is
+// 2.2 to 4.4 texels. Levels blend over the last quarter.
 fn ewa_color(t: Texture, f: Footprint) -> vec3f {
     let size = vec2f(f32(t.width), f32(t.height));
     let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
     let lod = level_of_length(t, 0.45 * minor);
     let finer = floor(lod);
     let between = max(4.0 * (lod - finer) - 3.0, 0.0);
-    let coarsest = lod >= f32(t.levels - 1u); // one texel: no footprint is needed, and it may have no bound
+    let coarsest = lod >= f32(t.levels - 1u); // one texel: needs no footprint, which may be unbounded
     let dx = select(f.dx, vec2f(0.0), coarsest);
     let dy = select(f.dy, vec2f(0.0), coarsest);
     var color = vec3f(0.0);
@@ -121,11 +121,11 @@ fn ewa_color(t: Texture, f: Footprint) -> vec3f {
     return color;
 }
 
-// The mean over one level's texels in the ellipse, made wider or narrower such that the whole filter has the variance of
-// that on the finest level. In units where an ellipse with the half axis r has r^2, that one has M + I: I is for a texel's
-// reconstruction. A level's texels are means already, of a box with the variance 1/3, the finest ones' box taken off:
-// (1 - q) / 3 where q is the square of a finest texel's size, and I is now q I. The half axes stay above 1, so that
-// every ellipse holds a texel. The mean is taken of differences to one of the texels, so that a constant stays what it is.
+// Returns the mean of a level over the ellipse, resized so that the whole filter has the variance of the finest level.
+// In units where half axis r has r^2, that is M + I, with I for reconstruction. Texels of a level are means over a box
+// of variance 1/3, less that of the finest texels: (1 - q) / 3, where q is the squared size of a finest texel; I
+// becomes q I. Half axes stay above 1: every ellipse contains a texel. The mean is of differences to one texel, which
+// keeps constants exact.
 fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) -> vec3f {
     let size = vec2f(f32(level.width), f32(level.height));
     let q = size / vec2f(f32(t.width), f32(t.height));
@@ -136,7 +136,7 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
     let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, least);
     let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
     let slope = m.y / yy;
-    let across = xx - m.y * slope; // the square of the half width of the row through the centre
+    let across = xx - m.y * slope; // squared half width of the row through the center
     let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
     let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
     let t_max = sqrt(yy);
@@ -163,13 +163,13 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
     return base + sum * select(0.0, 1.0 / total, total > 0.0);
 }
 
-// The value of a colour that gives a number.
+// Returns the channel of a color that a scalar parameter uses.
 fn channel_of(color: vec3f, lookup: Lookup, place: u32) -> f32 {
     let channel = (lookup.channels >> (2u * place)) & 3u;
     return select(select(color.x, color.y, channel == 1u), color.z, channel == 2u);
 }
 
-// A principled material with what a colour gives of it alone.
+// Sets the parameters that only principled materials have from the color of a lookup.
 fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     var m = before;
     let purposes = lookup.purposes;
@@ -190,14 +190,14 @@ fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     return m;
 }
 
-// What a surface looks like: its material and its shading normal as its textures make them.
+// A material and its shading normals, with textures applied.
 struct EvaluatedMaterial {
     material: Material,
     normal: vec3f,
-    coat_normal: vec3f,    // of a clear coat
+    coat_normal: vec3f,    // of the clearcoat
 }
 
-// `lookups` is how many the material has at most.
+// Applies textures; `lookups` is the maximum number for the material.
 fn evaluate_material(prim: HitPrimitive, hit: Hit, material: Material, surface: Surface, at: HitDifferential, lookups: u32) -> EvaluatedMaterial {
     var shading = EvaluatedMaterial(material, surface.shading_normal, surface.shading_normal);
     if lookups == 0u {

@@ -1,7 +1,6 @@
-// What vertices of meshes have beside positions, normals and their first texture coordinates: colours, and further sets of texture
-// coordinates.
+// Optional vertex attributes of meshes: colors, and further sets of texture coordinates.
 
-// The colour of what was hit, between those of its vertices; white where there are none.
+// Returns the interpolated vertex color of a hit; white without vertex colors.
 fn vertex_color(hit: Hit) -> vec4f {
     if is_on_mesh(hit) {
         let i = load_instance(hit.instance - 1u);
@@ -16,7 +15,7 @@ fn vertex_color(hit: Hit) -> vec4f {
     return vec4f(1.0);
 }
 
-// A material with the colours of its vertices, as it asks for them.
+// Applies vertex colors to a material, as it specifies.
 fn with_vertex_colors(before: Material, hit: Hit) -> Material {
     var material = before;
     if material.vertex_colors != NO_COLORS {
@@ -29,14 +28,14 @@ fn with_vertex_colors(before: Material, hit: Hit) -> Material {
     return material;
 }
 
-// Texture coordinates of a vertex in a further set, which the mesh has.
+// Loads the texture coordinates of a vertex from a further set, which must exist.
 fn load_further_uv(i: Instance, vertex: u32, uv_set: u32) -> vec2f {
     let rows = (i.uv_sets + 1u) / 2u;
     let row = bitcast<vec4f>(meshes[i.more_uvs + rows * vertex + (uv_set - 1u) / 2u]);
     return select(row.zw, row.xy, (uv_set & 1u) == 1u);
 }
 
-// What was hit, with a set of texture coordinates in place of the first: 0 where the mesh has none such.
+// Returns the hit primitive with a set of texture coordinates in place of the first; 0 if the mesh does not have it.
 fn spot_in_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
     var face = prim;
     if is_on_mesh(hit) {
@@ -54,7 +53,7 @@ fn spot_in_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
     return face;
 }
 
-// Where a texture is looked up: in its own set of texture coordinates, where `first` is the place in the first one.
+// Returns texture coordinates in a set; `first` are those of set 0.
 fn uv_in_set(first: vec2f, prim: HitPrimitive, hit: Hit, uv_set: u32) -> vec2f {
     if UV_SETS == 0u {
         return first;
@@ -65,7 +64,7 @@ fn uv_in_set(first: vec2f, prim: HitPrimitive, hit: Hit, uv_set: u32) -> vec2f {
     return face_uv(spot_in_set(prim, hit, uv_set), hit.barycentric);
 }
 
-// The same of a footprint.
+// Returns the footprint in a set; `first` is that in set 0.
 fn footprint_in_set(first: Footprint, prim: HitPrimitive, hit: Hit, at: HitDifferential, uv_set: u32) -> Footprint {
     if UV_SETS == 0u {
         return first;

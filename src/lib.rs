@@ -1,7 +1,7 @@
 //! A ray tracer written as WGSL compute shaders on wgpu, with a CPU twin that computes the same bits.
 //!
-//! A scene is read from a file, whose format is described in `docs/scene-format.md`, and rendered on a GPU, on software
-//! Vulkan or on the CPU, whichever there is:
+//! Scenes are read from files (`docs/scene-format.md` documents the format), and rendered on a GPU, on software Vulkan
+//! or on the CPU, whichever is available:
 //!
 //! ```
 //! use wgray::{Error, Options, Scene};
@@ -17,11 +17,11 @@
 //! }
 //! ```
 //!
-//! - [`Options`] chooses the device, a part of the picture, and layers such as depth and normals; [`Overrides`] with
-//!   [`Scene::load_with`] puts another size, number of samples or seed in place of the file's.
-//! - [`render_growing`] shows the picture as it grows, and can be cancelled.
-//! - [`Picture`] gives the linear pixels and layers, and writes PNG, OpenEXR, JPEG and WebP files.
-//! - A scene can be built in code, without a file, by [`Description::new`]:
+//! - [`Options`] selects the device, a region of the image, and layers such as depth and normals. [`Overrides`] with
+//!   [`Scene::load_with`] replaces the size, number of samples or seed of the file.
+//! - [`render_growing`] shows the image while it renders, and can be cancelled.
+//! - [`Picture`] provides the linear pixels and layers, and writes PNG, OpenEXR, JPEG and WebP files.
+//! - [`Description::new`] builds a scene in code, without a file:
 //!
 //! ```
 //! use wgray::scene::{PerspectiveDescription, PhongDescription, PointLightDescription, SphereDescription};
@@ -43,20 +43,20 @@
 //!
 //! # Features
 //!
-//! All are on by default; a program that links the library may want `default-features = false`.
+//! All are enabled by default; for the library, `default-features = false` may be preferable.
 //!
-//! - `gpu`: rendering on GPUs and software Vulkan. Without it [`Device::Auto`] is the CPU, and wgpu is not linked.
+//! - `gpu`: rendering on GPUs and software Vulkan. Without it, [`Device::Auto`] is the CPU, and wgpu is not linked.
 //! - `cli`: the program `wgray`.
-//! - `dev`: the development mode of the program, a page that follows every save of a shader or scene; with `gpu`.
+//! - `dev`: the development mode of the program, a page that updates when a shader or scene is saved. It enables `gpu`.
 //!
-//! # What is promised
+//! # Stability
 //!
-//! What is named at the root of the crate, and the modules that this page lists. Modules that are public but not listed are
-//! for the project's own tests and the program; they change as they need to.
-// These end the program where a stream is closed or full.
+//! The public API consists of the items at the root of the crate and the modules listed on this page. Other public
+//! modules are internal: the project's tests and program use them, and they may change at any time.
+// These macros panic if the stream is closed or full.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
-// The program in the README compiles.
+// Compiles the program in the README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,4 +1,4 @@
-//! A rendered picture in memory.
+//! A rendered image in memory.
 
 use std::io;
 use std::path::Path;
@@ -10,7 +10,7 @@ use wgray_image::Region;
 use wgray_render::film::Film;
 use wgray_render::records::FirstHit;
 
-/// A rendered picture, or the part of one that was asked for: linear radiance, and the layers beside it.
+/// A rendered image, or a region of one: linear radiance and additional layers (AOVs).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     pub(crate) film: Film,
@@ -19,38 +19,37 @@ pub struct Picture {
     pub(crate) device: DeviceInfo,
 }
 
-/// The values of one channel, row by row from the top.
+/// Values of a channel by rows, from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Channel {
-    /// Of `R`, `A`, `normal.X` and other measures.
+    /// Values of `R`, `A`, `normal.X` and other measurements.
     Floats(Vec<f32>),
-    /// Of `primitive.ID` and `sample_count.N`.
+    /// Values of `primitive.ID` and `sample_count.N`.
     Whole(Vec<u32>),
 }
 
 impl Picture {
-    /// Columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> u32 {
         self.layout.region.width()
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> u32 {
         self.layout.region.height()
     }
 
-    /// Which pixels of the scene's whole picture these are.
+    /// Returns the region of the scene's image that was rendered.
     pub fn region(&self) -> Region {
         self.layout.region
     }
 
-    /// What it was rendered on.
+    /// Returns the device that rendered last.
     pub fn device(&self) -> &DeviceInfo {
         &self.device
     }
 
-    /// The pixels in linear RGB, row by row from the top. Where the picture has alpha they are weighted by it: those of the
-    /// picture over black.
+    /// Returns the pixels in linear RGB by rows, from the top. If the image has alpha, they are premultiplied.
     pub fn pixels(&self) -> Pixels {
         Pixels {
             width: self.width(),
@@ -59,21 +58,21 @@ impl Picture {
         }
     }
 
-    /// The share of each pixel that is covered, row by row from the top, if the scene's background is transparent. A filter
-    /// with weights of either sign may take it out of 0 to 1.
+    /// Returns the alpha values by rows, from the top, if the background is transparent. Filters with negative weights
+    /// may exceed 0 to 1.
     pub fn alpha(&self) -> Option<Vec<f32>> {
         let pixels = 0..self.film.sums.len();
         self.layout.alpha.then(|| pixels.map(|i| self.film.alpha(i)).collect())
     }
 
-    /// The pixels as a screen and a PNG without alpha show them: red, green and blue of 8 bits each, by the scene's view
-    /// transform and exposure, row by row from the top. Where the picture has alpha it is over black.
+    /// Returns the pixels as 8-bit RGB by rows, from the top, with the scene's view transform and exposure, as in a PNG
+    /// without alpha. If the image has alpha, it is composited over black.
     pub fn rgb8(&self) -> Vec<u8> {
         self.film.means().flat_map(|mean| self.layout.view.rgb8(mean)).collect()
     }
 
-    /// The pixels as a PNG with alpha has them, row by row from the top: red, green and blue as in [`Picture::rgb8`], but of
-    /// what is there by itself, not weighted by alpha; then alpha, linear, 255 where the picture has none.
+    /// Returns the pixels as 8-bit RGBA by rows, from the top, as in a PNG with alpha: straight colors, encoded as in
+    /// [`Picture::rgb8`], and linear alpha, which is 255 if the image has none.
     pub fn rgba8(&self) -> Vec<u8> {
         let pixel = |(i, mean)| match self.layout.alpha {
             true => self.layout.view.rgba8(mean, self.film.alpha(i)),
@@ -82,8 +81,8 @@ impl Picture {
         self.film.means().enumerate().flat_map(pixel).collect()
     }
 
-    /// The values of a channel, by the name that it has in an OpenEXR file: `R`, `G`, `B`, `A` with alpha, and those of the layers that were
-    /// asked for, such as `depth.Z` or `normal.X`. `None` if there is no such channel.
+    /// Returns a channel by its OpenEXR name: `R`, `G`, `B`, `A` if the image has alpha, and the channels of requested
+    /// layers, such as `depth.Z` or `normal.X`. `None` if the channel does not exist.
     pub fn channel(&self, name: &str) -> Option<Channel> {
         if let Some(color) = ["R", "G", "B"].iter().position(|known| *known == name) {
             return Some(Channel::Floats(self.film.means().map(|mean| mean[color]).collect()));
@@ -100,27 +99,30 @@ impl Picture {
         })
     }
 
-    /// The layers that it has beside the radiance.
+    /// Returns the additional layers.
     pub fn aovs(&self) -> &[Aov] {
         &self.layout.aovs
     }
 
-    /// Writes the picture to a file whose name ends in `.png`, `.jpg`, `.jpeg` or `.webp`, as a screen shows it, or in `.exr`, with its linear values.
-    /// Layers are further channels of an EXR, and files beside a PNG: `NAME.normal.png` and so on; JPEG and WebP have none. Files appear when they
-    /// are whole, in place of those that have their names. Alpha is a further channel of all but JPEG, which is over black.
+    /// Writes the image to a file. Files named `.png`, `.jpg`, `.jpeg` or `.webp` contain the displayed image, `.exr`
+    /// the linear values.
+    ///
+    /// Layers become channels of an EXR, and separate files such as `NAME.normal.png` for a PNG; JPEG and WebP have no
+    /// layers. Alpha becomes a channel, except in a JPEG, which is composited over black. Existing files are replaced
+    /// when the new ones are complete.
     ///
     /// # Errors
     ///
-    /// Names of another end, pictures larger than the format has them, and files that cannot be written.
+    /// The file type is unknown, the image is too large for the format, or a file cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         self.save_with(path, &SaveOptions::default())
     }
 
-    /// Writes the picture as [`Picture::save`] does, with other settings than the usual ones.
+    /// Like [`Picture::save`], with options.
     ///
     /// # Errors
     ///
-    /// Those of [`Picture::save`].
+    /// The errors of [`Picture::save`].
     pub fn save_with(&self, path: impl AsRef<Path>, options: &SaveOptions) -> Result<(), Error> {
         let path = path.as_ref();
         let refused = |rule: &str| {

@@ -1,4 +1,4 @@
-//! From a scene to a picture in memory.
+//! Rendering of a scene to an image in memory.
 
 use std::ops::ControlFlow;
 
@@ -17,18 +17,21 @@ use wgray_render::job::{self, Bands, Cut, Flow, NoCheckpoint, Order};
 use wgray_render::records::{FirstHit, Packed};
 use wgray_scene::Scene;
 
-/// Renders a scene. The picture is kept in memory, in 16 bytes a pixel; in 80 more where it has alpha, or layers that are means
-/// over the samples.
+/// Renders a scene. The image takes 16 bytes of memory per pixel, and 80 more if it has alpha or layers that are
+/// averaged over samples.
 ///
-/// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, or if the scene or image does not fit into its memory. With any
-/// device, it renders if the driver ends long loops early and a single sample needs longer ones. A lost device is opened again a few times, and
-/// the render continues from the last finished part; if that fails, [`Device::Auto`](crate::Device::Auto) continues on the CPU. Warnings by
-/// `tracing` give the reason; [`Picture::device`] returns the device that rendered last. wgpu panics at some losses: the panic is caught, but a
-/// panic hook observes it, and a program built with `panic = "abort"` ends. Mesa's drivers print a line on standard error if the environment has no `XDG_RUNTIME_DIR`.
+/// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, or if the scene or image does not
+/// fit into its memory. With any device, the CPU renders if the driver truncates long loops and a single sample exceeds
+/// the limit. A lost device is re-opened a few times, and the render resumes from the last finished part; if that
+/// fails, [`Device::Auto`](crate::Device::Auto) resumes on the CPU. `tracing` warnings give the reason, and
+/// [`Picture::device`] returns the device that rendered last.
+///
+/// wgpu panics at some device losses. The panic is caught, but panic hooks observe it, and a program built with `panic
+/// = "abort"` aborts. Mesa's drivers print a line on standard error if the environment has no `XDG_RUNTIME_DIR`.
 ///
 /// # Errors
 ///
-/// Options that do not fit the scene, no such device, and what its driver refuses.
+/// The options do not fit the scene, the device does not exist, or its driver reports an error.
 pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let packed = options.pack(scene);
     let mut prepared = Prepared::new(scene, &packed, options)?;
@@ -56,13 +59,14 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     Ok(prepared.picture(film))
 }
 
-/// Renders a scene, and shows the picture as it grows: `watch` is called some ten times a second or more, sees the picture
-/// as it is then, and says whether to go on. All pixels get a few samples before any gets more, but that a picture too
-/// large for one film of the device grows part by part, from the top. The result has the bits of [`render`].
+/// Renders a scene progressively. `watch` is called about ten times per second or more. It can access the current
+/// image, and returns whether to continue. All pixels get a few samples before any pixel gets more, except that an
+/// image too large for one film of the device is rendered part by part, from the top. The result is bit-identical to
+/// that of [`render`].
 ///
 /// # Errors
 ///
-/// The errors of [`render`] and of `watch`, and [`RenderError::Cancelled`] if `watch` breaks off.
+/// The errors of [`render`] and of `watch`, and [`RenderError::Cancelled`] if `watch` returns [`ControlFlow::Break`].
 pub fn render_growing(
     scene: &Scene,
     options: &Options,
@@ -99,7 +103,7 @@ pub fn render_growing(
                 };
                 match watch(&mut growing) {
                     Ok(flow) => Ok(flow.is_continue().into()),
-                    // What befalls the device while the picture is copied from it is a fault like any other.
+                    // Device failures while the image is copied are handled like all others.
                     Err(Error::Render(error @ (RenderError::Lost { .. } | RenderError::OutOfMemory { .. }))) => {
                         Err(error)
                     }
@@ -129,7 +133,7 @@ pub fn render_growing(
     }
 }
 
-/// A picture that is being rendered.
+/// An image that is being rendered.
 pub struct Growing<'a> {
     share: f64,
     backend: &'a mut dyn Backend,
@@ -141,16 +145,16 @@ pub struct Growing<'a> {
 }
 
 impl Growing<'_> {
-    /// The share of the work that is done, from 0 to 1.
+    /// Returns the fraction of the work that is done, 0 to 1.
     pub fn share(&self) -> f64 {
         self.share
     }
 
-    /// The picture as it is now, copied from the device. Pixels without a sample so far are black.
+    /// Returns the current image, copied from the device. Pixels without samples are black.
     ///
     /// # Errors
     ///
-    /// What the device's driver refuses or loses.
+    /// The driver of the device reports an error or a loss.
     pub fn picture(&mut self) -> Result<Picture, Error> {
         put(self.whole, &self.backend.film()?.part(self.band));
         Ok(Picture {
@@ -162,7 +166,6 @@ impl Growing<'_> {
     }
 }
 
-/// What is there before the first sample.
 struct Prepared<'a> {
     renderer: Renderer<'a>,
     hits: Vec<FirstHit>,
@@ -217,28 +220,28 @@ fn empty(region: Region, form: Form) -> Result<Film, RenderError> {
     Ok(Film::of(region, form))
 }
 
-/// Puts whole rows of a film into it.
+/// Copies whole rows to the film.
 fn put(whole: &mut Film, band: &Film) {
     let start = (band.region.y0 - whole.region.y0) as usize * whole.region.width() as usize;
     for (to, from) in whole.lists_mut().zip(band.lists()) {
-        // Some lists are empty, as the film's form is.
+        // Lists that the form of the film lacks are empty.
         if let Some(to) = to.get_mut(start..start + from.len()) {
             to.copy_from_slice(from);
         }
     }
 }
 
-/// Whether any of these layers of a scene is of the first hits.
+/// Returns true if any of these layers is derived from the first hits.
 pub fn needs_first_hits(scene: &Packed, aovs: &[Aov]) -> bool {
     let mut sources = aovs.iter().map(|aov| aov.source(scene.integrator));
     sources.any(|source| source == AovSource::FirstHit)
 }
 
-/// The depth that looks half bright in a PNG: that in the middle of the whole picture, or 1 where nothing is.
+/// Returns the depth that a PNG shows at half brightness: that at the image center, or 1 without a hit.
 ///
 /// # Errors
 ///
-/// What the device's driver refuses or loses.
+/// The driver of the device reports an error or a loss.
 pub fn middle_depth(scene: &Packed, aovs: &[Aov], backend: &mut dyn Backend) -> Result<f32, RenderError> {
     if !aovs.contains(&Aov::Depth) {
         return Ok(1.0);

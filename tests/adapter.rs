@@ -1,17 +1,16 @@
-//! The adapter that the tests run on, told before anything else, and what is known to differ on which driver.
+//! The GPU adapter that the tests use, and the known deviations of its drivers.
 
 use std::io::Write as _;
 use std::sync::OnceLock;
 
 use wgray_render::gpu::{Choice, Device, choose};
 
-/// Part of the name, driver or type of the adapter to test, where there are several.
+/// Part of the name, driver or type of the adapter to test if several are available.
 const ADAPTER: &str = "WGRAY_TEST_ADAPTER";
-/// Set to 1 on a machine without an adapter, to run what needs none.
+/// Set to 1 to run only the tests that need no adapter.
 const WITHOUT: &str = "WGRAY_TEST_WITHOUT_GPU";
 
-/// The adapter under test. `None` only where the environment says to do without one; without that, a missing adapter
-/// fails the test that asks for it.
+/// Returns the adapter under test, or `None` if `WGRAY_TEST_WITHOUT_GPU` is 1. Panics if no adapter is found otherwise.
 pub fn device() -> Option<&'static Device> {
     static DEVICE: OnceLock<Option<Device>> = OnceLock::new();
     DEVICE.get_or_init(open).as_ref()
@@ -36,30 +35,28 @@ fn open() -> Option<Device> {
     }
 }
 
-/// Past the test harness, which would swallow it.
+/// Prints a line to standard error directly, as the test harness captures `eprintln!`.
 fn tell(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}"); // a closed terminal is no reason to fail
+    let _ = writeln!(std::io::stderr(), "{line}"); // a closed stderr does not fail the test
 }
 
-/// Whether this device is software Vulkan, on which every picture must be the same bit for bit.
+/// Returns true for a software Vulkan driver, whose images must match the CPU bit for bit.
 pub fn bit_exact(device: &Device) -> bool {
     device.info.exact && device.info.is_software()
 }
 
-/// A difference of one driver that is known and understood.
+/// A deviation of one driver whose cause is known.
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
     /// Part of the adapter's name or driver.
     pub adapter: &'static str,
-    /// Which check: the name of a shared function, `denormal numbers` of all of them, `picture` or `first hits`.
+    /// The check: the name of a shared function, `denormal numbers` for all functions, `picture` or `first hits`.
     pub what: &'static str,
-    /// Why.
     pub reason: &'static str,
-    /// The largest share of the results that differs.
+    /// Maximum fraction of results that may differ.
     pub share: f64,
 }
 
-/// All of them.
 pub const KNOWN: &[Known] = &[
     swiftshader("denormal numbers", "zero taken for denormal numbers", 0.0096),
     swiftshader("grid_sample", ROUNDED_TWICE, 0.0014),
@@ -69,7 +66,7 @@ pub const KNOWN: &[Known] = &[
     swiftshader("filter_offset", ROUNDED_TWICE, 0.0102),
 ];
 
-/// An integer that is made a float in two steps, each of which rounds. No picture has an index as large.
+/// Conversion of an integer to a float in two steps, each of which rounds. Scene indices are below 2^31.
 pub const ROUNDED_TWICE: &str = "unsigned integers from 2^31 on, which are rounded twice";
 
 const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> Known {
@@ -81,15 +78,15 @@ const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> Kn
     }
 }
 
-/// What the table allows a check on this device.
+/// Returns the deviation listed for a check on this device.
 pub fn allowed<'a>(known: &'a [Known], name: &str, driver: &str, what: &str) -> Option<&'a Known> {
     known
         .iter()
         .find(|k| k.what == what && (name.contains(k.adapter) || driver.contains(k.adapter)))
 }
 
-/// Holds the share of results that differ against the table: without an entry none may, and an entry that no longer
-/// applies must go.
+/// Checks the fraction of differing results against the table. Without an entry, no result may differ. An entry whose
+/// deviation no longer occurs is an error.
 pub fn judge(known: Option<&Known>, what: &str, share: f64) -> Result<(), String> {
     match known {
         None if share == 0.0 => Ok(()),
@@ -127,7 +124,7 @@ fn known_differences_that_no_longer_apply_or_have_grown_fail() {
     }
 }
 
-/// What the drivers can be asked for is told by them, so that a question that goes wrong is not taken for "nothing".
+/// Checks that the driver properties are queried at all, as a failed query looks like missing support.
 #[test]
 fn software_vulkan_can_be_asked_for_float_controls() {
     let Some(device) = device().filter(|device| bit_exact(device)) else {

@@ -1,4 +1,4 @@
-//! Pictures of all scenes, and what their pixels show first, against the oracle's.
+//! Images and first hits of all scenes, compared with the oracle's.
 
 use glam::{DVec2, DVec3};
 use wgray::scene::{Description, Pattern, SamplesDescription};
@@ -8,14 +8,13 @@ use crate::oracle::{Flaw, Meeting, Oracle};
 use crate::pictures::{both, first_hits, means, render};
 use crate::scenes;
 
-/// A pixel agrees if each of its values is within this, times one more than the value. It is what f32 leaves after a
-/// specular exponent of 50.
+/// Tolerance of a value `v`, in units of `1 + v`. The f32 error after a specular exponent of 50 is about as large.
 const TOLERANCE: f64 = 1e-5;
 
-/// The share of pixels that may not agree: on edges, where one of a pixel's samples falls on the other side.
+/// Maximum fraction of differing pixels. At edges, a sample can fall on the other side.
 const EDGES: f64 = 0.0005;
 
-/// Scenes with more edges than that, their share, and why.
+/// Scenes with more edges: name, fraction of differing pixels, reason.
 const MORE_EDGES: &[(&str, f64, &str)] = &[
     (
         "balls-checker.toml",
@@ -36,7 +35,7 @@ fn edges(scene: &str) -> f64 {
         .map_or(EDGES, |(_, share, _)| *share)
 }
 
-/// Scenes that the oracle does not know enough for, and why.
+/// Scenes with features that the oracle does not implement: name, features.
 const BEYOND: &[(&str, &str)] = &[
     ("textures.toml", "images and normal maps"),
     ("ground-grid.toml", "an image"),
@@ -47,7 +46,7 @@ const BEYOND: &[(&str, &str)] = &[
     ("materials.toml", "the same, and all its materials"),
 ];
 
-/// The scene, small, with grids of samples.
+/// Returns the scene at a width of 96 pixels with grid sample patterns.
 fn small(description: &Description) -> Description {
     let mut d = description.clone();
     let scale = f64::from(d.image.width) / 96.0;
@@ -57,7 +56,7 @@ fn small(description: &Description) -> Description {
         pattern: Some(Pattern::Grid),
         count: 4,
     };
-    // The oracle knows textures at points, and follows both branches of every path through glass: so do the first two.
+    // The oracle point-samples textures and follows both branches at glass, as the renderer does up to depth 2.
     d.render.ray_differentials = false;
     d.render.max_depth = 2;
     d.render.light_samples = SamplesDescription {
@@ -67,7 +66,7 @@ fn small(description: &Description) -> Description {
     d
 }
 
-/// Cylinders of each material that the oracle knows, one of them in a mirror, seen from outside and from inside.
+/// Cylinders with each material that the oracle implements, one visible in a mirror, seen from outside and from inside.
 const CYLINDERS: &str = r#"
 image = { width = 96, height = 72 }
 camera = { position = [0.3, -6, 3], look_at = [0, 0, 0.7], fov = 40 }
@@ -124,7 +123,6 @@ fn known() -> impl Iterator<Item = (String, Description)> {
         .map(|(name, d)| (name, small(&d)))
 }
 
-/// The share of pixels that differ by more than the tolerance.
 fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     assert_eq!(a.len(), b.len());
     let agree = |a: &f64, b: &f64| (a - b).abs() <= TOLERANCE * (1.0 + b.abs());
@@ -166,7 +164,7 @@ fn pictures_are_the_oracles() {
     }
 }
 
-/// Each mistake is found in at least one scene; those that concern all scenes in all.
+/// Checks that each flaw is detected in some scene, and flaws that affect all scenes in each.
 #[test]
 fn a_flawed_oracle_is_found() {
     let way = *both().last().expect("the CPU at least");
@@ -212,14 +210,13 @@ fn a_flawed_oracle_is_found() {
     }
 }
 
-/// Whether a first hit is what the oracle met.
 fn same_first_hit(hit: &FirstHit, meeting: &Option<Meeting>) -> bool {
     let Some(meeting) = meeting else {
         return hit.shape == NO_INDEX && hit.depth == 0.0;
     };
     let close = |a: f64, b: f64| (a - b).abs() <= 2e-5 * (1.0 + b.abs());
     let (normal, uv): (DVec3, DVec2) = (hit.normal.as_dvec3(), hit.uv.as_dvec2());
-    // An angle may be told from either side of where it starts, and has no digits near its pole.
+    // The angle u wraps around from 1 to 0, and is undefined at the poles.
     let around = |a: f64, b: f64| close(a, b) || close((a - b).abs(), 1.0);
     let pole = (meeting.uv.y - 0.5).abs() > 0.49;
     hit.shape as usize == meeting.shape

@@ -1,4 +1,4 @@
-//! Pictures whose pixels mathematics knows: closed forms, on both paths, each with a wrong answer that must fail.
+//! Images with closed-form pixel values, rendered on CPU and GPU. Each test also checks that a wrong value fails.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use wgray::scene::{
 use crate::pictures::{Way, both, first_hits, means, render};
 use crate::scenes::packed;
 
-/// Side of the pictures.
+/// Width and height of the images in pixels.
 const SIDE: u32 = 64;
 
 fn grid(count: u32) -> SamplesDescription {
@@ -23,7 +23,6 @@ fn grid(count: u32) -> SamplesDescription {
     }
 }
 
-/// Nothing, seen by parallel rays from `from` towards `to`.
 fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
     let camera = OrthographicDescription {
         position: from,
@@ -50,7 +49,7 @@ fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
     }
 }
 
-/// The plane z = 0 of a material, seen from above.
+/// Returns a scene with the plane z = 0, seen from above.
 fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shininess: f64) -> Description {
     let mut scene = empty(from, DVec3::new(from.x, from.y, 0.0), DVec3::Y, height);
     let factor = |x| Some(ColorDescription::Plain(DVec3::splat(x)));
@@ -74,7 +73,7 @@ fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shini
     scene
 }
 
-/// The middle of a pixel of the picture of a floor, on the floor.
+/// Returns the point on the floor at the center of a pixel.
 fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
     let step = height / f64::from(SIDE);
     let (column, row) = (f64::from(pixel % SIDE) + 0.5, f64::from(pixel / SIDE) + 0.5);
@@ -84,7 +83,7 @@ fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
     )
 }
 
-/// The largest difference of any pixel's green from its expected value.
+/// Returns the maximum absolute error of the green channel over all pixels.
 fn worst(scene: &Description, way: Way, expected: impl Fn(u32) -> f64) -> f64 {
     let picture = means(&render(&packed(scene), way));
     let difference = |(i, mean): (u32, &[f64; 3])| (mean[1] - expected(i)).abs();
@@ -94,14 +93,14 @@ fn worst(scene: &Description, way: Way, expected: impl Fn(u32) -> f64) -> f64 {
         .fold(0.0, |a, b| if b <= a { a } else { b })
 }
 
-/// Integral over x and y of 1 / sqrt(x^2 + y^2 + h^2): its mixed derivative is that.
+/// Returns an antiderivative of 1 / sqrt(x^2 + y^2 + h^2) over x and y.
 fn corner(x: f64, y: f64, h: f64) -> f64 {
     let r = (x * x + y * y + h * h).sqrt();
     x * (y / (x * x + h * h).sqrt()).asinh() + y * (x / (y * y + h * h).sqrt()).asinh() - h * (x * y / (h * r)).atan()
 }
 
-/// The mean of h / r over a rectangle at height h above a plane, parallel to it, as seen from the point (x, y) relative
-/// to its middle: the mean cosine at the plane.
+/// Returns the mean of h / r from a point of a plane to a parallel rectangle at height h: the mean cosine at the plane.
+/// `at` is relative to the rectangle's center.
 fn mean_cosine([width, height]: [f64; 2], h: f64, at: DVec2) -> f64 {
     let (x0, x1) = (-width / 2.0 - at.x, width / 2.0 - at.x);
     let (y0, y1) = (-height / 2.0 - at.y, height / 2.0 - at.y);
@@ -125,7 +124,7 @@ fn the_closed_form_of_the_mean_cosine_is_right() {
     }
 }
 
-/// A rectangle light over a matt plane: its mean cosine, up to the grid of samples, which is a midpoint rule.
+/// A rectangle light over a diffuse plane: the mean cosine, up to the error of the sample grid (a midpoint rule).
 #[test]
 fn light_of_a_rectangle_on_a_plane() {
     let (from, height) = (DVec3::new(0.3, 0.2, 0.5), 4.0);
@@ -160,7 +159,7 @@ fn light_of_a_rectangle_on_a_plane() {
     }
 }
 
-/// The shadow of a sphere in the light of a point is the cut of a cone: an ellipse on the plane.
+/// The shadow of a sphere under a point light is a conic section: an ellipse on the plane.
 #[test]
 fn shadow_of_a_sphere() {
     let (from, height) = (DVec3::new(1.6, 0.0, 1.0), 2.4);
@@ -179,7 +178,7 @@ fn shadow_of_a_sphere() {
     scene.lights.push(LightDescription::Point(point));
     let axis = center - light;
     let half_angle = (radius / axis.length()).asin();
-    // How far a point of the plane is inside of the cone, as an angle.
+    // Signed angle between a point of the plane and the surface of the shadow cone, positive inside.
     let inside = |at: DVec2| half_angle - (at.extend(0.0) - light).angle_between(axis);
     for way in both() {
         let picture = means(&render(&packed(&scene), way));
@@ -194,7 +193,7 @@ fn shadow_of_a_sphere() {
         let pixel = height / f64::from(SIDE);
         assert!(wrong(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel");
         assert!(wrong(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel");
-        // The ellipse's half axes: the cone's axis leans by `lean` from the vertical.
+        // Semi-axes of the ellipse; `lean` is the angle between the cone's axis and the vertical.
         let lean = (axis.x / axis.z).abs().atan();
         let long = light.z * ((lean + half_angle).tan() - (lean - half_angle).tan()) / 2.0;
         let short = long * (1.0 - (lean.sin() / half_angle.cos()).powi(2)).sqrt();
@@ -205,7 +204,7 @@ fn shadow_of_a_sphere() {
             !((dark / (PI * long * long) - 1.0).abs() < 0.05),
             "a circle is found out"
         );
-        // Outside of it the light arrives at the plane without falloff, by the cosine alone.
+        // Outside the shadow, a point light has no falloff: only the cosine remains.
         let worst = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
             let to = light - on_floor(from, height, pixel).extend(0.0);
             (picture[pixel as usize][1] - to.z / to.length()).abs()
@@ -214,7 +213,7 @@ fn shadow_of_a_sphere() {
     }
 }
 
-/// An ellipsoid under parallel rays along d covers pi |((a x b).d, (b x c).d, (c x a).d)| around its middle.
+/// The projected area of an ellipsoid with axes a, b, c along d is pi |((a x b).d, (b x c).d, (c x a).d)|.
 #[test]
 fn outlines_of_ellipsoids() {
     let ellipsoids = [
@@ -259,7 +258,7 @@ fn outlines_of_ellipsoids() {
         );
         let area = PI * shadow.length();
         let pixel = height / 256.0;
-        // From the middle of the picture, in pixels, to the right and down.
+        // Offset from the image center in pixels, to the right and down.
         let middle = DVec2::new(center.dot(right), -center.dot(up)) / pixel;
         for way in both() {
             let hits = first_hits(&packed(&scene), way);
@@ -279,7 +278,7 @@ fn outlines_of_ellipsoids() {
                 "{way:?} {center} from {view}: {centroid} for {middle}"
             );
             assert!(!((centroid + DVec2::X - middle).length() < 0.1), "a shifted pixel");
-            // The nearest points of all: the middle's depth less the half width along the view.
+            // Minimum depth: the depth of the center minus the half-extent along the view direction.
             let half = [a, b, c]
                 .map(|axis| axis.dot(forward))
                 .map(|h| h * h)
@@ -300,7 +299,7 @@ fn outlines_of_ellipsoids() {
     }
 }
 
-/// A directional light on a plane is the same everywhere: kd n.l + ks (r.v)^s, seen straight from above.
+/// A directional light on a plane, seen along the normal, is constant: kd n.l + ks (r.v)^s.
 #[test]
 fn directional_light_on_a_plane() {
     for (exponent, other) in [(16.0, 15.0), (2.5, 2.4), (0.5, 0.6), (1.0, 1.5)] {
@@ -313,14 +312,14 @@ fn directional_light_on_a_plane() {
                 color: DVec3::ONE,
             }));
         let cosine = -direction.z / direction.length();
-        // Straight from above, v is the normal, so that r.v is n.l.
+        // The view direction v is the normal, hence r.v equals n.l.
         let expected = |exponent: f64| 0.4 * cosine + 0.6 * cosine.powf(exponent);
         for way in both() {
             let error = worst(&scene, way, |_| expected(exponent));
             assert!(error < 1e-6, "{way:?}, shininess {exponent}: {error}");
             assert!(!(worst(&scene, way, |_| expected(other)) < 1e-4), "another shininess");
         }
-        // From below the plane is dark: the normal faces the viewer, and the light is behind it.
+        // From below, the plane is black: the normal faces the viewer, so that the light is behind the surface.
         scene.camera = empty(-DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).camera;
         for way in both() {
             assert_eq!(worst(&scene, way, |_| 0.0), 0.0, "{way:?}");

@@ -1,4 +1,4 @@
-//! How far the functions of `shaders/math.wgsl` are from the truth, which f64 stands for; on the CPU and on the device.
+//! Error bounds of the functions in `shaders/math.wgsl` against f64, on CPU and GPU.
 
 use crate::adapter;
 use crate::kernel::functions;
@@ -6,22 +6,21 @@ use crate::probes::twin;
 use crate::random::Random;
 use crate::sources::{parse, shared_source};
 
-/// A function's error over its domain.
+/// An error bound of a function over its domain.
 struct Bound {
     function: &'static str,
-    /// What the error is measured in.
     unit: &'static str,
-    /// The promise that stands beside the function in WGSL and in `docs/agreement.md`.
+    /// The bound documented at the WGSL function and in `docs/agreement.md`.
     bound: f64,
     arguments: fn(&Random) -> Vec<f32>,
-    /// The error of a result, in that unit.
+    /// Returns the error of a result in `unit`.
     error: fn(&[f32], f64) -> f64,
 }
 
 const EPSILON: f64 = f32::EPSILON as f64;
 const CALLS: usize = 1 << 20;
 
-/// Units in the last place of the truth.
+/// Returns the error in units in the last place of the truth.
 fn ulps(result: f64, truth: f64) -> f64 {
     let last_place = (truth as f32).abs().max(f32::MIN_POSITIVE);
     (result - truth).abs() / f64::from(last_place.next_up() - last_place)
@@ -134,7 +133,7 @@ const BOUNDS: &[Bound] = &[
     },
 ];
 
-/// The largest error over many arguments, of the first word of each result.
+/// Returns the maximum error over [`CALLS`] arguments. Only the first word of each result counts.
 fn largest(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
     let random = Random::new(bound.bound.to_bits());
     let arguments: Vec<Vec<f32>> = (0..CALLS).map(|_| (bound.arguments)(&random)).collect();
@@ -142,7 +141,7 @@ fn largest(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
     let results = evaluate(&words);
     let per = results.len() / CALLS;
     let errors = arguments.iter().zip(results.chunks_exact(per));
-    // NaN must not pass, and `max` would drop it
+    // a NaN error must propagate, but `f64::max` would drop it
     errors
         .map(|(x, r)| (bound.error)(x, f64::from(f32::from_bits(r[0]))))
         .fold(0.0, |a, b| if b <= a { a } else { b })
@@ -181,7 +180,6 @@ fn functions_are_as_near_to_the_truth_as_they_promise() {
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 
-/// What the functions answer where there is an exact answer.
 #[test]
 fn functions_have_their_exact_answers() {
     let source = shared_source();
@@ -202,7 +200,7 @@ fn functions_have_their_exact_answers() {
         ("exp2", &[infinity], infinity),
         ("power", &[1.0, 1e6], 1.0),
         ("power", &[0.0, 0.5], 0.0),
-        ("power", &[1e-40, 0.5], 0.0), // below the normal numbers counts as 0
+        ("power", &[1e-40, 0.5], 0.0), // denormal numbers count as 0
         ("power", &[0.25, 0.5], 0.5),
         ("power", &[f32::NAN, 2.0], 0.0),
         ("atan2", &[0.0, 1.0], 0.0),
@@ -217,7 +215,7 @@ fn functions_have_their_exact_answers() {
         ("atan2", &[-2.0, -2.0], -3.0 * std::f32::consts::FRAC_PI_4),
         ("min", &[1.0, 2.0], 1.0),
         ("max", &[1.0, 2.0], 2.0),
-        ("min", &[0.0, -0.0], -0.0), // the second, as neither is less
+        ("min", &[0.0, -0.0], -0.0), // the second argument, as neither is less
         ("max", &[f32::NAN, 0.0], 0.0),
         ("positive_zero", &[-0.0], 0.0),
         ("positive_zero", &[-1.5], -1.5),
@@ -244,7 +242,8 @@ fn functions_have_their_exact_answers() {
     }
 }
 
-/// Two values of the paper's hash, computed from its listing in Python.
+/// Values of pcg4d, computed in Python from the listing in Jarzynski and Olano, "Hash Functions for GPU Rendering",
+/// JCGT 9(3), 2020.
 #[test]
 fn the_hash_is_pcg4d() {
     for (key, expected) in [
@@ -255,7 +254,6 @@ fn the_hash_is_pcg4d() {
     }
 }
 
-/// A wrong digit in a series is found.
 #[test]
 fn a_function_that_is_further_from_the_truth_is_found() {
     let Some(device) = adapter::device() else { return };

@@ -1,4 +1,4 @@
-//! The library on the adapter under test: the choice of a device, and the CPU that takes over.
+//! The library API on the adapter under test: device selection and the fallback to the CPU.
 
 use std::ops::ControlFlow;
 
@@ -69,7 +69,7 @@ fn a_picture_grows_on_the_device_to_the_rendered_one() {
     assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
 }
 
-/// Whatever the driver: where it ends loops early and a sample is too long for it, the CPU takes over and the picture says so.
+/// If the driver truncates loops and a sample exceeds its limit, the CPU renders instead and the image reports it.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_by_the_cpu() {
     let Some(device) = adapter::device() else { return };

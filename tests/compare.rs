@@ -1,5 +1,5 @@
-//! How far two pictures are apart, against figures of others: those of NVIDIA's FLIP and of scikit-image, which
-//! `benches/peers/diff_check.py --values` prints, and closed forms.
+//! Image metrics, compared with closed forms and with the values of NVIDIA's FLIP and scikit-image, which
+//! `benches/peers/diff_check.py --values` prints.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use wgray_image::compare::{
     self, COLOR, Channel, Difference, Kind, PIXELS_PER_DEGREE, Picture, PixelCoord, Plane, layers,
 };
 
-/// A picture of red, green and blue by a function of column, row and channel.
+/// Returns an RGB image with `value(column, row, channel)`.
 fn picture(width: u32, height: u32, kind: Kind, value: impl Fn(u32, u32, u32) -> f32) -> Picture {
     let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     let channels = ["R", "G", "B"].into_iter().zip(0..).map(|(name, c)| {
@@ -32,7 +32,7 @@ fn picture(width: u32, height: u32, kind: Kind, value: impl Fn(u32, u32, u32) ->
 
 const BYTES: Kind = Kind::Display { bits: 8 };
 
-/// The two pictures of `formula` in the script.
+/// Returns the two images of `formula` in the script.
 fn formula(kind: Kind) -> (Picture, Picture) {
     let smooth = |x: u32, y: u32, c: u32| ((x * 5 + y * 3 + c * 40) % 256) as i32;
     let noise = |x: u32, y: u32, c: u32| ((x * 7919 + y * 104_729 + c * 1_299_709 + x * y * 31) % 101) as i32 - 50;
@@ -83,7 +83,7 @@ fn figures_are_those_of_others() {
         for (found, expected) in [found.rmse, found.rel_mse, found.psnr, ssim].into_iter().zip(expected) {
             is_near(found, expected, 1e-12 * expected.abs());
         }
-        // both are in 32-bit floats
+        // both implementations use f32
         is_near(flip(&a, &b), expected[4], 2e-6);
     }
 }
@@ -115,9 +115,9 @@ fn extremes_have_closed_forms() {
         let found = color(&black, &white);
         assert_eq!((found.rmse, found.psnr), (1.0, 0.0));
         is_near(found.rel_mse, 1.0 / 1.01, 1e-12);
-        // no structure, and means of 0 and 1: (0 + C1) (0 + C2) / ((1 + C1) (0 + C2))
+        // zero variance and means of 0 and 1: (0 + C1) (0 + C2) / ((1 + C1) (0 + C2))
         is_near(compare::ssim(&black, &white).unwrap(), 1e-4 / (1.0 + 1e-4), 1e-12);
-        // green and blue are what the paper's largest distance is of
+        // green and blue have the maximum distance by definition
         is_near(
             flip(&flat(0.0, 255.0, 0.0, size), &flat(0.0, 0.0, 255.0, size)),
             1.0,
@@ -128,7 +128,7 @@ fn extremes_have_closed_forms() {
 
 #[test]
 fn windows_along_short_sides_are_cut_and_weighted_anew() {
-    // the definition, written out, in one dimension: (2 ma mb + C1) (2 cov + C2) / ((ma² + mb² + C1) (va + vb + C2))
+    // the definition in one dimension: (2 ma mb + C1) (2 cov + C2) / ((ma² + mb² + C1) (va + vb + C2))
     let (a, b) = ([0.0, 51.0, 255.0, 102.0], [10.0, 51.0, 200.0, 0.0]);
     let mut sum = 0.0;
     for middle in 0..4 {
@@ -150,8 +150,7 @@ fn windows_along_short_sides_are_cut_and_weighted_anew() {
 
 #[test]
 fn cuts_into_tiles_and_chunks_change_nothing() {
-    // larger than a tile of 256 and a chunk of 65,536 pixels; both figures are local but for a sum, so that a picture that is
-    // repeated far apart has what the two parts have
+    // larger than a tile of 256 x 256 and a chunk of 65,536 pixels; distant changes add up in both metrics
     let noise = |x: u32, y: u32, c: u32| ((x * 7919 + y * 104_729 + c * 1_299_709) % 251) as f32;
     let b = picture(600, 300, BYTES, move |x, y, c| (noise(x, y, c) / 2.0).floor());
     let one = |places: &'static [(u32, u32)]| {
@@ -188,13 +187,13 @@ fn flip_sees_less_from_farther_away() {
 #[test]
 fn flip_of_linear_values_has_an_exposure_for_every_brightness() {
     let flat = |value: f32| picture(12, 12, Kind::Linear, move |_, _, _| value);
-    // the exposures follow the reference, so that the factor does not matter
+    // the exposures follow the reference, so that a common factor cancels
     let found = flip(&flat(1.1), &flat(1.0));
     assert!(found > 0.01);
     for scale in [1e-30_f32, 1e-3, 1e3, 1e30] {
         is_near(flip(&flat(1.1 * scale), &flat(scale)), found, 1e-4);
     }
-    // black, mostly black, negative and infinite ones are no trouble
+    // black, mostly black, negative and infinite images
     let spot = |value: f32| {
         picture(
             12,

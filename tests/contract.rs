@@ -1,5 +1,5 @@
-//! The contract of backends (`wgray_render::backend::Backend`), sentence by sentence, held by one suite: the CPU and the device, the
-//! scene as constants and in buffers, with adaptive sampling and layers and without. Backends that break it are found.
+//! Tests of each sentence of the contract of `wgray_render::backend::Backend` on CPU and GPU, with baked and buffered
+//! scenes. Deliberately wrong backends must fail.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ use crate::{patterns, scenes};
 const SIZE: (u32, u32) = (20, 12);
 const SAMPLES: u32 = 40;
 
-/// A small scene, and the same with adaptive sampling; then both along whole paths, with layers.
+/// Returns a small scene with and without adaptive sampling, for direct lighting and for paths with layers.
 pub fn subjects() -> [Packed; 4] {
     let mut plain = scenes::scene("cornell.toml");
     (plain.image.width, plain.image.height) = SIZE;
@@ -34,7 +34,6 @@ pub fn subjects() -> [Packed; 4] {
     [scenes::packed(&plain), scenes::packed(&adaptive), layered, both]
 }
 
-/// The scene by the integrator `path`, whose materials are diffuse.
 fn along_paths(scene: &Description) -> Description {
     let mut scene = scene.clone();
     scene.render.integrator = Some(wgray::scene::Integrator::Path);
@@ -51,7 +50,6 @@ fn region(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {
     Region { x0, y0, x1, y1 }
 }
 
-/// A film's bits.
 pub fn bits(film: &Film) -> (Region, Vec<u32>) {
     let all = film.lists().map(|list| bytemuck::cast_slice(list).to_vec());
     (film.region, all.collect::<Vec<_>>().concat())
@@ -61,7 +59,7 @@ fn film_of(backend: &mut dyn Backend) -> (Region, Vec<u32>) {
     bits(&backend.film().expect("a film"))
 }
 
-/// The whole picture in one piece for each look, by any backend.
+/// Renders all samples: the pilot pass, then the rest.
 fn whole(backend: &mut dyn Backend) -> Film {
     let all = backend.samples_of_all().min(SAMPLES);
     backend.begin(picture()).expect("a film");
@@ -71,7 +69,7 @@ fn whole(backend: &mut dyn Backend) -> Film {
 }
 
 type Make<'a> = dyn Fn() -> Box<dyn Backend + 'a> + 'a;
-/// A sentence of the contract, and what holds a backend to it: the error says what it did instead.
+/// A sentence of the contract and its test, which returns the deviation as an error.
 type Sentence = (&'static str, fn(&Packed, &Make) -> Result<(), String>);
 
 fn hold(what: bool, why: &str) -> Result<(), String> {
@@ -337,7 +335,7 @@ const SENTENCES: &[Sentence] = &[
     }),
 ];
 
-/// The sentences that a backend does not keep to, with what it did.
+/// Returns the sentences that a backend violates, with the deviations.
 fn broken<'a>(packed: &'a Packed, make: &Make<'a>) -> Vec<String> {
     let found = SENTENCES.iter().filter_map(|(sentence, holds)| {
         let told = holds(packed, make).err()?;
@@ -356,7 +354,7 @@ fn every_backend_keeps_to_the_contract() {
     }
 }
 
-/// A backend with one thing wrong.
+/// A backend with one defect.
 struct Wrong<'a> {
     inner: Cpu<'a>,
     how: How,

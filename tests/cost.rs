@@ -1,5 +1,4 @@
-//! What grows with a scene grows no faster than the scene: time, and memory. Nothing here takes a time as such, but the
-//! ratio of two, of the processor and not of the clock.
+//! Time and memory grow in proportion to the scene. The tests compare ratios of CPU times, not wall-clock times.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -30,7 +29,7 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 ";
 
-/// A scene with n of something: `{i}` is its number, `{x}`, `{y}` and `{z}` its place.
+/// Returns a scene with n copies of `one`, in which `{i}` is the number and `{x}`, `{y}` and `{z}` a position.
 fn scene(n: usize, one: &str) -> String {
     let mut text = START.to_owned();
     for i in 0..n {
@@ -43,7 +42,7 @@ fn scene(n: usize, one: &str) -> String {
 
 const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'first'\ncenter = [{x}, {y}, {z}]\nradius = 0.05";
 
-/// One of everything that a scene may have many of.
+/// An example of everything that a scene may have many of.
 const KINDS: [(&str, &str); 13] = [
     ("spheres", SPHERE),
     (
@@ -59,7 +58,7 @@ const KINDS: [(&str, &str); 13] = [
         "triangles",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {z}], [9, {y}, {z}], [{x}, 9, {y}]]",
     ),
-    // A turned floor of triangles: all is on one side of each.
+    // A slope of triangles: each has all others on one side.
     (
         "triangles on a slope",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {x}], [9, {y}, 9], [9, 9, 9]]",
@@ -92,7 +91,7 @@ const KINDS: [(&str, &str); 13] = [
         "[textures.t{i}]\ntype = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]\n[materials.m{i}]\ntype = 'phong'\n\
          color = { texture = 't{i}' }",
     ),
-    // Read as a whole, as the table of all is there too.
+    // Parsed in one piece, as the parent table `materials` also exists.
     (
         "materials in one table",
         "[materials.m{i}.color]\ntexture = 't'\n[materials.m{i}]\ntype = 'mirror'",
@@ -104,8 +103,7 @@ fn packed(text: &str) -> Option<Packed> {
     scene.ok().map(|scene| pack(&scene))
 }
 
-/// The time that the processor gave to this thread, in seconds. The kernel's own clock of it: what `/proc` tells is some
-/// milliseconds old, as long as small work takes.
+/// Returns the CPU time of this thread in seconds. The resolution of `/proc`, some milliseconds, is too coarse.
 fn processor_time(work: impl Fn()) -> f64 {
     #[cfg(unix)]
     let now = || {
@@ -125,7 +123,7 @@ fn processor_time(work: impl Fn()) -> f64 {
     now() - start
 }
 
-/// On one thread, which does no work of other tests meanwhile.
+/// Returns the minimum of three times, on a pool of one thread that runs no work of other tests.
 fn least_of_three(work: impl Fn() + Sync) -> f64 {
     let thread = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -135,8 +133,7 @@ fn least_of_three(work: impl Fn() + Sync) -> f64 {
     thread.install(times)
 }
 
-/// The ratio of two times, each the least of several: measured until it is below a bound, and often enough that other work
-/// on the machine does not keep it above. Work that takes too long in itself never gets below.
+/// Returns the ratio of the minimum times, measured until it is below `bound`, so that load does not fail the test.
 fn ratio_below(bound: f64, large: impl Fn() + Sync, small: impl Fn() + Sync) -> f64 {
     const ROUNDS: usize = 8;
     let (mut most, mut least) = (f64::INFINITY, f64::INFINITY);
@@ -157,7 +154,7 @@ fn reading_and_packing_take_time_in_proportion() {
         let pack = |text: &str| {
             packed(text);
         };
-        // 8 times as many: n log n takes 10 times as long, n^2 64 times.
+        // 8 times the input: n log n takes 10 times as long, n^2 64 times.
         let ratio = ratio_below(24.0, || pack(&large), || pack(&small));
         println!("{name}: {ratio:.1}");
         assert!(ratio < 24.0, "{name}: 8 times as many take {ratio} times as long");
@@ -178,7 +175,7 @@ fn work_that_grows_with_the_square_is_found() {
 fn kernels_do_not_grow_with_materials_lights_and_textures() {
     for (name, one) in KINDS {
         if packed(&scene(2, one)).is_none() {
-            continue; // an error, told in time
+            continue; // an error, reported early
         }
         let [small, large] = [600, 6000].map(|n| packed(&scene(n, one)).expect("a scene"));
         let check = |packed: &Packed| check_kernels(packed, sources::shaders(), Forms::All).expect("good kernels");
@@ -188,12 +185,12 @@ fn kernels_do_not_grow_with_materials_lights_and_textures() {
     }
 }
 
-/// `wgray check` with so much memory, in KiB; whether it succeeded, and what it said.
+/// Runs `wgray check` with an address space limit in KiB and returns the exit code and the messages.
 #[cfg(target_os = "linux")]
 fn check_within(kibibytes: u32, scene: &Path) -> (Option<i32>, String) {
     let script = format!("ulimit -v {kibibytes}; exec \"$0\" check \"$1\"");
     let mut command = Command::new("sh");
-    // Threads and their heaps reserve address space that nobody uses.
+    // Threads and malloc arenas reserve address space.
     command.envs([("RAYON_NUM_THREADS", "1"), ("MALLOC_ARENA_MAX", "1")]);
     command.args(["-c", &script, env!("CARGO_BIN_EXE_wgray")]).arg(scene);
     let out = command.output().expect("a shell");
@@ -203,7 +200,7 @@ fn check_within(kibibytes: u32, scene: &Path) -> (Option<i32>, String) {
     )
 }
 
-/// Returns the least address space in KiB, to within 500, in which `wgray check` accepts a scene.
+/// Returns the minimum address space in KiB, to within 500, in which `wgray check` accepts a scene.
 #[cfg(target_os = "linux")]
 fn address_space(scene: &Path) -> u32 {
     let (mut too_little, mut enough) = (0, 200_000);
@@ -228,7 +225,7 @@ fn a_scene_file_takes_a_few_times_its_size() {
     let small = folder.path().join("small.toml");
     std::fs::write(&small, scene(1, SPHERE)).unwrap();
     let program = address_space(&small);
-    // docs/performance.md says 400 bytes for a sphere and its text; memory is taken in larger pieces.
+    // docs/performance.md documents 400 bytes for a sphere with its text; memory is allocated in larger pieces.
     let (code, message) = check_within(program + 65_000, &path);
     assert_eq!(code, Some(0), "{message}");
     assert!(message.contains("; 100001 shapes; "), "{message}");
@@ -248,7 +245,7 @@ fn images_are_refused_by_their_headers() {
     let mut writer = bits.write_header().unwrap();
     writer.write_image_data(&vec![0; bytes * width as usize]).unwrap();
     drop(writer);
-    // A colour profile that grows a thousandfold.
+    // A color profile that decompresses to a thousand times its size.
     let file = std::fs::File::create(folder.path().join("profile.png")).unwrap();
     let mut info = png::Info::with_size(4, 4);
     info.color_type = png::ColorType::Rgb;

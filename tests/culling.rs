@@ -1,5 +1,4 @@
-//! What is left out because it cannot matter does not matter: a primitive whose sphere is outside of the cone to a light
-//! hides none of its samples.
+//! Conservative shadow culling: a primitive whose bounding sphere is outside of the light frustum occludes no sample.
 
 use glam::{UVec2, Vec3};
 use proptest::strategy::{Strategy, ValueTree};
@@ -11,7 +10,6 @@ use wgray_render::records::{ENVIRONMENT, Packed, RANDOM, Sphere};
 use crate::random::Random;
 use crate::random_scenes::any_scene;
 
-/// Small scenes of all kinds.
 fn some_scenes(count: usize) -> Vec<Packed> {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::without_trees();
@@ -19,8 +17,8 @@ fn some_scenes(count: usize) -> Vec<Packed> {
     (0..count).map(scene).collect()
 }
 
-/// How many times a primitive was left out, and how many times that was wrong, up to 30 radii away from something, and 200 in the space of the
-/// primitive, where a thin one is a ball: from thousands of radii away both tests are about rounding. `bound` changes the spheres.
+/// Returns the numbers of culled and of wrongly culled primitives. Points are up to 30 radii away, and up to 200 in
+/// local space: at thousands of radii both tests are dominated by rounding. `bound` changes the bounding spheres.
 fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usize) {
     let random = Random::new(11);
     let (mut left_out, mut wrong) = (0, 0);
@@ -32,12 +30,12 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
             let near = scene.bounds[random.below(scene.bounds.len() as u32) as usize];
             let t_max = random.pick(&[0.5, 1.0, 4.0, 30.0]) * near.radius;
             if t_max > 1e9 {
-                continue; // around a plane
+                continue; // the bounding sphere of a plane
             }
             let p = near.center + Vec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0) as f32)) * t_max;
             let light = &scene.lighting.lights[random.below(scene.lighting.lights.len() as u32) as usize];
             if light.kind == ENVIRONMENT {
-                continue; // all around
+                continue; // has no frustum
             }
             let cone = light_frustum(light, p);
             let block = SampleBlock {

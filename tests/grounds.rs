@@ -1,5 +1,5 @@
-//! Spheres as grounds, from a thousandth to ten thousand of a scene's sizes, near the origin and far away: no point of a
-//! surface hides its own light, and shadows are right where things touch. The oracle, in f64, is the truth.
+//! Spheres as ground, with radii of 1e-3 to 1e4 scene sizes, near the origin and far away, compared with the f64
+//! oracle: no self-shadowing, and correct contact shadows.
 
 use glam::DVec3;
 use wgray::scene::Description;
@@ -13,7 +13,7 @@ use crate::pictures::{differing, exact_ways, means, reference, render};
 use crate::random::Random;
 use crate::scenes::packed;
 
-/// A scene of the given size in the middle, whose text has lengths in units of that size.
+/// A scene of the given size at an offset. The coordinates in its text are in units of the size.
 struct Setting {
     size: f64,
     offset: DVec3,
@@ -32,7 +32,6 @@ impl Setting {
         )
     }
 
-    /// Seen from `from`, lit by a point light.
     fn scene(&self, from: [f64; 3], to: [f64; 3], light: [f64; 3], shapes: &str) -> Description {
         let text = format!(
             "[image]\nwidth = 48\nheight = 36\n\
@@ -50,7 +49,7 @@ impl Setting {
     }
 }
 
-/// Near the origin and a thousand sizes from it, of all magnitudes.
+/// Returns settings of several sizes, near the origin and a thousand sizes away.
 fn settings() -> Vec<Setting> {
     let mut all = Vec::new();
     for size in [1e-3, 1.0, 1e3] {
@@ -65,7 +64,6 @@ fn settings() -> Vec<Setting> {
 const ABOVE: [f64; 3] = [0.3, -4.0, 1.5];
 const LIGHT: [f64; 3] = [2.0, -2.5, 4.0];
 
-/// The device gives the same bits.
 fn same_on_all_paths(d: &Description) {
     let packed = packed(d);
     let cpu = reference(&packed);
@@ -74,10 +72,10 @@ fn same_on_all_paths(d: &Description) {
     }
 }
 
-/// Light that is there or not makes a tenth; at a small sphere's limb a normal's last digits make less than this.
+/// A missing light changes a value by 0.1, rounding of the normal at the limb of a small sphere by less than this.
 const TOLERANCE: f64 = 1e-3;
 
-/// How many pixels are not the oracle's.
+/// Returns the number of pixels that differ from the oracle's.
 fn wrong(d: &Description) -> usize {
     let truth = Oracle::new(d, Flaw::None).picture();
     let cpu = reference(&packed(d));
@@ -86,7 +84,7 @@ fn wrong(d: &Description) -> usize {
     pixels.filter(|(a, b)| !a.iter().zip(*b).all(close)).count()
 }
 
-/// Grounds of all radii, and the pixels of each that may be wrong: those on edges. `shapes` stand on it.
+/// Checks that at most `most` pixels differ for each radius of the ground. `shapes` returns the shapes.
 fn check(radii: &[f64], most: usize, shapes: impl Fn(&Setting, f64) -> String) {
     for setting in settings() {
         for &radius in radii {
@@ -123,7 +121,7 @@ fn small_spheres_on_large_ones_have_their_contact_shadows() {
     });
 }
 
-/// A grain of a thousandth, seen from near: the ground is ten million times as large.
+/// A grain of radius 1e-3, seen from near: the ground is ten million times as large.
 #[test]
 fn a_grain_on_the_largest_ground_has_its_contact_shadow() {
     for offset in [DVec3::ZERO, DVec3::splat(1000.7)] {
@@ -167,7 +165,7 @@ fn the_inside_of_a_sphere_is_lit_from_inside_alone() {
     }
 }
 
-/// Faces that share edges, seen and lit along lines of symmetry, which pixels' centres lie on.
+/// Faces with common edges. Pixel centers and the light lie on lines of symmetry.
 #[test]
 fn neighbours_hide_no_light_at_shared_edges() {
     for setting in settings() {
@@ -176,14 +174,14 @@ fn neighbours_hide_no_light_at_shared_edges() {
             let vertices = [a, b, c].map(p).join(", ");
             format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'dull'\nvertices = [{vertices}]\n")
         };
-        // two that make a square, tilted, and a third below it, so that both can cast shadows
+        // two triangles that form a tilted square, and a third below as a shadow receiver
         let tilt = |x: f64, y: f64| [x, y, 0.3 * x + 0.1 * y];
         let corners = [tilt(-3.0, -3.0), tilt(3.0, -3.0), tilt(3.0, 3.0), tilt(-3.0, 3.0)];
         let below = floor([-1.0, -1.0, -3.0], [1.0, -1.0, -3.0], [0.0, 1.0, -3.0]);
         let square = floor(corners[0], corners[1], corners[2]) + &floor(corners[0], corners[2], corners[3]);
         let d = setting.scene([0.0, -0.01, 5.0], [0.0, 0.0, 0.0], [-6.0, 5.5, 2.0], &(below + &square));
         assert_eq!(wrong(&d), 0, "a square of triangles, size {}", setting.size);
-        // a box of rectangles on a floor of one, and a tetrahedron beside it
+        // a box of rectangles on a rectangular floor, and a tetrahedron beside it
         let face = |center: [f64; 3], side: f64, normal: [f64; 3], tangent: [f64; 3]| {
             format!(
                 "[[shapes]]\ntype = 'rectangle'\nmaterial = 'dull'\ncenter = {}\nsize = [{side:?}, {side:?}]\n\
@@ -215,7 +213,7 @@ fn neighbours_hide_no_light_at_shared_edges() {
     }
 }
 
-/// Rays start above what they leave, but hardly: in f64, and over all sizes.
+/// In f64, over all sizes, `ray_origin` is above the surface, by less than 1e-5 of the coordinates.
 #[test]
 fn rays_start_a_little_above_their_surface() {
     let random = Random::new(5);

@@ -1,6 +1,6 @@
-//! Inputs for the probes. Most are arguments as they occur, so that every branch is taken: a primitive, a ray at a
-//! point of it, in its inside, on its edge or past it. Some of these have single numbers replaced by edge values or by
-//! one another, some are brought to halves, so that what is compared is often equal, and some are of all magnitudes.
+//! Random inputs for the probes of CPU and GPU functions. Most arguments are consistent, such as a primitive and a ray
+//! to its interior, to its edge or past it, to cover every branch. Some components are replaced by edge values or by
+//! each other, rounded to halves for equal comparisons, or of any magnitude.
 
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
@@ -29,7 +29,7 @@ use crate::random::Random;
 use crate::sources::type_name;
 use crate::words::Words;
 
-/// Numbers at which arithmetic turns.
+/// Values at which floating-point arithmetic changes behavior.
 const EDGES: &[f32] = &[
     0.0,
     -0.0,
@@ -41,7 +41,7 @@ const EDGES: &[f32] = &[
     1.0 - f32::EPSILON / 2.0,
     f32::MIN_POSITIVE,
     -f32::MIN_POSITIVE,
-    1e-45, // the least denormal number
+    1e-45, // smallest denormal number
     -1e-45,
     1e-39,
     f32::MAX,
@@ -54,12 +54,12 @@ const EDGES: &[f32] = &[
     8_388_608.0,
     16_777_216.0,
     -126.5,
-    0.0001, // the least and the largest width of procedural.wgsl
+    0.0001, // minimum and maximum width in procedural.wgsl
     4096.0,
     0.333_333_34,
 ];
 
-/// The arguments' words for so many calls.
+/// Returns the words of the arguments of `calls` calls.
 pub fn inputs(function: &Function, calls: usize, seed: u64) -> Vec<u32> {
     let random = Random::new(seed);
     let mut words = Vec::new();
@@ -94,25 +94,25 @@ fn call(function: &Function, random: &Random, words: &mut Vec<u32>) {
     }
 }
 
-/// Of any magnitude and sign.
+/// Returns a number of any magnitude and sign.
 fn wild(random: &Random) -> f32 {
     let sign = random.pick(&[1.0, -1.0]);
     (sign * random.magnitude(-44.0, 38.0)) as f32
 }
 
-/// One or two units in the last place away.
+/// Returns a number one or two ulps away.
 fn neighbour(x: f32, random: &Random) -> f32 {
     let step = random.pick(&[-2, -1, 1, 2]);
     f32::from_bits(x.to_bits().wrapping_add_signed(step))
 }
 
-/// What the arguments of one call have in common.
+/// A consistent set of arguments for one call.
 struct Situation {
     primitive: Primitive,
-    /// A point of local space, often of the primitive, and the same in the world.
+    /// A point in local space, often on the primitive; `target` is the same point in world space.
     local: DVec3,
     target: DVec3,
-    /// Where a ray to it starts, in the world and in local space.
+    /// The ray origin in world space; `local_start` is the same point in local space.
     start: DVec3,
     local_start: DVec3,
     direction: DVec3,
@@ -120,15 +120,15 @@ struct Situation {
     face: Face,
 }
 
-/// A triangle of a mesh and a ray, both in the mesh's space.
+/// A triangle of a mesh and a ray, both in object space.
 struct Face {
     instance: Instance,
     corners: [DVec3; 3],
-    /// Where the ray meets its plane: in its inside, on an edge, at a corner, or past it.
+    /// Barycentric coordinates of the intersection with the plane: inside, on an edge, at a corner or outside.
     barycentric: DVec2,
     origin: DVec3,
     direction: DVec3,
-    /// How far the directions of a fan reach to either side of the ray's.
+    /// Half-extent of the directions of a ray interval.
     spread: DVec3,
 }
 
@@ -138,7 +138,7 @@ impl Face {
         let at = vector(random) * random.pick(&[0.0, 1.0, 100.0]);
         let mut corners = [(); 3].map(|()| (at + vector(random)) * size);
         match random.below(8) {
-            0 => corners[2] = corners[0].lerp(corners[1], random.unit()), // a sliver
+            0 => corners[2] = corners[0].lerp(corners[1], random.unit()), // degenerate
             1 => corners.iter_mut().for_each(|corner| corner.z = size),
             _ => {}
         }
@@ -153,7 +153,7 @@ impl Face {
         let met = point_of(&corners, barycentric);
         let away = match random.below(6) {
             0 => random.pick(&DVec3::AXES) * random.pick(&[1.0, -1.0]),
-            1 => (corners[1] - corners[0]) / size, // edge on
+            1 => (corners[1] - corners[0]) / size, // parallel to the triangle's plane
             _ => vector(random),
         };
         let origin = met - away * size * random.pick(&[0.1, 1.0, 100.0, -1.0]);
@@ -229,7 +229,7 @@ impl Face {
         }
     }
 
-    /// The root of a tree around the triangle and others.
+    /// Returns the root of a BVH over the triangle and others.
     fn node(&self, random: &Random) -> Node {
         let size = self.edges()[0].length();
         let away = || vector(random) * size * random.pick(&[0.5, 3.0]);
@@ -249,7 +249,7 @@ impl Face {
         BOX_PAD * farthest
     }
 
-    /// A vector of its space, by an argument's name.
+    /// Returns the vector for an argument of this name.
     fn vector(&self, name: &str) -> Option<Vec3> {
         Some(
             match name {
@@ -271,7 +271,7 @@ impl Face {
     }
 }
 
-/// Perpendicular axes, two of one length.
+/// Returns orthogonal axes, two of equal length.
 fn cylinder_columns(random: &Random, scale: f64) -> DMat3 {
     let axis = vector(random).normalize();
     let across = axis.cross(vector(random)).normalize_or(axis.any_orthonormal_vector());
@@ -284,7 +284,7 @@ fn point_of(corners: &[DVec3; 3], barycentric: DVec2) -> DVec3 {
     a + (b - a) * barycentric.x + (c - a) * barycentric.y
 }
 
-/// Functions of rays in a mesh's space, whose arguments a face has.
+/// Functions of rays in object space, whose arguments come from a [`Face`].
 const OF_FACES: &[&str] = &[
     "slabs",
     "box_interval",
@@ -308,10 +308,10 @@ impl Situation {
         let scale = random.magnitude(-3.0, 3.0);
         let mut columns = DMat3::from_cols(vector(random), vector(random), vector(random)) * scale;
         if random.once_in(4) {
-            columns = DMat3::from_diagonal(DVec3::splat(scale)); // parallel to the axes, as scenes often are
+            columns = DMat3::from_diagonal(DVec3::splat(scale)); // axis-aligned
         }
         let kind = random.below(KINDS);
-        // a solid's anchor is on it, or near
+        // the anchor of a solid is on or near its surface
         let (mut middle, mut level) = (DVec3::ZERO, -1.0);
         if kind == ELLIPSOID && random.once_in(2) {
             middle = -local_point(random).normalize_or(DVec3::Z) * random.pick(&[1.0, 1.0, 1.1]);
@@ -382,7 +382,7 @@ impl Situation {
         }
     }
 
-    /// An argument's words, by its type, and where a type says too little by its name.
+    /// Writes the words of an argument, selected by its type and, for plain numbers and vectors, by its name.
     fn argument(
         &self,
         (function, name): (&str, &str),
@@ -481,7 +481,7 @@ impl Situation {
         }
     }
 
-    /// Where its ray meets the target.
+    /// Returns the ray parameter of the target.
     fn t(&self) -> f64 {
         (self.target - self.start).length()
     }
@@ -540,7 +540,7 @@ impl Situation {
         }
     }
 
-    /// About the way to the light, or off it.
+    /// Returns a sphere on or near the segment to the light.
     fn sphere(&self, random: &Random) -> Sphere {
         let away = self.direction.length() * random.pick(&[0.0, 0.1, 0.5, 2.0]);
         let center = self.start + self.direction * random.between(-0.5, 1.5) + vector(random) * away;
@@ -550,7 +550,7 @@ impl Situation {
         }
     }
 
-    /// Children about the target, or around the point that light is wanted at.
+    /// Returns a light-tree node with children around the target or the shaded point.
     fn light_node(&self, random: &Random) -> LightNode {
         let children = [(); 4].map(|()| {
             let center = self.target + vector(random) * random.pick(&[0.0, 0.0, self.direction.length()]);
@@ -638,14 +638,13 @@ impl Situation {
     }
 }
 
-/// Of a rough surface.
 fn alpha(random: &Random) -> Vec2 {
     let one = || random.pick(&[SMALLEST_ALPHA, 1.0, (random.unit() as f32).max(SMALLEST_ALPHA)]);
     let x = one();
     random.pick(&[Vec2::splat(x), Vec2::new(x, one())])
 }
 
-/// A vector that is not short.
+/// Returns a vector of length 0.1 or more.
 fn vector(random: &Random) -> DVec3 {
     loop {
         let v = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
@@ -659,7 +658,7 @@ fn color(random: &Random) -> Vec3 {
     Vec3::from_array([(); 3].map(|()| random.unit() as f32))
 }
 
-/// A point of local space: of any of the canonical shapes, on an edge or corner of one, or near.
+/// Returns a point in local space: on a canonical shape, on an edge or corner of one, or near.
 fn local_point(random: &Random) -> DVec3 {
     let coordinate = || random.between(-1.2, 1.2);
     let p = DVec3::new(coordinate(), coordinate(), coordinate());
@@ -699,7 +698,7 @@ fn arrival(random: &Random) -> HitDifferential {
     }
 }
 
-/// From a point to many repetitions of a texture, long and short, along its axes and across.
+/// Returns a footprint from a point to many repetitions of a texture, axis-aligned or not.
 fn footprint(random: &Random) -> Footprint {
     let uv = Vec2::new(random.between(-3.0, 3.0) as f32, random.between(-3.0, 3.0) as f32);
     let size = random.magnitude(-4.0, 1.5);
@@ -784,7 +783,7 @@ fn material(random: &Random) -> Material {
     material
 }
 
-/// A principled material as it is seen from somewhere.
+/// Returns the lobes of a principled material for a random view direction.
 fn mixture(random: &Random) -> PrincipledLobes {
     let material = Material {
         ior: random.between(1.0, 3.0) as f32,
@@ -793,7 +792,7 @@ fn mixture(random: &Random) -> PrincipledLobes {
     let wo = vector(random).normalize().as_vec3();
     let normal = random.pick(&[DVec3::Z, vector(random).normalize()]).as_vec3();
     let outside = random.once_in(2);
-    // Tables know shares from 0 to 1.
+    // The tables are defined for 0 to 1.
     let share = || random.pick(&[0.0, 1e-4, 0.3, 0.7, 1.0]) as f32;
     let energy = Vec3::new(share(), share(), share());
     principled_mixture(
@@ -806,7 +805,7 @@ fn mixture(random: &Random) -> PrincipledLobes {
     )
 }
 
-/// Whole numbers are small where they count something.
+/// Returns an integer, small if it is a count or an index.
 fn whole(function: &str, name: &str, random: &Random) -> u32 {
     match name {
         "lobes" => random.below(32),
@@ -814,7 +813,7 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
         "size" => 1 + random.pick(&[random.below(20), random.below(16_384)]),
         "level" => random.below(15),
         "blades" | "corners" => random.pick(&[0, 3, 4, 5, 6, 16]),
-        // Of an image around the scene, both halves of it.
+        // For both hemispheres of an environment map.
         "width" => 1 + random.pick(&[random.below(4), random.below(16_384)]),
         "height" => 5 + random.pick(&[random.below(4), random.below(16_380)]),
         "row" => random.below(6),
@@ -841,7 +840,6 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
     }
 }
 
-/// Words of a type that nothing more is known of.
 fn anything(kinds: &[ScalarKind], random: &Random, words: &mut Vec<u32>) {
     for kind in kinds {
         words.push(match kind {

@@ -1,5 +1,5 @@
-//! Work that ends early and goes on: whatever was kept, wherever it was cut, and whichever backend goes on with it, the film has
-//! the same bits. And files of pieces: what is damaged in them is not believed.
+//! Interrupted and resumed jobs: the film has the same bits wherever the work was interrupted and whichever backend
+//! resumes it. Damaged pieces in a checkpoint are rejected.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,11 +18,11 @@ use crate::contract::{bits, subjects};
 use crate::pictures::{self, Way, whole};
 use crate::scenes;
 
-/// Keeps pieces in memory, every time it can.
+/// A checkpoint store in memory, written at every opportunity.
 #[derive(Default)]
 struct Shelf {
     pieces: BTreeMap<u32, Piece>,
-    /// Forgets, of an unfinished piece, that a pass was made: the control.
+    /// Loses the progress of the current pass in an unfinished piece (negative control).
     forgetful: bool,
 }
 
@@ -63,7 +63,7 @@ impl CheckpointStore for Shelf {
     }
 }
 
-/// Renders until so many calls were made, if there are so many; all bands that were handed out then, and whether those are all.
+/// Renders up to `calls` dispatches. Returns the film if it is complete.
 fn some_calls(
     packed: &Packed,
     backend: &mut dyn Backend,
@@ -108,10 +108,10 @@ fn some_calls(
     }
 }
 
-/// The film of work that was broken off again and again; `None` if it never came to its end.
+/// Returns the film of a job that is interrupted every `calls` dispatches, or `None` if it never completes.
 fn in_pieces(packed: &Packed, store: &mut dyn CheckpointStore, cut: &Cut, at_once: bool, calls: usize) -> Option<Film> {
     (0..1000).find_map(|round| {
-        // Each time another backend goes on.
+        // Each round uses another backend.
         let mut backend: Box<dyn Backend> = match round % 3 {
             0 => pictures::backend(packed, Way::Buffers),
             1 => Box::new(Cpu::new(packed)),
@@ -161,7 +161,7 @@ fn work_that_is_broken_off_and_gone_on_with_makes_the_same_film() {
     }
 }
 
-/// The control: a store that loses where a piece stands makes another film.
+/// Negative control: a store that loses the progress of a piece gives another film.
 #[test]
 fn a_keeper_that_forgets_is_found() {
     let [packed, ..] = subjects();
@@ -211,7 +211,7 @@ fn when_the_time_is_up_every_pixel_has_a_sample() {
     }
 }
 
-/// The film of the first samples of all pixels.
+/// Returns the film of the first samples of all pixels.
 fn of_samples(packed: &Packed, samples: u32) -> Film {
     let (mut cpu, region) = (Cpu::new(packed), whole(packed));
     let pilot = cpu.samples_of_all().min(samples);
@@ -239,8 +239,7 @@ fn last_pass(bands: &mut Bands) -> Film {
     all
 }
 
-/// Every pass ends with the film of its samples, and a pass that is interrupted, even several times, leaves the film of the
-/// pass before it.
+/// Each pass ends with the film of its samples. An interrupted pass leaves the film of the previous one.
 #[test]
 fn the_last_pass_is_a_whole_image_of_its_samples() {
     for packed in subjects() {
@@ -313,7 +312,7 @@ fn open(
         path: path.to_owned(),
         resume: true,
         interval: Duration::ZERO,
-        // A program that this process starts has its files, and so the lock, for a moment.
+        // A child process inherits the file, and with it the lock, for a moment.
         wait: Box::new(move || {
             rounds += 1;
             assert!(rounds < 200, "somebody else writes it");
@@ -366,11 +365,11 @@ fn of_a_damaged_file_all_before_the_damage_is_used() {
                 }
                 Ok((mut checkpoint, told)) => {
                     assert!(at >= header, "a damaged header was believed: byte {at}");
-                    // Between two pieces a file may end.
+                    // A truncation between two pieces is not damage.
                     assert!(told.len() == 1 || (cut_short && told.is_empty()), "byte {at}: {told:?}");
                     let left = checkpoint.pieces();
                     assert_ne!(left, whole_file);
-                    // On a slow machine an older piece of the same rows, which is not finished, may take the place of a damaged one.
+                    // On a slow machine, an older unfinished piece of the same rows may replace a damaged one.
                     for piece in left.into_iter().filter(|piece| whole_file.contains(piece)) {
                         let Piece {
                             region, film: found, ..
@@ -428,7 +427,6 @@ fn what_is_no_longer_needed_does_not_pile_up() {
     assert_eq!((checkpoint.pieces().len(), told), (1, Vec::new()));
 }
 
-/// What a change of something is told as.
 type Change<'a, T> = (&'a str, &'a dyn Fn(&mut T));
 
 #[test]
@@ -470,7 +468,7 @@ fn another_job_has_another_identity() {
         let told = this.difference(&other).unwrap_or_default();
         assert!(told.starts_with(what), "{what}: {told}");
     }
-    // Layers are no part of the scene.
+    // Layers do not change the scene hash.
     let [_, _, layered, _] = subjects();
     let plain = layered.clone().without_layers();
     let hashes = [layered, plain].map(|packed| Identity::of(&packed, whole(&packed), false).scene);

@@ -1,5 +1,4 @@
-//! One function of the shared mathematics as a kernel of its own, compiled as the renderer's kernels are, and run over
-//! a list of inputs.
+//! Compute kernels for single shader functions, compiled like the renderer's kernels and run over a list of inputs.
 
 use std::fmt::Write as _;
 
@@ -12,7 +11,7 @@ use wgray_render::gpu::{Device, Rounding, check};
 
 use crate::sources::{file_of, shared_source, type_name};
 
-/// The kinds of the scalars that a type is made of, in order.
+/// Returns the scalar kinds of the components of a type, in order.
 pub fn scalars(module: &Module, ty: Handle<Type>) -> Vec<ScalarKind> {
     match &module.types[ty].inner {
         TypeInner::Scalar(s) => vec![s.kind],
@@ -27,13 +26,12 @@ pub fn scalars(module: &Module, ty: Handle<Type>) -> Vec<ScalarKind> {
     }
 }
 
-/// A function, as its module describes it.
 pub struct Function<'a> {
     pub module: &'a Module,
     pub function: &'a naga::Function,
 }
 
-/// The functions of the shared files, by file.
+/// Returns the functions of the shared shader files, with the name of their file.
 pub fn functions<'a>(module: &'a Module, source: &Source) -> Vec<(String, Function<'a>)> {
     let of = |(handle, function)| {
         (
@@ -49,7 +47,6 @@ impl Function<'_> {
         self.function.name.as_deref().expect("a shared function has a name")
     }
 
-    /// Names and types of the arguments.
     pub fn arguments(&self) -> Vec<(String, Handle<Type>)> {
         self.function
             .arguments
@@ -66,7 +63,6 @@ impl Function<'_> {
             .ty
     }
 
-    /// How many words its arguments have.
     pub fn words_in(&self) -> usize {
         self.arguments()
             .iter()
@@ -74,12 +70,11 @@ impl Function<'_> {
             .sum()
     }
 
-    /// The kinds of the words of its result.
     pub fn words_out(&self) -> Vec<ScalarKind> {
         scalars(self.module, self.result())
     }
 
-    /// A kernel that reads the arguments of call `id.x` from `probe_in`, and writes the result to `probe_out`.
+    /// Returns a kernel that reads the arguments of call `id.x` from `probe_in` and writes the result to `probe_out`.
     pub fn kernel(&self) -> String {
         let mut text = "@group(0) @binding(0) var<storage, read> probe_in: array<u32>;\n\
                         @group(0) @binding(1) var<storage, read_write> probe_out: array<u32>;\n\
@@ -104,7 +99,7 @@ impl Function<'_> {
         text
     }
 
-    /// An expression of a type, from the words of `probe_in` from `next` on.
+    /// Returns an expression of a type that reads `probe_in` from word `next` on.
     fn read(&self, ty: Handle<Type>, next: &mut u32) -> String {
         let list = |parts: Vec<String>| format!("{}({})", type_name(self.module, ty), parts.join(", "));
         match &self.module.types[ty].inner {
@@ -122,7 +117,7 @@ impl Function<'_> {
         }
     }
 
-    /// Statements that write a value's words to `probe_out`.
+    /// Appends statements that write a value to `probe_out`.
     fn write(&self, ty: Handle<Type>, value: &str, next: &mut u32, text: &mut String) {
         match &self.module.types[ty].inner {
             TypeInner::Scalar(s) => write_word(s.kind, value, next, text),
@@ -150,17 +145,16 @@ impl Function<'_> {
         }
     }
 
-    /// Its results on a device, for the words of as many calls as there are.
     pub fn run(&self, device: &Device, words: &[u32]) -> Vec<u32> {
         self.run_in(device, &shared_source(), words)
     }
 
-    /// The same with another text of the shared files.
+    /// Like [`Function::run`], with other shared files.
     pub fn run_in(&self, device: &Device, shared: &Source, words: &[u32]) -> Vec<u32> {
         self.run_rounded(device, shared, words, Rounding::Device)
     }
 
-    /// The same with quotients and square roots of either kind.
+    /// Like [`Function::run_in`], with software or native division and square roots.
     pub fn run_rounded(&self, device: &Device, shared: &Source, words: &[u32], rounding: Rounding) -> Vec<u32> {
         let mut source = shared.clone();
         source.append("probe", &self.kernel());
@@ -190,8 +184,7 @@ fn write_word(kind: ScalarKind, value: &str, next: &mut u32, text: &mut String) 
     *next += 1;
 }
 
-/// Runs the entry point `probe` of a text for `calls` invocations: `input` in, `output` words out. On devices that
-/// take SPIR-V it goes the way of the renderer's exact kernels.
+/// Runs the entry point `probe` and returns `output` words. Uses SPIR-V where the renderer's exact kernels do.
 fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], calls: usize, output: usize) -> Vec<u32> {
     let (wgpu, queue) = device.wgpu();
     let checked =

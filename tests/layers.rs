@@ -1,4 +1,4 @@
-//! Layers that are means over the samples, and alpha: their sums, known answers, and the same bits by every way.
+//! Averaged layers and alpha: sums, closed forms, and equal bits on all backends.
 
 use glam::{Vec3, Vec4};
 use wgray::scene::ViewSettings;
@@ -13,7 +13,7 @@ use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hit
 use crate::scenes::parse;
 use crate::{adapter, sources};
 
-/// Diffuse, mirroring, shining and nothing at all; light that comes by any number of bounces.
+/// Diffuse, mirror and emissive surfaces and the environment, with light of any path length.
 const SCENE: &str = r#"
 image = { width = 24, height = 16 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
@@ -64,7 +64,7 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 "#;
 
-/// The scene with other settings in `[render]`, instead of those of the same keys.
+/// Returns the scene with other values of keys in `[render]`.
 fn with(settings: &str) -> String {
     let keys: Vec<&str> = settings.lines().filter_map(|line| line.split(" =").next()).collect();
     let kept = SCENE
@@ -76,7 +76,7 @@ fn with(settings: &str) -> String {
 
 const ADAPTIVE: &str = "adaptive = { error = 0.02, max_samples = 64 }";
 
-/// Scenes whose films are of every form that has layers.
+/// Returns scenes for each form of film with layers.
 fn subjects() -> Vec<(&'static str, Packed)> {
     let adaptive_alpha = format!("{ADAPTIVE}\nalpha = true");
     vec![
@@ -91,7 +91,7 @@ fn subjects() -> Vec<(&'static str, Packed)> {
     ]
 }
 
-/// Pixels whose bits differ in the layers alone.
+/// Returns the number of pixels that differ in a layer.
 fn other_layers(a: &Film, b: &Film) -> usize {
     let only = |film: &Film| Film {
         sums: vec![Vec4::ZERO; film.sums.len()],
@@ -195,12 +195,12 @@ fn light_is_sorted_by_how_often_it_was_reflected() {
     assert!(none[0] > 0.0 && none[1..] == [0.0, 0.0], "{none:?}");
     assert!(once[1] > 0.0 && once[2] == 0.0, "{once:?}");
     assert!(often[2] > 0.0, "{often:?}");
-    // What comes by fewer bounces does not depend on how many there may be.
+    // The light of short paths does not depend on the maximum depth.
     assert_eq!([none[0], once[0]], [often[0]; 2]);
     assert_eq!(once[1], often[1]);
 }
 
-/// A rectangle of 1 x 1 in a picture of pixels as large, seen straight, or from behind.
+/// Returns a rectangle of 1 x 1 that faces the camera or is seen from behind. Pixels have the same size.
 fn facing(size: (u32, u32), place: [f64; 2], more: &str, from_behind: bool) -> String {
     let ([x, z], (width, height)) = (place, size);
     let y = if from_behind { 5 } else { -5 };
@@ -230,7 +230,7 @@ tangent = [1, 0, 0]
     )
 }
 
-/// By every exact way; they must be the same.
+/// Returns the film, which must be equal for all exact configurations.
 fn on_all(packed: &Packed) -> Film {
     let expected = reference(packed);
     for way in exact_ways() {
@@ -345,7 +345,7 @@ fn alpha_is_the_share_of_the_samples_that_meet_anything() {
         let film = on_all(&packed);
         for (i, share) in shares.into_iter().enumerate() {
             assert_eq!(film.alpha(i), share, "{place:?}, pixel {i}");
-            // The colours are weighted by it, and the environment is not seen.
+            // Colors are premultiplied, and the environment is invisible.
             let color = Vec3::new(0.5, 0.25, 4.0) * share;
             assert_eq!(
                 Vec3::from(wgray_render::film::mean(film.sums[i])),
@@ -354,7 +354,7 @@ fn alpha_is_the_share_of_the_samples_that_meet_anything() {
             );
         }
     }
-    // A picture of one pixel, of which a quarter is covered.
+    // A single pixel that is covered by a quarter.
     let film = on_all(&parse(&facing((1, 1), [0.5, 0.5], "alpha = true", false)));
     assert_eq!(film.alpha(0), 0.25);
 }

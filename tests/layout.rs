@@ -1,5 +1,4 @@
-//! The records, constants and overrides that the host and the shaders share: stated once in `crates/render/src/pack/`, and as naga reads
-//! what WGSL gets of them.
+//! Records, constants and overrides of `crates/render/src/pack/`, compared with the WGSL that naga parses.
 
 use wgray_render::gpu::compose::{KERNELS, Source, built_in};
 use wgray_render::gpu::naga::proc::Layouter;
@@ -13,13 +12,12 @@ use wgray::scene::Integrator;
 
 use crate::sources::{self, parse, shared_source};
 
-/// A record's name and its size in bytes, in Rust.
 fn size<R: Record>() -> (&'static str, u32) {
     (R::NAME, size_of::<R>() as u32)
 }
 
-/// What is wrong with the layout of a record in WGSL (WGSL, section 14.4.1). Both sides have its fields in the same order,
-/// from one list, and in Rust each is directly behind the one before, as `bytemuck::Pod` proves.
+/// Returns the errors in the WGSL layout of a record (WGSL, section 14.4.1). Both sides have the same list of fields,
+/// and `bytemuck::Pod` proves that the Rust struct has no padding.
 fn layout_problems(module: &Module, (name, bytes): (&str, u32)) -> Vec<String> {
     let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
     let Some((_, ty)) = found else {

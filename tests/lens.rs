@@ -1,4 +1,4 @@
-//! A thin lens: the circle of confusion in closed form, the shape of the opening, what is sharp, and the ends of its ranges.
+//! Thin lens camera: the circle of confusion in closed form, the aperture shape, the focus plane, and parameter limits.
 
 use glam::{Vec2, Vec3};
 use wgray::Scene;
@@ -10,11 +10,11 @@ use wgray_render::records::Packed;
 use crate::pictures::{both, differing, exact_ways, means, render};
 use crate::scenes::{self, parse};
 
-/// Pixels along each side of the picture, and its field of view.
+/// Width and height of the image in pixels; `FOV` is in degrees.
 const SIDE: u32 = 64;
 const FOV: f64 = 10.0;
 
-/// The camera at the origin looks along y at a shining disk of radius 0.005 times its distance. `lens` are lines of `[camera]`.
+/// Returns an emissive disk of radius 0.005 `distance`, seen along y from the origin. `lens` are lines of `[camera]`.
 fn spot(distance: f64, lens: &str, samples: u32) -> Packed {
     let radius = 0.005 * distance;
     parse(&format!(
@@ -41,23 +41,23 @@ fn spot(distance: f64, lens: &str, samples: u32) -> Packed {
     ))
 }
 
-/// Pixels per unit of a plane at distance 1.
+/// Returns the number of pixels per unit at distance 1.
 fn pixels() -> f64 {
     f64::from(SIDE) / 2.0 / (FOV / 2.0).to_radians().tan()
 }
 
-/// Where a pixel's centre is, in pixels from the middle, to the right and upwards.
+/// Returns the center of a pixel relative to the image center in pixels, right and up.
 fn place(i: usize) -> (f64, f64) {
     let side = SIDE as usize;
     let half = f64::from(SIDE) / 2.0;
     ((i % side) as f64 + 0.5 - half, half - (i / side) as f64 - 0.5)
 }
 
-/// What is wrong with a picture as that of a spot spread over a circle of this radius at a distance of 1: the largest error of the
-/// light's mean in rings, as a share of what it should be, and of the light as a whole.
+/// Returns the relative errors in the image of a disk blurred to a circle of this radius at distance 1: the maximum
+/// error of the mean radiance in rings, and the error of the total.
 fn wrong(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
     let (circle, spot) = (radius * pixels(), 0.005 * pixels());
-    let within = spot * spot / (circle * circle); // the share of the opening that sees it
+    let within = spot * spot / (circle * circle); // fraction of the aperture that sees the disk
     let mut worst = 0.0_f64;
     let mut total = 0.0;
     let rings = [0.0, 0.4, 0.7, 1.0].map(|share| share * (circle - spot - 1.0));
@@ -84,7 +84,7 @@ fn wrong(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
 
 #[test]
 fn a_spot_out_of_focus_is_its_circle_of_confusion() {
-    // Of an opening of radius r focused at f, what is at z spreads over r |1 / f - 1 / z| at a distance of 1.
+    // An aperture of radius r focused at f blurs a point at z to a circle of radius r |1 / f - 1 / z| at distance 1.
     let lens = "aperture = 0.4\nfocus_distance = 4";
     for way in both() {
         for distance in [12.0, 2.5] {
@@ -102,7 +102,7 @@ fn a_spot_out_of_focus_is_its_circle_of_confusion() {
 
 #[test]
 fn the_width_may_be_told_by_the_f_number() {
-    // The focus is at what is looked at, unless something else is said.
+    // The default focus distance is that of `look_at`.
     let by = |lens: &str| spot(12.0, lens, 1).camera;
     assert_eq!(
         by("focal_length = 0.8\nf_number = 2"),
@@ -121,7 +121,7 @@ fn what_is_in_the_focus_plane_is_sharp() {
         let with = means(&render(&spot(5.0, lens, 256), way));
         let without = means(&render(&spot(5.0, "", 256), way));
         let off = means(&render(&spot(5.5, lens, 256), way));
-        // The same samples of the pixel, up to rounding at the spot's edge.
+        // The pixel samples are equal, up to rounding at the edge of the disk.
         let apart = |a: &[[f64; 3]]| a.iter().zip(&without).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>();
         assert!(apart(&with) < 0.05, "{way:?}: {}", apart(&with));
         assert!(apart(&off) > 1.0, "{way:?}: {}", apart(&off));
@@ -146,14 +146,14 @@ fn blades_make_a_polygon_with_a_corner_at_the_top_of_what_is_far() {
             let (sin, cos) = (90.0 + degrees).to_radians().sin_cos();
             (0.8 * circle * cos, 0.8 * circle * sin)
         };
-        // Far things show the opening as it is; 60 degrees farther on is the middle of a side, half as far away.
+        // Far points show the aperture upright. The middle of a side, 60 degrees from a corner, is half as far out.
         for degrees in [0.0, 30.0, -100.0] {
             let far = spot(12.0, &format!("{lens}{degrees}"), 64);
             assert!(lit(&far, turned(degrees), way), "{way:?} {degrees}");
             assert!(!lit(&far, turned(degrees + 60.0), way), "{way:?} {degrees}");
             assert!(lit(&far, turned(degrees + 120.0), way), "{way:?} {degrees}");
         }
-        // Near ones show it upside down. This one has nearly the same circle.
+        // Near points show it upside down. The circle of confusion is nearly the same.
         let near = spot(2.4, &format!("{lens}0"), 64);
         assert!(lit(&near, turned(180.0), way), "{way:?}");
         assert!(!lit(&near, turned(0.0), way), "{way:?}");
@@ -166,14 +166,14 @@ fn openings_are_covered_evenly() {
         let corners = f64::from(blades);
         let turn = std::f64::consts::TAU / corners;
         let count = 1 << 14;
-        // The second moment about the middle: Young and Budynas, "Roark's Formulas for Stress and Strain", table A.1, over the area.
+        // Polar second moment over area: Young and Budynas, "Roark's Formulas for Stress and Strain", table A.1.
         let expected = if blades == 0 { 0.5 } else { (2.0 + turn.cos()) / 6.0 };
         let (mut middle, mut moment, mut inner, mut farthest) = (Vec2::ZERO.as_dvec2(), 0.0, 0.0, 0.0_f64);
         for i in 0..count {
             let p = lens_sample(blades, sobol_sample(i, glam::UVec2::new(3, 7))).as_dvec2();
             middle += p / f64::from(count);
             moment += p.length_squared() / f64::from(count);
-            // How far out it is, as a share of the way to the edge.
+            // Distance from the center as a fraction of the distance to the edge.
             let out = match blades {
                 0 => p.length(),
                 _ => (0..blades)
@@ -196,7 +196,7 @@ fn openings_are_covered_evenly() {
 
 #[test]
 fn samples_of_the_lens_are_spread_over_it_and_not_tied_to_the_pixel() {
-    // Of 16 samples four are in each quarter of the lens's square: of 64 pixels, so many samples in each quarter of pixel and lens.
+    // Each quarter of the lens gets 4 of 16 samples. Over 64 pixels, each pair of pixel and lens quarters gets 64.
     let packed = spot(12.0, "aperture = 2\nfocus_distance = 1", 16);
     let mut counts = [[0_u32; 4]; 4];
     for pixel in 0..64 {
@@ -208,7 +208,7 @@ fn samples_of_the_lens_are_spread_over_it_and_not_tied_to_the_pixel() {
             let straight =
                 (ray.direction / ray.direction.y + ray.origin * packed.camera.inverse_focus) * pixels() as f32;
             let at = Vec2::new(straight.x + SIDE as f32 / 2.0, SIDE as f32 / 2.0 - straight.z) - pixel.as_vec2();
-            // The map from the square to the disk keeps its diagonals' sectors, and these have equal areas.
+            // The square-to-disk mapping preserves the sectors between the diagonals, which have equal areas.
             let sector = usize::from(lens.x > lens.z) + 2 * usize::from(lens.x > -lens.z);
             let quarter = usize::from(at.x > 0.5) + 2 * usize::from(at.y > 0.5);
             of_lens[sector] += 1;

@@ -1,5 +1,4 @@
-//! The library as a program uses it that renders on the CPU, with whichever features it was built; and the program `wgray`
-//! without the feature `gpu`.
+//! The library API on the CPU, with any set of features, and the program `wgray` without the feature `gpu`.
 
 use std::ops::ControlFlow;
 #[cfg(all(feature = "cli", not(feature = "gpu")))]
@@ -45,7 +44,7 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 "#;
 
-/// What [`FILE`] says.
+/// Returns the scene of [`FILE`], built in code.
 fn described() -> Description {
     let samples = |pattern, count| SamplesDescription {
         pattern: Some(pattern),
@@ -212,7 +211,7 @@ fn a_picture_is_saved_as_its_name_says() {
         "{error}"
     );
     assert!(!path("a.gif").exists());
-    // As it is said, or as the scene says.
+    // With the given settings, or with those of the scene.
     let saved = SaveOptions {
         bit_depth: BitDepth::Sixteen,
         metadata: Metadata {
@@ -247,7 +246,7 @@ fn a_growing_picture_ends_as_the_rendered_one_and_can_be_cancelled() {
         error: 0.01,
         max_samples: Some(64),
     });
-    adaptive.image.width = 130; // more than a first call does
+    adaptive.image.width = 130; // more than the first dispatch covers
     adaptive.image.height = 130;
     let mut plain = adaptive.clone();
     plain.render.adaptive = None;

@@ -1,5 +1,5 @@
-//! No picture is cut short. Mesa 22.3's software Vulkan ends all loops of an invocation once they have gone round 65,535
-//! times together, without a word; `shaders/completion.wgsl` tells. Each test holds on drivers without such a limit too.
+//! Detection of truncated loops. The software Vulkan of Mesa 22.3 silently ends all loops of an invocation after a
+//! total of 65,535 iterations; `shaders/completion.wgsl` detects it. The tests also pass on other drivers.
 
 use wgray::error::RenderError;
 use wgray::scene::{AdaptiveDescription, Description, Pattern, PlaneDescription, ShapeDescription, SphereDescription};
@@ -12,7 +12,6 @@ use crate::pictures::{Way, backend_with, differing, exact_ways, reference, rende
 use crate::sources::{self, edited, edited_shaders, with};
 use crate::{adapter, patterns, scenes};
 
-/// A scene as small as this, with these samples of a pixel and of an area light.
 fn small(name: &str, size: (u32, u32), pixel_samples: u32, light_samples: u32) -> Description {
     let mut d = scenes::scene(name);
     (d.image.width, d.image.height) = size;
@@ -21,7 +20,7 @@ fn small(name: &str, size: (u32, u32), pixel_samples: u32, light_samples: u32) -
     d
 }
 
-/// A scene with so many spheres, which all reach into the picture.
+/// Returns a scene with small spheres, all in view.
 fn spheres(count: u32) -> Description {
     let mut d = small("cornell.toml", (4, 3), 1, 1);
     let Some(material) = d.materials.keys().next().cloned() else {
@@ -38,7 +37,7 @@ fn spheres(count: u32) -> Description {
     d
 }
 
-/// A scene with so many planes below the floor, which no tree can be over.
+/// Returns a scene with planes below the floor, which are not in the BVH.
 fn planes(count: u32) -> Description {
     let mut d = small("cornell.toml", (4, 3), 1, 1);
     let Some(material) = d.materials.keys().next().cloned() else {
@@ -56,7 +55,6 @@ fn planes(count: u32) -> Description {
     d
 }
 
-/// The whole picture by other shaders, or why there is none.
 fn attempt(packed: &Packed, way: Way, shaders: &Shaders) -> Result<Film, RenderError> {
     let mut backend = backend_with(packed, way, shaders);
     let mut film = Film::new(whole(packed));
@@ -75,7 +73,7 @@ fn attempt(packed: &Packed, way: Way, shaders: &Shaders) -> Result<Film, RenderE
     Ok(film)
 }
 
-/// Shaders that go round a loop so many times, in a call of the first sample, and add how often they did to what is red.
+/// Returns shaders that loop `rounds` times in the dispatch of the first sample and add the iterations to red.
 fn looping(rounds: u32) -> Shaders {
     assert_eq!(rounds % 4, 0);
     let (file, store) = ("kernels/render.wgsl", "    film[index] = sum;");
@@ -91,13 +89,13 @@ fn looping(rounds: u32) -> Shaders {
     edited_shaders(file, store, &looping)
 }
 
-/// Whether a film of one sample is what the shaders of [`looping`] should make of a scene.
+/// Returns true if a film of one sample equals `plain` plus the iterations of [`looping`].
 fn has_rounds(film: &Film, plain: &Film, rounds: u32) -> bool {
     let right = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
     film.sums.iter().zip(&plain.sums).all(right)
 }
 
-/// Whether the driver under test ends loops early: whether it does so where nothing watches.
+/// Returns true if the driver under test truncates loops when the check is disabled.
 fn driver_cuts_loops() -> bool {
     const ROUNDS: u32 = 1_000_000;
     let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 1));
@@ -106,7 +104,7 @@ fn driver_cuts_loops() -> bool {
     !has_rounds(&film, &reference(&packed), ROUNDS)
 }
 
-/// Shaders that sign whatever happened.
+/// Returns shaders that always report completion.
 fn without_check(shaders: &Shaders) -> Shaders {
     let text = edited(shaders.text("completion.wgsl"), "atomicStore(&completion.cut, 1u);", "");
     with(shaders, "completion.wgsl", &text)
@@ -140,7 +138,7 @@ fn long_pictures_are_whole() {
             assert_eq!(differing(&render(&packed, way), &cpu), 0, "{name}, {way:?}");
         }
     }
-    // Quotients and square roots by software have loops, or may have: the same promise.
+    // Software division and square roots may contain loops.
     if adapter::device().is_some_and(adapter::bit_exact) {
         let packed = scenes::packed(&small("cornell.toml", (2, 2), 256, 64));
         assert_eq!(differing(&render(&packed, Way::Rounded), &reference(&packed)), 0);
@@ -201,7 +199,7 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
             Err(error) => panic!("{rounds} rounds: {error}"),
         }
     }
-    // A kernel that does not sign is not believed, whatever the driver.
+    // A kernel that does not report completion is rejected on every driver.
     let unsigned = edited_shaders("completion.wgsl", "atomicAdd(&completion.ended, 1u);", "");
     let device = adapter::device().expect("a device");
     let options = wgray_render::gpu::Options {
@@ -215,7 +213,7 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
     );
 }
 
-/// Negative control: where the driver cuts loops and nothing watches, a picture is wrong.
+/// Negative control: without the check, a driver that truncates loops gives a wrong image.
 #[test]
 fn without_the_check_wrong_pictures_would_be_made() {
     if adapter::device().is_none() || !driver_cuts_loops() {

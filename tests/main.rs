@@ -1,5 +1,5 @@
-//! All tests of the program, of whole pictures, and of the promise that GPU and CPU agree (`docs/agreement.md`). One
-//! binary: a test build links once.
+//! Integration tests of the program, of images, and of the agreement of GPU and CPU (`docs/agreement.md`), in one
+//! binary that links once.
 
 mod adapter;
 mod against_oracle;

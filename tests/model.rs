@@ -1,15 +1,14 @@
-//! A small glTF file: a box, and a smaller one on it that rises in an animation, is of gold in a variant, and is absent from the second scene; two
-//! cameras if they are wanted.
+//! A small glTF model: a box, and a smaller one on top that rises in an animation, is gold in a variant, and is absent
+//! from the second scene. Two cameras are optional.
 
 use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
 
-/// What varies of it.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// The base colour of the large box.
+    /// Base color of the large box.
     pub color: [f64; 3],
     pub cameras: bool,
     pub animated: bool,
@@ -25,7 +24,7 @@ impl Default for Model {
     }
 }
 
-/// Corners of the box from (-1, 0, -0.5) to (1, 1, 0.5), +y upwards, and its triangles.
+/// Returns a corner of the box from (-1, 0, -0.5) to (1, 1, 0.5), with +y up.
 fn corner(i: usize) -> [f32; 3] {
     let side = |axis: usize, low: f32, high: f32| if i >> axis & 1 == 0 { low } else { high };
     [side(0, -1.0, 1.0), side(1, 0.0, 1.0), side(2, -0.5, 0.5)]
@@ -36,7 +35,7 @@ const TRIANGLES: [u16; 36] = [
 ];
 
 impl Model {
-    /// The buffer: positions, indices, two times, two places.
+    /// Returns the buffer: positions, indices, two key times, two translations.
     fn bytes() -> Vec<u8> {
         let positions = (0..8).flat_map(corner).flat_map(f32::to_le_bytes);
         let indices = TRIANGLES.into_iter().flat_map(u16::to_le_bytes);
@@ -46,7 +45,7 @@ impl Model {
         positions.chain(indices).chain(keys).collect()
     }
 
-    /// The file but for where its buffer is.
+    /// Returns the JSON without the buffer list.
     fn json(&self) -> Value {
         let [r, g, b] = self.color;
         let material = |name: &str, color: [f64; 3], metallic: f64| {
@@ -102,7 +101,6 @@ impl Model {
         json
     }
 
-    /// The bytes of a .glb file.
     pub fn glb(&self) -> Vec<u8> {
         let bytes = Model::bytes();
         let mut json = self.json();
@@ -123,7 +121,7 @@ impl Model {
         .concat()
     }
 
-    /// A .gltf file, and its buffer `NAME.bin` beside it.
+    /// Writes a .gltf file and its buffer `NAME.bin`.
     pub fn write_gltf(&self, folder: &Path, name: &str) {
         let bytes = Model::bytes();
         let mut json = self.json();
@@ -132,7 +130,6 @@ impl Model {
         fs::write(folder.join(format!("{name}.gltf")), json.to_string()).expect("a file");
     }
 
-    /// A folder with the file `box.glb`.
     pub fn write_glb(&self, folder: &Path, name: &str) {
         fs::write(folder.join(name), self.glb()).expect("a file");
     }

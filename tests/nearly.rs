@@ -1,43 +1,42 @@
-//! What is promised where bits are not: pixels that are near, but for some on edges, and the same mean.
+//! Image tolerances where identical bits are not guaranteed: relative pixel error, share of outliers on edges, and
+//! mean.
 
 use std::fmt;
 
 use wgray_render::film::Film;
 use wgray_render::records::Packed;
 
-/// A pixel is within this of its value, as a part of the largest of its colours: a pattern's share of a dark one is a difference of nearly
-/// equal integrals ...
+/// Maximum relative error of a pixel, relative to its largest channel: in dark channels, patterns subtract nearly equal
+/// integrals.
 const RELATIVE: f64 = 1e-4;
-/// ... or, on devices other than software Vulkan, this where textures are: they have many texels for each digit of a
-/// coordinate ...
+/// `RELATIVE` for textures on other devices than software Vulkan: one digit of a coordinate spans many texels.
 const TEXTURED: f64 = 1e-3;
-/// ... but for this share of the pixels, on edges where a comparison flips ...
+/// Maximum share of outliers, on edges where a comparison flips.
 pub const EDGES: f64 = 1e-3;
-/// ... on such devices of a picture with so many pixels on a side. Edges grow with the side, so that smaller pictures have
-/// more of them.
+/// Image side in pixels below which `EDGES` is scaled up on such devices, as edges grow with the side only.
 const SIDE: f64 = 400.0;
-/// ... and the mean is within this of its own: of all pixels; on such devices, in smaller pictures, of those not on edges.
+/// Maximum relative error of the mean. On such devices, images below `SIDE` leave outliers out.
 const MEAN: f64 = 1e-5;
 
-/// What is compared where bits are not promised; of one picture, or of several together.
+/// Accumulated differences of GPU and CPU films.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nearly {
-    /// Pixels that are no numbers: none may be.
+    /// Non-finite pixels; must be 0.
     no_numbers: usize,
-    /// Pixels that are not near, and how many may not be.
+    /// Outliers, and their limit.
     edges: usize,
     budget: f64,
-    /// Sums of the pixels whose means are compared, of both pictures.
+    /// Sums of the compared pixels: GPU, CPU.
     sums: [f64; 2],
 }
 
 impl Nearly {
-    /// On software Vulkan, whose plain WGSL differs by what the driver fuses and reorders alone.
+    /// Compares on software Vulkan, where plain WGSL differs only by fused and reordered operations.
     pub fn by_plain_wgsl(gpu: &Film, cpu: &Film) -> Nearly {
         Nearly::within(RELATIVE, 0.0, gpu, cpu)
     }
 
-    /// On any other device.
+    /// Compares on other devices.
     pub fn of(packed: &Packed, gpu: &Film, cpu: &Film) -> Nearly {
         let relative = if packed.textures.records.is_empty() {
             RELATIVE

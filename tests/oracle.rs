@@ -1,6 +1,6 @@
-//! A third renderer, in f64, straight from what the scene file says. It shares no code and no choice of formula with
-//! the twins, which could share a mistake: ellipsoids are quadrics, triangles Moeller and Trumbore's, rectangles are
-//! cut out of their planes by projection, meshes are lists of triangles that it reads itself, and Phong's model is the formula of `docs/scene-format.md` with unit vectors.
+//! Reference renderer in f64 from the scene description. It shares no code and no formula with the twins, so that it
+//! cannot share their errors: ellipsoids are quadrics, rectangles bounded planes, meshes triangle lists loaded here,
+//! and Phong is the formula of `docs/scene-format.md` with unit vectors.
 
 use std::collections::HashMap;
 
@@ -15,29 +15,25 @@ use wgray::scene::{
 
 use crate::sources;
 
-/// A mistake that the tests of the tests make on purpose.
+/// A deliberate error that `tests/against_oracle.rs` must detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flaw {
     None,
-    /// The diffuse term without n.l.
+    /// Diffuse term without n.l.
     MissingCosine,
-    /// Width and height of rectangles confused.
     SwappedAxes,
-    /// Pixels seen one to the left.
     ShiftedPixel,
     /// Samples at the corners of their cells.
     CornerSamples,
-    /// Lights shine through everything.
     NoShadows,
-    /// The specular exponent one too low.
+    /// Too low by one.
     Exponent,
-    /// Glass and what is before it confused.
+    /// Indices of refraction swapped.
     InvertedIndex,
-    /// Rows of a texture confused with columns.
     TransposedTexture,
-    /// Meshes shaded by the normals of their triangles.
+    /// Flat-shaded meshes.
     Facets,
-    /// Normals turned like edges, not like planes.
+    /// Without the inverse transpose.
     StretchedNormals,
 }
 
@@ -47,33 +43,31 @@ pub struct Oracle<'a> {
     flaw: Flaw,
 }
 
-/// One surface and what it is of.
 struct Solid {
     form: Form,
-    /// Its number in the file; lights follow the shapes.
+    /// Index in the order shapes, instances, lights.
     shape: usize,
-    /// A shape's; lights have a colour of their own.
+    /// `None` for lights.
     material: Option<String>,
 }
 
 enum Form {
-    /// The points p with (p, 1)^T Q (p, 1) = 0, and the map from its local space.
+    /// The points p with (p, 1)^T Q (p, 1) = 0.
     Quadric {
         q: DMat4,
         from_local: DMat4,
     },
     Triangle([DVec3; 3]),
-    /// The side of a cylinder: the center of its start, the vector to its end, its radius, and the unit vector to u = 0.
+    /// Side of a cylinder, with the unit vector to u = 0.
     Side {
         start: DVec3,
         axis: DVec3,
         radius: f64,
         tangent: DVec3,
     },
-    /// Facets by 32 that follow one another, with a box around each 32.
+    /// Blocks of 32 triangles with their bounding boxes.
     Mesh(Vec<(DVec3, DVec3, Vec<Facet>)>),
-    /// Centre, unit tangent and bitangent, and half the sizes along them; endless if there are no sizes; `round` if only
-    /// what is no farther from the centre than that.
+    /// An infinite plane without `half`, the half extents. If `round`, a disk of radius `half.x`.
     Flat {
         center: DVec3,
         tangent: DVec3,
@@ -83,29 +77,28 @@ enum Form {
     },
 }
 
-/// A triangle of a mesh in the world.
+/// A mesh triangle in world space.
 #[derive(Clone)]
 struct Facet {
     corners: [DVec3; 3],
     uvs: [DVec2; 3],
-    /// Unit normals at its corners.
+    /// At the vertices.
     normals: Option<[DVec3; 3]>,
     /// Outward.
     normal: DVec3,
 }
 
-/// What a ray meets.
 pub struct Meeting {
     pub t: f64,
     pub shape: usize,
     /// Outward.
     pub normal: DVec3,
     pub uv: DVec2,
-    /// What it is shaded by, outward.
+    /// Outward.
     pub shading: DVec3,
-    /// From the surface up to the smooth one that a mesh stands for, as seen from outside and from inside.
+    /// Shadow-terminator offsets outside and inside.
     bulges: [DVec3; 2],
-    /// Of a mesh's triangle.
+    /// The mesh triangle.
     corners: Option<[DVec3; 3]>,
     solid: usize,
 }
@@ -148,13 +141,13 @@ impl<'a> Oracle<'a> {
         Oracle { scene, solids, flaw }
     }
 
-    /// The means of all pixels. Samples are at the centres of square grids, whatever the scene says.
+    /// Renders all pixels with samples at the cell centers of square grids, whatever the pattern.
     pub fn picture(&self) -> Vec<[f64; 3]> {
         let pixels = self.scene.image.width * self.scene.image.height;
         (0..pixels).into_par_iter().map(|i| self.pixel(i)).collect()
     }
 
-    /// One of them: row by row from the top left.
+    /// Renders pixel `i`, row by row from the top left.
     pub fn pixel(&self, i: u32) -> [f64; 3] {
         let width = self.scene.image.width;
         let places = self.grid(self.scene.render.pixel_samples.count);
@@ -166,7 +159,7 @@ impl<'a> Oracle<'a> {
         (sum / places.len() as f64).to_array()
     }
 
-    /// What the rays through the pixels' centres meet.
+    /// Returns the hits through the pixel centers.
     pub fn meetings(&self) -> Vec<Option<Meeting>> {
         let (width, height) = (self.scene.image.width, self.scene.image.height);
         let pixel = |i: u32| {
@@ -177,7 +170,7 @@ impl<'a> Oracle<'a> {
         (0..width * height).map(pixel).collect()
     }
 
-    /// The centres of the cells of a square grid.
+    /// Returns the cell centers of a square grid.
     fn grid(&self, count: u32) -> Vec<DVec2> {
         let side = f64::from(count).sqrt().round() as u32;
         assert_eq!(side * side, count, "the oracle samples by square grids");
@@ -186,8 +179,7 @@ impl<'a> Oracle<'a> {
         (0..count).map(place).collect()
     }
 
-    /// Origin and unit direction of the ray through a point of the picture, in pixels from its top left corner: the
-    /// image plane is one unit ahead, its pixels are squares.
+    /// Returns the ray through an image point, in pixels from the top left corner. The image plane is at distance 1.
     fn camera_ray(&self, at: DVec2) -> (DVec3, DVec3) {
         let (width, height) = (f64::from(self.scene.image.width), f64::from(self.scene.image.height));
         let basis = |position: DVec3, look_at: DVec3, up: DVec3| {
@@ -252,7 +244,7 @@ impl<'a> Oracle<'a> {
         })
     }
 
-    /// `bounces` by mirrors and glass lie behind.
+    /// Returns the radiance along a ray after `bounces` specular bounces.
     fn radiance(&self, (origin, direction): (DVec3, DVec3), bounces: u32) -> DVec3 {
         let render = &self.scene.render;
         let Some(meeting) = self.nearest(origin, direction) else {
@@ -266,7 +258,7 @@ impl<'a> Oracle<'a> {
         let facing = meeting.normal.dot(direction) < 0.0;
         let normal = if facing { meeting.normal } else { -meeting.normal };
         let shading = if facing { meeting.shading } else { -meeting.shading };
-        // "how far above the surface rays start at least, relative to the largest coordinate there": 1e-9 is enough in f64
+        // Minimum offset of ray origins, relative to the largest coordinate; 1e-9 suffices in f64.
         let offset = normal * (render.shadow_epsilon.max(1e-9) * point.abs().max_element().max(meeting.t));
         let follow = |origin: DVec3, direction: DVec3| self.radiance((origin, direction), bounces + 1);
         match &self.scene.materials[material] {
@@ -277,7 +269,7 @@ impl<'a> Oracle<'a> {
             _ if bounces == render.max_depth => render.background,
             MaterialDescription::Mirror(mirror) => {
                 assert!(mirror.normal_map.is_none(), "the oracle knows no normal maps");
-                // where the shading normal would lead into the surface, its own takes its place
+                // If the reflection is below the surface, the geometric normal is used.
                 let mirrored = direction.reflect(shading);
                 let is_usable = mirrored.dot(normal) > 0.0 && shading.dot(direction) < 0.0;
                 let mirrored = if is_usable { mirrored } else { direction.reflect(normal) };
@@ -307,7 +299,7 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// What a surface reflects of the lights, and of ambient light; `above` is where its shadow rays start.
+    /// Returns direct and ambient light; `above` is the origin of the shadow rays.
     fn direct(
         &self,
         phong: &PhongDescription,
@@ -327,7 +319,7 @@ impl<'a> Oracle<'a> {
         for light in &self.scene.lights {
             let samples = self.samples(light, point);
             for (to_light, distance) in &samples {
-                // A mesh is lit as the smooth surface that it stands for.
+                // Also light above the triangle, but below the shading normal, is left out.
                 if shading.dot(*to_light) <= 0.0 {
                     continue;
                 }
@@ -340,7 +332,7 @@ impl<'a> Oracle<'a> {
         sum
     }
 
-    /// A colour of a material, of textures at the point alone.
+    /// Evaluates a material color; textures are unfiltered.
     fn color(&self, color: &ColorDescription, uv: DVec2) -> DVec3 {
         let name = match color {
             ColorDescription::Plain(color) => return *color,
@@ -371,7 +363,7 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// kd max(0, n.l) + ks max(0, r.v)^shininess; nothing where n.l <= 0.
+    /// Returns kd max(0, n.l) + ks max(0, r.v)^shininess, or 0 if n.l <= 0.
     fn reflected(
         &self,
         diffuse: DVec3,
@@ -395,7 +387,7 @@ impl<'a> Oracle<'a> {
         diffuse * if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine } + specular * highlight
     }
 
-    /// Unit directions and distances from a point to a light's samples.
+    /// Returns directions and distances to the samples of a light.
     fn samples(&self, light: &LightDescription, from: DVec3) -> Vec<(DVec3, f64)> {
         let way = |to: DVec3| ((to - from).normalize(), (to - from).length());
         match light {
@@ -415,7 +407,7 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// Whether a shape, not a light, is between a point and a light; not the triangle with these corners.
+    /// Returns true if a shape, except the triangle `own`, occludes the segment. Lights do not occlude.
     fn hidden(&self, from: DVec3, direction: DVec3, distance: f64, own: Option<[DVec3; 3]>) -> bool {
         let end = distance * (1.0 - self.scene.render.shadow_epsilon.max(1e-5));
         let transparent = self.scene.render.shadows == Shadows::Transparent;
@@ -442,7 +434,7 @@ fn light_color(light: &LightDescription) -> DVec3 {
     }
 }
 
-/// Unit tangent and bitangent: normal x tangent.
+/// Returns unit tangent and bitangent.
 fn frame(normal: DVec3, tangent: DVec3) -> (DVec3, DVec3) {
     let bitangent = normal.cross(tangent).normalize();
     (bitangent.cross(normal.normalize()), bitangent)
@@ -469,7 +461,7 @@ fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, fl
     }
 }
 
-/// Returns the direction of u: x, or y where x is nearly the normal, unless the scene has another.
+/// Returns the direction of u: `own`, else x, or y if x is nearly the normal.
 fn tangent(normal: DVec3, own: Option<DVec3>) -> DVec3 {
     let across = normal.normalize().x.abs() >= 0.9;
     own.unwrap_or(if across { DVec3::Y } else { DVec3::X })
@@ -497,7 +489,6 @@ fn quadric(center: DVec3, axes: [DVec3; 3]) -> Form {
     }
 }
 
-/// A shape's material and its surfaces.
 fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
     match shape {
         ShapeDescription::Rectangle(r) => (
@@ -543,7 +534,7 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
         ShapeDescription::Triangle(t) => (t.material.clone(), vec![Form::Triangle(t.vertices)]),
         ShapeDescription::Tetrahedron(t) => {
             let [v0, mut v1, mut v2, v3] = t.vertices;
-            // The first face, (v0, v2, v1), must look away from v3.
+            // The face (v0, v2, v1) must face away from v3.
             if (v2 - v0).cross(v1 - v0).dot(v3 - v0) > 0.0 {
                 (v1, v2) = (v2, v1);
             }
@@ -554,7 +545,7 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
     }
 }
 
-/// A mesh file in the world.
+/// Loads a mesh file in world space.
 fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form {
     assert!(
         i.matrix.is_none() && i.materials.is_empty() && file.up == Up::Z,
@@ -565,7 +556,7 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
         Some(Scale::All(s)) => DVec3::splat(s),
         Some(Scale::Each(s)) => s,
     };
-    // A rotation is told by where it takes the axes: Rodrigues' formula.
+    // Rodrigues' rotation formula.
     let turned = |v: DVec3, axis: DVec3, degrees: f64| {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         v * cosine + axis.cross(v) * sine + axis * (axis.dot(v) * (1.0 - cosine))
@@ -627,10 +618,10 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
 }
 
 impl Facet {
-    /// What it is like at a point of it; `t`, `shape` and `solid` are not its to say.
+    /// Returns the hit at a point; the caller sets `t`, `shape` and `solid`.
     fn meeting(&self, point: DVec3, flaw: Flaw) -> Meeting {
         let [a, b, c] = self.corners;
-        // Weights as ratios of areas.
+        // Barycentric coordinates as area ratios.
         let across = (b - a).cross(c - a);
         let area = |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(across) / across.length_squared();
         let weights = [area(b, c), area(c, a), area(a, b)];
@@ -639,8 +630,8 @@ impl Facet {
         if let Some(normals) = self.normals.filter(|_| flaw != Flaw::Facets) {
             let smooth: DVec3 = (0..3).map(|i| normals[i] * weights[i]).sum();
             shading = smooth.normalize() * smooth.dot(self.normal).signum();
-            // Up to the planes through the corners, where these are above the triangle: Hanika, "Hacking the Shadow
-            // Terminator", 2021.
+            // Offset to the tangent planes of the vertices above the triangle: Hanika, "Hacking the Shadow Terminator",
+            // 2021.
             bulges = [1.0, -1.0].map(|side| {
                 let lifted = |i: usize| {
                     let n = normals[i] * side;
@@ -662,16 +653,15 @@ impl Facet {
     }
 }
 
-/// Whether a line's way forward passes a box.
 fn passes(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> bool {
     let (a, b) = ((low - origin) / direction, (high - origin) / direction);
     let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
     let margin = 1e-9 * (1.0 + near.abs());
-    // NaN, of a side that the line lies in, passes
+    // NaN, for a ray in a face, counts as a hit.
     !(near > far + margin || far < -margin)
 }
 
-/// Where a line crosses a surface, as distances along it; and of a mesh which triangle.
+/// Returns the distances of all crossings, and the mesh triangles.
 fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<(f64, Option<&Facet>)> {
     if let Form::Mesh(parts) = form {
         let parts = parts
@@ -717,7 +707,7 @@ fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
         Form::Side {
             start, axis, radius, ..
         } => {
-            // Across the axis the distance from it is the radius: a quadratic equation.
+            // A quadratic equation for the distance from the axis.
             let unit = axis.normalize();
             let across = |v: DVec3| v - unit * v.dot(unit);
             let (o, d) = (across(origin - *start), across(direction));
@@ -749,7 +739,6 @@ fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
     }
 }
 
-/// Outward unit normal and texture coordinates at a point of a surface.
 fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
     match form {
         Form::Mesh(_) => unreachable!("a mesh's triangle knows what it is like"),
@@ -775,7 +764,6 @@ fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
         }
         Form::Triangle([v0, v1, v2]) => {
             let normal = (*v1 - *v0).cross(*v2 - *v1);
-            // Weights as ratios of areas.
             let area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - b).dot(normal);
             let whole = area(*v0, *v1, *v2);
             (

@@ -1,4 +1,4 @@
-//! A panorama: known directions at known pixels, poles and seam, solid angles, differentials, crops.
+//! Panoramic camera: directions, poles and seam, solid angles, differentials, crops.
 
 use glam::{DVec3, Vec2, Vec3};
 use wgray::Scene;
@@ -13,7 +13,7 @@ use crate::scenes::parse;
 const WIDTH: u32 = 128;
 const HEIGHT: u32 = 64;
 
-/// Looks along y from (1, 2, 3); spheres of this radius are 10 away in these directions.
+/// Returns emissive spheres at distance 10 around a camera at (1, 2, 3).
 fn spheres(directions: &[DVec3], radius: f64) -> Packed {
     let shapes: String = directions
         .iter()
@@ -39,7 +39,7 @@ fn spheres(directions: &[DVec3], radius: f64) -> Packed {
     ))
 }
 
-/// The direction of degrees to the right of the middle and above the horizon.
+/// Returns a direction; degrees to the right and above the horizon.
 fn direction(east: f64, north: f64) -> DVec3 {
     let (east, north) = (east.to_radians(), north.to_radians());
     DVec3::new(east.sin() * north.cos(), east.cos() * north.cos(), north.sin())
@@ -59,8 +59,8 @@ fn directions_are_where_they_should_be() {
         ((0.1, 0.0), Vec3::Z),
         ((0.5, 1.0), Vec3::NEG_Z),
         ((0.5, 0.25), Vec3::new(0.0, 0.5_f32.sqrt(), 0.5_f32.sqrt())),
-        ((0.5, -0.25), Vec3::new(0.0, -(0.5_f32.sqrt()), 0.5_f32.sqrt())), // a filter reaches over the pole
-        ((1.25, 0.5), Vec3::NEG_X),                                        // and over the seam
+        ((0.5, -0.25), Vec3::new(0.0, -(0.5_f32.sqrt()), 0.5_f32.sqrt())), // a filter extends beyond the pole
+        ((1.25, 0.5), Vec3::NEG_X),                                        // and beyond the seam
     ] {
         let ray = panorama_ray(&packed.camera, Vec2::new(at.0 * w, at.1 * h));
         assert_eq!(ray.origin, packed.camera.position);
@@ -71,7 +71,7 @@ fn directions_are_where_they_should_be() {
 
 #[test]
 fn a_sphere_is_seen_where_it_is_and_fills_its_solid_angle() {
-    // In the middle, at the seam, at the poles.
+    // Center, seam, general position, pole, near the pole.
     for (east, north) in [(0.0, 0.0), (180.0, 0.0), (77.0, -31.0), (0.0, 90.0), (33.0, -86.0)] {
         let to = direction(east, north);
         let packed = spheres(&[to], 3.0);
@@ -91,7 +91,7 @@ fn a_sphere_is_seen_where_it_is_and_fills_its_solid_angle() {
                     assert_eq!(hit.shape != NO_INDEX, seen, "{way:?} {east} {north}: pixel {x}, {y}");
                 }
                 if hit.shape != NO_INDEX {
-                    // The depth goes along the ray, to the nearer side.
+                    // Depth along the ray, to the nearer side.
                     let along = 10.0 * (center.dot(to) - (center.dot(to).powi(2) - 1.0 + 0.09).sqrt());
                     assert!((f64::from(hit.depth) - along).abs() < 1e-3, "{} {along}", hit.depth);
                 }
@@ -100,7 +100,7 @@ fn a_sphere_is_seen_where_it_is_and_fills_its_solid_angle() {
                 found += mean[0] * turn * (edge(y) - edge(y + 1));
             }
             let angle = std::f64::consts::TAU * (1.0 - (1.0 - 0.09_f64).sqrt());
-            // A row near a pole counts as if it were even, which it is not quite.
+            // Includes the variation within rows near a pole.
             assert!(
                 (found / angle - 1.0).abs() < 0.015,
                 "{way:?} {east} {north}: {found} {angle}"

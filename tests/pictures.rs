@@ -1,4 +1,4 @@
-//! Pictures by every way to one: the CPU, and on the device the scene as constants, from buffers, and as plain WGSL.
+//! Renders test scenes by all backends: CPU, and GPU with the scene as constants, in buffers, and by plain WGSL.
 
 use glam::Vec4;
 use wgray_image::Region;
@@ -12,29 +12,28 @@ use wgray_render::records::{FirstHit, Packed};
 
 use crate::{adapter, sources};
 
-/// A way from a packed scene to a picture.
+/// A backend configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// The twins.
     Cpu,
-    /// SPIR-V that is computed as written, the scene as constants.
+    /// Exact SPIR-V, the scene as constants.
     Baked,
-    /// The same, the scene in buffers.
+    /// Exact SPIR-V, the scene in buffers.
     Buffers,
-    /// The same, quotients and square roots rounded by software.
+    /// Like `Buffers`, with software quotients and square roots.
     Rounded,
     /// Plain WGSL through wgpu, the scene in buffers.
     Plain,
 }
 
-/// One of each path, for tests of what both compute. The CPU alone where there is no device.
+/// Returns one configuration per backend; only the CPU without a device.
 pub fn both() -> Vec<Way> {
     let mut ways = vec![Way::Cpu];
     ways.extend(adapter::device().map(|_| Way::Baked));
     ways
 }
 
-/// The CPU, and the device where it gives the same bits as the CPU.
+/// Returns the bit-identical configurations.
 pub fn exact_ways() -> Vec<Way> {
     let exact = adapter::device().is_some_and(adapter::bit_exact);
     if exact {
@@ -44,12 +43,11 @@ pub fn exact_ways() -> Vec<Way> {
     }
 }
 
-/// A backend with a scene. Panics where the way asks for a device and there is none.
+/// Creates a backend. Panics if `way` needs a device and none is available.
 pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
     backend_with(packed, way, sources::shaders())
 }
 
-/// The same with other shaders.
 pub fn backend_with<'a>(packed: &'a Packed, way: Way, shaders: &Shaders) -> Box<dyn Backend + 'a> {
     if way == Way::Cpu {
         return Box::new(Cpu::new(packed));
@@ -67,12 +65,11 @@ pub fn backend_with<'a>(packed: &'a Packed, way: Way, shaders: &Shaders) -> Box<
     Box::new(gpu.unwrap_or_else(|error| panic!("{way:?}: {error}")))
 }
 
-/// The region of a scene's whole picture.
 pub fn whole(packed: &Packed) -> Region {
     Region::whole(packed.camera.width, packed.camera.height)
 }
 
-/// A region rendered in bands, put together.
+/// Renders a region and joins its bands.
 pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cut) -> Film {
     let mut all = Film {
         sums: Vec::new(),
@@ -101,12 +98,10 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cu
     all
 }
 
-/// The whole picture.
 pub fn render(packed: &Packed, way: Way) -> Film {
     film(&mut *backend(packed, way), packed, whole(packed), &Cut::default())
 }
 
-/// The whole picture by other shaders.
 pub fn render_with(packed: &Packed, way: Way, shaders: &Shaders) -> Film {
     film(
         &mut *backend_with(packed, way, shaders),
@@ -116,7 +111,6 @@ pub fn render_with(packed: &Packed, way: Way, shaders: &Shaders) -> Film {
     )
 }
 
-/// The whole picture on the CPU.
 pub fn reference(packed: &Packed) -> Film {
     render(packed, Way::Cpu)
 }
@@ -126,7 +120,7 @@ pub fn first_hits(packed: &Packed, way: Way) -> Vec<FirstHit> {
     hits.unwrap_or_else(|error| panic!("{way:?}: {error}"))
 }
 
-/// How many pixels are not the same bits; moments and layers count as further pixels.
+/// Counts the records that are not bit-identical: pixels, moments and layers.
 pub fn differing(a: &Film, b: &Film) -> usize {
     let form = |film: &Film| (film.region, film.sums.len(), film.moments.len(), film.has_layers());
     assert_eq!(form(a), form(b), "films of different regions or forms");
@@ -135,17 +129,15 @@ pub fn differing(a: &Film, b: &Film) -> usize {
     records.filter(|(a, b)| bits(a) != bits(b)).count()
 }
 
-/// The records of a film but for its looks, which are the scheduling's own.
+/// Iterates over all records except those used only by scheduling.
 fn of_pictures(film: &Film) -> impl Iterator<Item = &Vec4> {
     [&film.sums, &film.moments].into_iter().chain(&film.layers).flatten()
 }
 
-/// A part of a film.
 pub fn crop(film: &Film, part: Region) -> Film {
     film.clone().part(part)
 }
 
-/// The means of the pixels as f64.
 pub fn means(film: &Film) -> Vec<[f64; 3]> {
     film.means().map(|mean| mean.map(f64::from)).collect()
 }

@@ -1,4 +1,4 @@
-//! Every shared function, run on the device and on the CPU over thousands of inputs: the same bits.
+//! Compares every shared function on GPU and CPU, bit by bit, for thousands of inputs.
 
 use glam::{UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray_render::cpu::adaptive::{
@@ -128,23 +128,22 @@ use crate::random::Random;
 use crate::sources::{parse, shared_source};
 use crate::words::{Argument, Words};
 
-/// Compares this function alone.
+/// Variable that names the only function to compare.
 const FUNCTION: &str = "WGRAY_TEST_FUNCTION";
 
-/// Calls of each function.
+/// Calls per function.
 const CALLS: usize = 8192;
 
-/// A twin by its name, over words.
+/// A twin with arguments and results as words.
 pub struct Probe {
     pub name: &'static str,
-    /// The arguments' names.
     arguments: &'static [&'static str],
     pub run: fn(&mut &[u32], &mut Vec<u32>),
 }
 
 macro_rules! probes {
     ($($name:ident($($argument:ident: $ty:ty),* $(,)?) -> $result:ty;)*) => {
-        /// The twins. A shared function that is not here fails the test.
+        /// The twins. A shared function without an entry fails the test.
         pub const PROBES: &[Probe] = &[$(Probe {
             name: stringify!($name),
             arguments: &[$(stringify!($argument)),*],
@@ -477,10 +476,9 @@ probes! {
     face_first_hit(face: &HitPrimitive, hit: Hit) -> FirstHit;
 }
 
-/// Shared functions that are not probed, and why.
+/// Shared functions without a probe, with reasons.
 const EXCEPTIONS: &[(&str, &str)] = &[("no_hit", "it has no arguments"), ("nowhere", "it has no arguments")];
 
-/// The twin of a function.
 pub fn twin(name: &str) -> &'static Probe {
     PROBES
         .iter()
@@ -489,7 +487,7 @@ pub fn twin(name: &str) -> &'static Probe {
 }
 
 impl Probe {
-    /// Its results for the words of many calls.
+    /// Returns the results of many calls with the arguments `words`.
     pub fn results(&self, words: &[u32], words_out: usize) -> Vec<u32> {
         let mut words = words;
         let mut out = Vec::new();
@@ -506,7 +504,7 @@ impl Probe {
         out
     }
 
-    /// Whether a call's twin has to do with denormal numbers: with one as an operand, or as a result of any step.
+    /// Returns true if an operand or any intermediate result is denormal.
     fn meets_denormals(&self, words: &[u32], words_out: usize) -> bool {
         processor::clear_denormals_met();
         let results = self.results(words, words_out);
@@ -514,24 +512,24 @@ impl Probe {
     }
 }
 
-/// What a processor notes of the arithmetic that it has done.
+/// Exception flags of the processor.
 #[cfg(target_arch = "x86_64")]
 mod processor {
     use std::arch::asm;
 
-    /// The flags in MXCSR of an operand that is denormal, and of a result that is.
+    /// MXCSR: denormal operand and underflow.
     const MET: u32 = 1 << 1 | 1 << 4;
 
     fn flags() -> u32 {
         let mut flags = 0u32;
-        // SAFETY: this stores 32 bits where there is room for them.
+        // SAFETY: stores 32 bits to a `u32`.
         unsafe { asm!("stmxcsr [{}]", in(reg) &raw mut flags) };
         flags
     }
 
     pub fn clear_denormals_met() {
         let cleared = flags() & !MET;
-        // SAFETY: of the register's bits only flags that arithmetic raises change, which Rust lets assembly change.
+        // SAFETY: changes only exception flags of MXCSR, which inline assembly may change.
         unsafe { asm!("ldmxcsr [{}]", in(reg) &raw const cleared) };
     }
 
@@ -540,7 +538,7 @@ mod processor {
     }
 }
 
-/// Other processors are not asked: no difference is put down to denormal numbers.
+/// Elsewhere no difference is attributed to denormals.
 #[cfg(not(target_arch = "x86_64"))]
 mod processor {
     pub fn clear_denormals_met() {}
@@ -550,12 +548,12 @@ mod processor {
     }
 }
 
-/// Whether two words are the same value: the same bits, or both no number, whose bits no device promises.
+/// Returns true for equal bits or two NaN, whose bits no device guarantees.
 fn same(kind: ScalarKind, a: u32, b: u32) -> bool {
     a == b || kind == ScalarKind::Float && f32::from_bits(a).is_nan() && f32::from_bits(b).is_nan()
 }
 
-/// Which calls have results that differ.
+/// Returns the indices of differing calls.
 fn differing(kinds: &[ScalarKind], a: &[u32], b: &[u32]) -> Vec<usize> {
     assert_eq!(a.len(), b.len());
     let calls = a.chunks_exact(kinds.len()).zip(b.chunks_exact(kinds.len())).enumerate();
@@ -571,11 +569,11 @@ fn show(kinds: &[ScalarKind], words: &[u32]) -> String {
     kinds.iter().zip(words).map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// The check of calls that have to do with denormal numbers.
+/// The check name of calls with denormals.
 const DENORMALS: &str = "denormal numbers";
 
-/// Compares a function with its twin on a device. Where the device is known to differ in them, calls that have to do with
-/// denormal numbers are left out: the result is how many of these differ.
+/// Compares a function with its twin. Calls with denormals are left out on devices with a known difference; returns how
+/// many of them differ.
 fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let (name, kinds) = (function.name(), function.words_out());
     let words = inputs(function, CALLS, name.bytes().map(u64::from).sum());
@@ -591,7 +589,7 @@ fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let kinds_in: Vec<ScalarKind> = arguments.flat_map(|(_, ty)| scalars(function.module, ty)).collect();
     let is_large = |(word, kind): (&u32, &ScalarKind)| *kind == ScalarKind::Uint && *word >= 1 << 31;
     let has_large = |call: &usize| call_words(*call).iter().zip(&kinds_in).any(is_large);
-    // `jittered_sample`, and `sample_square` by it, make large integers of small ones.
+    // `jittered_sample`, called by `sample_square`, computes large integers from small ones.
     let converts_arguments = !matches!(name, "jittered_sample" | "sample_square");
     let is_rounded_twice = known.is_some_and(|known| known.reason == ROUNDED_TWICE);
     if is_rounded_twice && converts_arguments && !differ.iter().all(has_large) {
@@ -677,7 +675,7 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
     );
 }
 
-/// The probes reach what a function decides: both answers of each that gives one, hits and misses of each intersection.
+/// The inputs reach both results of each predicate, and hits and misses of each intersection.
 #[test]
 fn inputs_take_both_ways_of_every_decision() {
     let source = shared_source();
@@ -721,7 +719,7 @@ fn inputs_take_both_ways_of_every_decision() {
     }
 }
 
-/// One unit in the last place, in one constant of a function, is found.
+/// One ulp in a constant is detected.
 #[test]
 fn a_function_that_differs_by_one_ulp_is_found() {
     let Some(device) = adapter::device() else { return };
@@ -758,7 +756,7 @@ fn a_function_that_differs_by_one_ulp_is_found() {
     }
 }
 
-/// What no number is to one argument does not become of the whole: `max(NaN, 0)` clears it.
+/// `max(NaN, 0)` is 0: NaN does not spread to the result.
 #[test]
 fn nan_does_not_spread_where_it_must_not() {
     assert_eq!(max(f32::NAN, 0.0), 0.0);
@@ -774,7 +772,7 @@ fn nan_does_not_spread_where_it_must_not() {
     let module = parse(&source);
     let random = Random::new(7);
     for (_, function) in functions(&module, &source) {
-        // A ray that has no numbers meets nothing.
+        // A ray with NaN hits nothing.
         if function.name().starts_with("intersect_") {
             let mut words = inputs(&function, 500, random.bits());
             let per = function.words_in();
@@ -788,7 +786,7 @@ fn nan_does_not_spread_where_it_must_not() {
     }
 }
 
-/// Denormal numbers are noticed wherever a twin meets them, and nowhere else.
+/// Denormals are detected exactly where a twin has them.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn denormal_numbers_are_noticed_where_a_twin_meets_them() {
@@ -797,7 +795,7 @@ fn denormal_numbers_are_noticed_where_a_twin_meets_them() {
         ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0], false),
         ([least, 0.0, -0.0], [1.0, 1e-45, 0.0], true), // an operand
         ([least, 0.0, 0.0], [0.3, 0.0, 0.0], true),    // a result
-        ([least, 1.0, 0.0], [0.3, 1.0, 0.0], true),    // a result on the way to another
+        ([least, 1.0, 0.0], [0.3, 1.0, 0.0], true),    // an intermediate result
         ([least, 1.0, 0.0], [1.0, 1.0, 0.0], false),
         ([f32::MAX, 1.0, 0.0], [f32::MAX, 1.0, f32::NAN], false),
     ] {

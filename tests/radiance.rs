@@ -1,4 +1,4 @@
-//! Pictures whose values are known in closed form.
+//! Images with closed-form radiance.
 
 use wgray_render::film::Film;
 use wgray_render::records::Packed;
@@ -6,12 +6,11 @@ use wgray_render::records::Packed;
 use crate::pictures::{both, render};
 use crate::scenes::parse;
 
-/// Both paths' pictures.
 fn films(scene: &Packed) -> Vec<Film> {
     both().into_iter().map(|way| render(scene, way)).collect()
 }
 
-/// The camera looks straight down on the ground; a picture of 40 x 30 pixels shows 4 x 3 units.
+/// Looks straight down on the ground; 40 x 30 pixels cover 4 x 3 units.
 const DOWN: &str = r#"
 image = { width = 40, height = 30 }
 camera = { type = "orthographic", position = [0, 0, 5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }
@@ -36,7 +35,7 @@ normal = [0, 0, 1]
 tangent = [1, 1, 0]
 "#;
 
-/// A light 1.5 above (0.4, -0.3).
+/// 1.5 above (0.4, -0.3).
 const LIGHT: &str = r#"
 [[lights]]
 type = "point"
@@ -44,7 +43,7 @@ position = [0.4, -0.3, 1.5]
 color = [1, 0.5, 2]
 "#;
 
-/// The largest difference of a picture from what a function says of the pixel centres, x to the right, y up.
+/// Returns the maximum error at the pixel centers, x to the right, y up.
 fn largest_error(film: &Film, expected: impl Fn(f64, f64) -> [f64; 3]) -> f64 {
     let mut largest = 0.0f64;
     for (i, found) in film.means().enumerate() {
@@ -57,8 +56,7 @@ fn largest_error(film: &Film, expected: impl Fn(f64, f64) -> [f64; 3]) -> f64 {
     largest
 }
 
-/// What the point light adds: seen along the normal, the cosines to the light and from its mirrored direction to the
-/// viewer are the same, h / sqrt(h^2 + d^2).
+/// Returns the light of the point light. Seen along the normal, n.l = r.v = h / sqrt(h^2 + d^2).
 fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
     let (h, dx, dy) = (1.5, x - 0.4, y + 0.3);
     let cosine = h / (h * h + dx * dx + dy * dy).sqrt();
@@ -70,7 +68,7 @@ fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
 
 #[test]
 fn a_point_light_over_a_plane() {
-    // Light is seen from where shadow rays start; the formula knows of no offset.
+    // Shading is evaluated where shadow rays start; the formula has no offset.
     let down = DOWN.replace("[render]", "[render]\nshadow_epsilon = 0");
     let scene = parse(&format!("{down}{GROUND}{LIGHT}"));
     for film in films(&scene) {
@@ -115,9 +113,8 @@ fn a_light_from_below_reaches_no_ground_above() {
     }
 }
 
-/// A sphere of radius 0.5, one unit above the ground, under a directional light from straight above: its shadow is the
-/// disc of radius 0.5 below, which the sphere itself would hide from a camera above. So the camera is below the sphere:
-/// its image plane, where rays start, is at 0.25.
+/// A sphere of radius 0.5 at height 1 under a directional light from above casts a disk of radius 0.5. The camera is
+/// below the sphere, which would cover it; its image plane, where rays start, is at 0.25.
 #[test]
 fn a_sphere_in_parallel_light_casts_a_disc() {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
@@ -137,8 +134,8 @@ fn a_sphere_in_parallel_light_casts_a_disc() {
     }
 }
 
-/// Large shapes of every kind at some height, that cover all of the picture; and a small one far away above them, so that
-/// all have something on both sides: walls cast no shadow.
+/// Returns large shapes of every kind that cover the image. `dark_or_lit` adds a small one above them: shapes with
+/// nothing on one side cast no shadow.
 fn covers(heights: [f64; 4]) -> [String; 4] {
     let [a, b, c, d] = heights;
     [
@@ -150,7 +147,7 @@ fn covers(heights: [f64; 4]) -> [String; 4] {
     .map(|text| format!("[[shapes]]\nmaterial = 'ground'\n{text}\n"))
 }
 
-/// The ground under a light and covers, seen from below these: whether all of it is dark, and whether all of it is lit.
+/// Renders the ground below covers. Returns whether all is dark, and whether all is lit.
 fn dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let above = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [90, 90, 5]\nradius = 0.5\n";
@@ -167,7 +164,7 @@ fn dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
 const DARK: (bool, bool) = (true, false);
 const LIT: (bool, bool) = (false, true);
 
-/// What two primitives hide is hidden, of whichever kinds they are.
+/// Primitives of any two kinds occlude.
 #[test]
 fn light_behind_two_primitives_is_hidden() {
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
@@ -181,7 +178,7 @@ fn light_behind_two_primitives_is_hidden() {
     assert_eq!(dark_or_lit(light, ""), LIT, "without them");
 }
 
-/// A light is hidden by what is just before it, and by nothing behind it.
+/// Occluded just before the light, not behind it.
 #[test]
 fn a_light_is_hidden_by_what_is_before_it_alone() {
     for (before, behind) in covers([1.45; 4]).iter().zip(&covers([1.55; 4])) {

@@ -1,5 +1,5 @@
-//! Pictures are the same on GPU and CPU: all scenes, all ways, several sizes, seeds and patterns of samples; and
-//! however the work is cut.
+//! GPU and CPU images agree for all scenes, configurations, sizes, seeds and sample patterns, however the work is
+//! split.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ use crate::pictures::{
 };
 use crate::{patterns, scenes, sources};
 
-/// How a picture of the device differs from the CPU's more than is promised.
+/// Returns an error if a GPU image exceeds the guaranteed tolerance.
 pub fn compare(way: Way, packed: &Packed, gpu: &Film, cpu: &Film) -> Result<(), String> {
     assert_eq!((gpu.region, gpu.sums.len()), (cpu.region, cpu.sums.len()));
     let device = adapter::device().expect("the device that rendered the picture");
@@ -32,7 +32,7 @@ pub fn compare(way: Way, packed: &Packed, gpu: &Film, cpu: &Film) -> Result<(), 
     judge(known, "picture", differing(gpu, cpu) as f64 / cpu.sums.len() as f64)
 }
 
-/// The same for first hits: on other devices than software Vulkan only the integers, away from edges.
+/// Compares first hits; on devices other than software Vulkan only integers, away from edges.
 pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
     let device = adapter::device().expect("the device that rendered the picture");
     assert_eq!(gpu.len(), cpu.len());
@@ -53,7 +53,6 @@ pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
     }
 }
 
-/// A scene with another size, seed and samples.
 fn with(description: &Description, size: (u32, u32), seed: u32, pattern: Pattern, counts: (u32, u32)) -> Description {
     let mut d = description.clone();
     (d.image.width, d.image.height) = size;
@@ -63,7 +62,7 @@ fn with(description: &Description, size: (u32, u32), seed: u32, pattern: Pattern
     d
 }
 
-/// Every scene as it is, but smaller.
+/// Returns all scenes at reduced size.
 pub fn small_scenes() -> Vec<(String, Packed)> {
     let small = |(name, mut d): (String, Description)| {
         let scale = d.image.width.max(d.image.height).div_ceil(100);
@@ -74,10 +73,10 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
     scenes::descriptions().into_iter().map(small).collect()
 }
 
-/// Every pattern in some scene, every scene with some pattern, with many sizes, seeds and numbers of samples.
+/// Returns each scene and each pattern at least once, with different sizes, seeds and sample counts.
 pub fn variations() -> Vec<(String, Packed)> {
     let (mut scenes, patterns) = (scenes::descriptions(), patterns::all());
-    scenes.sort_by_key(|(_, d)| d.integrator() == Integrator::Path); // later, so that the others keep their numbers
+    scenes.sort_by_key(|(_, d)| d.integrator() == Integrator::Path); // last: keeps the indices of the others
     let vary = |i: usize| {
         let (name, d) = &scenes[i % scenes.len()];
         let (size, counts) = (
@@ -134,7 +133,7 @@ fn first_hits_of_all_scenes_are_the_same() {
     }
 }
 
-/// One unit in the last place of one number, and one pixel's last bit, are found.
+/// One ulp of a number, or one bit of a pixel, is detected.
 #[test]
 fn a_picture_that_differs_is_found() {
     let Some(device) = adapter::device() else { return };
@@ -162,7 +161,7 @@ fn a_picture_that_differs_is_found() {
                 "'{to}' in place of '{from}'"
             );
         }
-        // and yet it is nearly the same
+        // Still within the tolerances.
         assert!(nearly(&film).is_ok(), "'{to}' in place of '{from}'");
     }
     let mut other = cpu.clone();
@@ -212,7 +211,7 @@ fn a_larger_picture_is_the_same() {
     }
 }
 
-/// Pieces of work in some order: tiles, each with ranges of samples.
+/// Renders tiles with ranges of samples, in order.
 fn pieces(backend: &mut dyn Backend, region: Region, pieces: &[(Region, Range<u32>)]) -> Film {
     let mut run = || {
         backend.begin(region)?;
@@ -243,7 +242,7 @@ fn pictures_do_not_depend_on_how_the_work_is_cut() {
             };
             for cut in [
                 cut(45 * 10, Some(1), Some(3)),
-                cut(1, Some(4), None), // a band has a row at least
+                cut(1, Some(4), None), // a band has at least one row
                 cut(45 * 36, None, Some(1)),
                 cut(u64::MAX, None, Some(40)),
             ] {
@@ -253,7 +252,7 @@ fn pictures_do_not_depend_on_how_the_work_is_cut() {
                     "{way:?}, {cut:?}"
                 );
             }
-            // tiles of any shape in any order, each interrupted and continued
+            // Any shape and order, each interrupted and continued.
             let tiles = [
                 tile(13, 20, 45, 37),
                 tile(0, 0, 45, 7),
@@ -276,7 +275,7 @@ fn pictures_do_not_depend_on_how_the_work_is_cut() {
                 0,
                 "{way:?}, samples"
             );
-            // Only one order is promised: samples one after the other. Another gives other roundings.
+            // Another order of samples rounds differently.
             let film = pieces(
                 &mut *backend,
                 whole(&packed),
@@ -336,7 +335,7 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
             "{threads} threads"
         );
     }
-    // The same samples with another seed are another picture.
+    // Control: another seed.
     let other = reference(&scenes::packed(&with(
         &description,
         (70, 31),

@@ -1,4 +1,4 @@
-//! A picture does not depend on the unit of length, nor on where the origin is: no acne, no lost contact shadows.
+//! Images do not depend on the unit of length or the origin: no shadow acne, no lost contact shadows.
 
 use glam::DVec3;
 use wgray::scene::{CameraDescription, Description, LightDescription, ShapeDescription};
@@ -8,7 +8,7 @@ use crate::oracle::{Flaw, Oracle};
 use crate::pictures::reference;
 use crate::scenes::{packed, scene};
 
-/// The scene scaled about the origin and then moved.
+/// Scales about the origin, then translates.
 fn transformed(description: &Description, scale: f64, offset: DVec3) -> Description {
     let mut description = description.clone();
     let point = |p: &mut DVec3| *p = *p * scale + offset;
@@ -47,7 +47,7 @@ fn transformed(description: &Description, scale: f64, offset: DVec3) -> Descript
     description
 }
 
-/// The assignment scene with few samples, so that each counts.
+/// Returns the Cornell scene with one sample per pixel, so that each counts.
 fn cornell() -> Description {
     let mut description = scene("cornell.toml");
     (description.image.width, description.image.height) = (200, 200);
@@ -56,15 +56,15 @@ fn cornell() -> Description {
     description
 }
 
-/// The pixels with a value that differs by more than a tolerance.
+/// Returns the pixels that differ by more than a tolerance.
 fn beyond(a: &Film, b: &Film, tolerance: f32) -> Vec<usize> {
     let far = |(a, b): ([f32; 3], [f32; 3])| a.iter().zip(b).any(|(a, b)| !((a - b).abs() <= tolerance));
     let pairs = a.means().zip(b.means()).enumerate();
     pairs.filter(|(_, pair)| far(*pair)).map(|(pixel, _)| pixel).collect()
 }
 
-/// Pixels of the 40,000 that differ visibly from the scene where it was. A shadow's edge that falls to the other side of
-/// a light's sample changes a value by 1/16 of the light.
+/// Returns the visibly different pixels of 40,000. A shadow edge that moves across a light sample changes a value by
+/// 1/16 of the light.
 fn visible(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
     let expected = reference(&packed(&cornell()));
     let mut description = transformed(&cornell(), 1.0, DVec3::splat(offset));
@@ -72,12 +72,12 @@ fn visible(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
     beyond(&reference(&packed(&description)), &expected, 0.01)
 }
 
-/// Rays start 32 units of 2^-24 above a surface, and are off by less than 24 more: docs/decisions/shadow-rays.md, step 5.
-/// Coordinates go to 1 from what the camera looks at.
+/// Rays start 32 units of 2^-24 above a surface, with an error below 24: docs/decisions/shadow-rays.md, step 5.
+/// Coordinates are up to 1 from the look-at point.
 const ROUNDING: f64 = 56.0 / 16_777_216.0;
 
-/// Whether rounding may show in a pixel, by f64 alone: an edge of a shape or of a shadow passes over the pixel's ray or
-/// one of the light's samples when the camera or the light is moved by no more than what rounding moves.
+/// Returns true if rounding may change a pixel: in f64, moving camera or light by `ROUNDING` moves an edge across the
+/// camera ray or a light sample.
 fn near_an_edge(description: &Description, pixel: usize) -> bool {
     let value = |description: &Description| {
         let oracle = Oracle::new(description, Flaw::None);
@@ -115,8 +115,8 @@ fn camera_moved(description: &Description, way: DVec3) -> Description {
     description
 }
 
-/// The edge from the tetrahedron's first corner to its top is 4e-7 from a ray from pixel (15, 193) to the light's first
-/// sample: in some units the sample is seen, in others it is not.
+/// The segment from pixel (15, 193) to the first light sample passes an edge of the tetrahedron at 4e-7, so the scale
+/// decides its occlusion.
 #[test]
 fn the_unit_of_length_shows_in_the_last_digits_of_edges_alone() {
     let (scene, expected) = (cornell(), reference(&packed(&cornell())));
@@ -131,7 +131,7 @@ fn the_unit_of_length_shows_in_the_last_digits_of_edges_alone() {
     assert_eq!(near, 0, "of the pixels of everywhere");
 }
 
-/// 1000 of its own sizes away, and farther: coordinates are counted from near what the camera looks at.
+/// Even at 1000 times the scene's size and farther: coordinates are relative to a point near the look-at point.
 #[test]
 fn the_place_of_the_origin_does_not_show() {
     for offset in [100.0, -2000.0, 1e6] {
@@ -139,7 +139,7 @@ fn the_place_of_the_origin_does_not_show() {
         let (found, expected) = (reference(&packed(&found)), reference(&packed(&expected)));
         assert_eq!(found, expected, "moved by {offset}");
     }
-    // not by a multiple of the grid that the origin is on
+    // Not multiples of the grid of that origin.
     for offset in [1999.3, -77_777.7] {
         let found = visible(offset, 0.0);
         assert!(found.is_empty(), "moved by {offset}: pixels {found:?}");
@@ -150,7 +150,7 @@ fn the_place_of_the_origin_does_not_show() {
 fn too_large_an_offset_is_found() {
     let leaks = visible(0.0, 0.05);
     assert!(leaks.len() > 400, "lost contact shadows: {} pixels", leaks.len());
-    // a small one too, and it is no matter of edges' last digits
+    // A small one too, away from edges.
     let (scene, moved) = (cornell(), visible(0.0, 1e-3));
     let far = moved.iter().filter(|pixel| !near_an_edge(&scene, **pixel)).count();
     assert!(far > 60, "{far} of {} pixels", moved.len());

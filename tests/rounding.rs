@@ -1,5 +1,5 @@
-//! Quotients and square roots in software are rounded correctly, whatever the device's own are like; and what pictures
-//! promise of a device whose own are only near.
+//! Software quotients and square roots are correctly rounded on any device; with imprecise ones, images stay within the
+//! tolerances.
 
 use std::sync::OnceLock;
 
@@ -13,7 +13,7 @@ use crate::random::Random;
 use crate::render::small_scenes;
 use crate::sources::{edited, parse, shaders, shaders_with};
 
-/// Moves a number by up to 3 units in the last place, as a function of its digits: more than WGSL allows a quotient.
+/// Adds up to 3 ulp, by the bits: more than WGSL allows for a quotient.
 const NUDGED: &str = "
 fn nudged(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
@@ -23,7 +23,7 @@ fn nudged(x: f32) -> f32 {
 }
 ";
 
-/// The functions over a device's own operations that are near only.
+/// Returns the software functions over imprecise device operations.
 fn over_a_poor_device() -> String {
     let mut text = shaders().text(ROUNDING).to_string();
     for (from, to) in [
@@ -43,7 +43,7 @@ fn over_a_poor_device() -> String {
     text + NUDGED
 }
 
-/// A device's own operations that are near only, in place of the functions.
+/// Returns imprecise device operations instead of the functions.
 fn poor_device() -> String {
     "fn quotient(a: f32, b: f32) -> f32 { return nudged(a / b); }
     fn quotient2(a: vec2f, b: vec2f) -> vec2f { return vec2f(quotient(a.x, b.x), quotient(a.y, b.y)); }
@@ -58,7 +58,7 @@ fn poor_device() -> String {
         + NUDGED
 }
 
-/// Numbers of all kinds, and those around which something changes.
+/// Returns numbers of all magnitudes, and ends of ranges.
 fn numbers(random: &Random) -> f32 {
     const EDGES: [u32; 12] = [
         0,
@@ -81,17 +81,16 @@ fn numbers(random: &Random) -> f32 {
         1 => random.pick(&EDGES),
         2 => few_digits(),
         3 => 0x3f80_0000 | (random.bits() as u32 & 0x7f_ffff), // from 1 to 2
-        _ => random.bits() as u32 & 0xff_ffff,                 // denormal and a little larger
+        _ => random.bits() as u32 & 0xff_ffff,                 // denormal and slightly above
     };
     f32::from_bits(bits ^ sign)
 }
 
-/// A function that is or is not rounded correctly.
 struct Case {
     name: &'static str,
     arguments: usize,
     truth: fn(&[f32]) -> f32,
-    /// Mistakes that must be found.
+    /// Errors that must be detected.
     mistakes: [(&'static str, &'static str); 2],
 }
 
@@ -116,7 +115,7 @@ const CASES: [Case; 2] = [
     },
 ];
 
-/// How many of a million results are not those of IEEE 754, and the first of them.
+/// Returns how many of a million results differ from IEEE 754, and the first.
 fn wrong(case: &Case, text: &str) -> (usize, Option<String>) {
     let mut source = Source::default();
     source.append("rounding", text);
@@ -160,7 +159,7 @@ fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
             );
             assert_eq!(number, 0, "on {device}: {first:?}");
         }
-        // negative controls
+        // Controls.
         assert!(
             wrong(case, &poor_device()).0 > 100_000,
             "{}: a poor device is found out",
@@ -173,18 +172,17 @@ fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
     }
 }
 
-/// A poor device, as shaders of kernels that are rounded in software.
+/// Returns imprecise operations for kernels that round in software.
 pub fn poor_shaders() -> &'static Shaders {
     static POOR: OnceLock<Shaders> = OnceLock::new();
     POOR.get_or_init(|| shaders_with(ROUNDING, &poor_device()))
 }
 
-/// A device with quotients and square roots that are wrong in the last digits keeps the promise of nearly the same
-/// pictures, and with the functions that of the same.
+/// With imprecise operations images are within the tolerances; with the software functions they are bit-identical.
 #[test]
 fn pictures_keep_their_promise_on_a_poor_device() {
     if !adapter::device().is_some_and(bit_exact) {
-        return; // the other tests tell what that device is like by itself
+        return; // other tests cover such devices
     }
     let corrected = shaders_with(ROUNDING, &over_a_poor_device());
     for (name, packed) in small_scenes() {

@@ -1,4 +1,4 @@
-//! The project's scenes, small: every file of `scenes/`, whatever it is called.
+//! The project's scenes: all files of `scenes/`.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use wgray_render::records::Packed;
 
 use crate::sources;
 
-/// What every file of `scenes/` says, by its name.
+/// Returns all descriptions by file name.
 pub fn descriptions() -> Vec<(String, Description)> {
     let mut found = Vec::new();
     for entry in fs::read_dir(sources::path("scenes")).expect("the scenes") {
@@ -24,7 +24,6 @@ pub fn descriptions() -> Vec<(String, Description)> {
     found
 }
 
-/// One scene of the project.
 pub fn scene(name: &str) -> Description {
     descriptions()
         .into_iter()
@@ -33,12 +32,11 @@ pub fn scene(name: &str) -> Description {
         .1
 }
 
-/// A scene from its text.
 pub fn parse(text: &str) -> Packed {
     packed(&Description::parse(text, "test").unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// A description as the backends read it.
+/// Validates and packs.
 pub fn packed(description: &Description) -> Packed {
     let beside = Assets::beside(&sources::path("scenes"));
     pack(
@@ -48,7 +46,7 @@ pub fn packed(description: &Description) -> Packed {
     )
 }
 
-/// The scenes as they are.
+/// Returns all scenes at full size.
 pub fn all() -> Vec<(String, Packed)> {
     descriptions()
         .iter()

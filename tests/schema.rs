@@ -1,4 +1,4 @@
-//! The JSON Schema of scene files beside the program that reads them: what the one refuses the other refuses too.
+//! The JSON Schema of scene files and the program accept the same files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -31,7 +31,7 @@ fn fits(scene: &Table) -> bool {
     validator().is_valid(&serde_json::to_value(scene).expect("JSON"))
 }
 
-/// What the program says of a scene in a folder.
+/// Validates by the program.
 fn told(scene: &Table, folder: &Path) -> Result<(), String> {
     let text = toml::to_string(scene).expect("TOML");
     let description = Description::parse(&text, "s.toml").map_err(|error| error.to_string())?;
@@ -39,7 +39,7 @@ fn told(scene: &Table, folder: &Path) -> Result<(), String> {
     checked.map(|_| ()).map_err(|problem| problem.to_string())
 }
 
-/// Scenes with every key there is.
+/// Together these have every key.
 const EVERY: [&str; 4] = [
     r#"
 [image]
@@ -330,7 +330,7 @@ file = "rock.obj"
 material = "gray"
 matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]
 "#,
-    // There is no such file.
+    // Only the schema accepts this one, as the file does not exist.
     r#"
 image = { width = 8, height = 6 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40, f_number = 2 }
@@ -366,9 +366,9 @@ integrator = "path"
 "#,
 ];
 
-/// The program refuses these for what several values are together, or for what a name or a file is; the messages have one of these texts.
+/// Errors that the schema does not cover: relations of values, names, file contents.
 const OF_SEVERAL: &[&str] = &[
-    // names and files
+    // Names and files.
     "there is no texture",
     "there is no material",
     "there is no mesh",
@@ -384,7 +384,7 @@ const OF_SEVERAL: &[&str] = &[
     "must have a red and green factor",
     "texture's factor",
     "texture with uv_set",
-    // what stands beside other keys, or needs them
+    // Keys that exclude or require others.
     "integrator = \"path\"",
     "must be from 1 to 64",
     "must not be there",
@@ -403,7 +403,7 @@ const OF_SEVERAL: &[&str] = &[
     "must not emit light",
     "must be greater than the frame of the previous key",
     "camera.path: at frame",
-    // several numbers: places, directions, maps. Of lists of 0 alone, and of their lengths, the schema knows
+    // Relations of numbers. The schema covers lists of zeros and lengths.
     "must not be parallel",
     "must not lie",
     "must differ from the camera's position",
@@ -415,7 +415,7 @@ const OF_SEVERAL: &[&str] = &[
     "must be [0, 0, 0, 1]",
 ];
 
-/// All ways to a value, the table itself among them.
+/// Collects the paths of all values.
 fn places(value: &Value, here: &mut Vec<Step>, all: &mut Vec<Vec<Step>>) {
     all.push(here.clone());
     match value {
@@ -426,7 +426,7 @@ fn places(value: &Value, here: &mut Vec<Step>, all: &mut Vec<Vec<Step>>) {
                 here.pop();
             }
         }
-        // Of points and colours one number is as good as another.
+        // One component represents a point or color.
         Value::Array(list) if list.first().is_some_and(|first| !first.is_table() && !first.is_array()) => {
             if let Some(value) = list.last() {
                 here.push(Step::Index(list.len() - 1));
@@ -458,7 +458,7 @@ fn at<'a>(scene: &'a mut Value, place: &[Step]) -> &'a mut Value {
     })
 }
 
-/// The scene with other values at one place.
+/// Puts other values at one place.
 fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
     let floats = [-1e10, -400.0, -0.5, -1e-12, 0.0, 1e-12, 0.5, 1.5, 1e7, 1e10];
     let wholes = [-1, 0, 2, 17, 101, 1025, 65_537, 5_000_000_000_i64];
@@ -503,11 +503,11 @@ fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
     all
 }
 
-/// Whether the program and the schema agree on a scene: how, if not.
+/// Returns the disagreement of schema and program, if any.
 fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
     match (fits(scene), told(scene, folder)) {
         (false, Ok(())) => Some(format!("the schema alone refuses {scene}")),
-        // To JSON 1.0 is a whole number.
+        // To JSON, 1.0 is an integer.
         (true, Err(message))
             if message.contains(".0 must be ")
                 && ["whole number", "a name or a number"]
@@ -516,7 +516,7 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
         {
             None
         }
-        // What the keys of a camera's path must have then.
+        // The schema does not require the static keys of a camera with a path.
         (true, Err(message)) if message.contains(": camera.") && message.ends_with(" is missing") => {
             let has_path = scene["camera"].get("path").is_some();
             (!has_path).then(|| format!("the schema takes a camera without: {message}"))
@@ -528,7 +528,7 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
     }
 }
 
-/// Says so of all changes of one value of a scene; returns how many there were.
+/// Checks every `step`-th change; returns their number.
 fn compare(scene: &Table, folder: &Path, step: usize) -> usize {
     let mut all = Vec::new();
     places(&Value::Table(scene.clone()), &mut Vec::new(), &mut all);
@@ -549,7 +549,7 @@ fn compare(scene: &Table, folder: &Path, step: usize) -> usize {
 fn changed_values_are_refused_by_both() {
     let folder = any_scene::folder();
     let scenes = EVERY.map(|text| text.parse::<Table>().unwrap());
-    // So many that each value has several changes.
+    // Leaves several changes for each value.
     let count: usize = scenes.iter().map(|scene| compare(scene, folder, 3)).sum();
     assert!(count > 3000, "{count}");
     let whole = scenes.iter().filter(|scene| told(scene, folder).is_ok() && fits(scene));
@@ -578,7 +578,7 @@ fn nothing_and_too_much_are_refused_by_both() {
         (0, &[key("instances"), Step::Index(1)], "scale", 1.into()),
         (1, &shape(0), "translate", vec![0, 0, 0].into()),
         (2, &shape(1), "scale", 1.into()),
-        // No list of a table's values stands for the table.
+        // A list does not replace a table.
         (0, &[key("render")], "adaptive", vec![0.01].into()),
         (
             0,
@@ -649,7 +649,7 @@ fn the_projects_scenes_fit() {
     }
 }
 
-/// The parts of the schema, with the tables of the page that are of them.
+/// Returns the parts of the schema with their headings in the documentation.
 fn parts() -> Vec<(String, &'static Json)> {
     let defs = schema()["$defs"].as_object().unwrap();
     let of_types = defs.iter().map(|(name, part)| {
@@ -676,7 +676,7 @@ fn parts() -> Vec<(String, &'static Json)> {
         .collect()
 }
 
-/// The keys of the page's tables under a heading, with default and range.
+/// Returns default and range of the keys under a heading.
 fn rows(heading: &str) -> BTreeMap<&'static str, (String, String)> {
     let (_, rest) = PAGE
         .split_once(&format!("\n{heading}\n"))
@@ -704,10 +704,10 @@ fn the_page_has_the_same_keys_defaults_and_ranges() {
         for (key, (default, range)) in rows {
             let place = format!("{heading} {key}");
             let said = &keys[key];
-            // A camera's are wanted where it has no path.
+            // Camera keys are required without a path.
             let required = [&part["required"], &part["anyOf"][0]["required"]].into_iter();
             let is_required = required.flat_map(Json::as_array).flatten().any(|name| name == key);
-            // Whatever has types must say which it is of.
+            // `type` is always required.
             assert!(is_required == (default == "required") || key == "type", "{place}");
             if let (Some(said), Ok(default)) = (
                 said.get("default"),
@@ -732,7 +732,7 @@ fn the_page_has_the_same_keys_defaults_and_ranges() {
                     Some((low.parse::<f64>().ok()?, high.parse::<f64>().ok()?))
                 }),
             };
-            // Of several forms one is told.
+            // The documentation states one of several ranges.
             let is_plain = key != "max_depth" && of.get("anyOf").is_none();
             if let (Some((low, high)), true) = (wanted, is_plain) {
                 let ends = ["minimum", "maximum"].map(|end| of[end].as_f64());
@@ -744,7 +744,7 @@ fn the_page_has_the_same_keys_defaults_and_ranges() {
     assert!(defaults > 60 && ranges > 80, "{defaults} {ranges}");
 }
 
-/// Equality of values, in which 1 is 1.0.
+/// 1 equals 1.0.
 fn same(a: &Json, b: &Json) -> bool {
     match (a, b) {
         (Json::Number(a), Json::Number(b)) => a.as_f64() == b.as_f64(),
@@ -756,12 +756,12 @@ fn same(a: &Json, b: &Json) -> bool {
     }
 }
 
-/// Calls for each key that a schema describes, with the way to it.
+/// Visits each described key with its path.
 fn each_key(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
     match schema {
         Json::Object(all) => {
             for (key, property) in all.get("properties").and_then(Json::as_object).into_iter().flatten() {
-                // What a condition asks is described where it leads to.
+                // Described in the consequence of the condition.
                 if !path.ends_with("/if") {
                     check(&format!("{path}.{key}"), property);
                 }
@@ -794,7 +794,7 @@ fn every_key_is_described_and_every_number_has_its_ends() {
             !is_number || ends.iter().any(|end| property.get(end).is_some()),
             "{path}: {property}"
         );
-        // Where a texture may stand in its place, what its numbers may be is told where they are asked for: at the key.
+        // If a texture may replace the number, the key describes the range.
         let is_texture = |either: &Json| either["properties"].get("texture").is_some();
         let either = property.get("anyOf").filter(|either| is_texture(&either[1]));
         let mut plain = either.map_or(&Json::Null, |either| &either[0]);

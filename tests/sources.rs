@@ -1,4 +1,4 @@
-//! The two texts of the shared mathematics, as naga and syn read them: which functions and records are where.
+//! The shared functions and records, as naga parses the WGSL and syn the Rust.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,15 +9,13 @@ use wgray_render::gpu::compose::{KERNELS, Shaders, Source, built_in};
 use wgray_render::gpu::naga;
 use wgray_render::gpu::naga::{ArraySize, Module, ScalarKind, TypeInner};
 
-/// A folder of shaders to test in place of the ones in the program: what `scripts/mutate` has changed.
+/// Folder of shaders to test, from `scripts/mutate`.
 const SHADERS: &str = "WGRAY_TEST_SHADERS";
 
-/// A path of the project.
 pub fn path(relative: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(relative)
 }
 
-/// The shaders under test.
 pub fn shaders() -> &'static Shaders {
     static SHADERS_UNDER_TEST: OnceLock<Shaders> = OnceLock::new();
     SHADERS_UNDER_TEST.get_or_init(|| match std::env::var_os(SHADERS) {
@@ -26,23 +24,20 @@ pub fn shaders() -> &'static Shaders {
     })
 }
 
-/// The shaders with one place of a file changed.
 pub fn edited_shaders(file: &str, from: &str, to: &str) -> Shaders {
     shaders_with(file, &edited(shaders().text(file), from, to))
 }
 
-/// A text with one place changed.
+/// Replaces the first occurrence.
 pub fn edited(text: &str, from: &str, to: &str) -> String {
     assert!(text.contains(from), "'{from}' is not there to be changed");
     text.replacen(from, to, 1)
 }
 
-/// The shaders with another text of a file.
 pub fn shaders_with(file: &str, text: &str) -> Shaders {
     with(shaders(), file, text)
 }
 
-/// Other shaders with another text of a file.
 pub fn with(shaders: &Shaders, file: &str, text: &str) -> Shaders {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, _) in built_in() {
@@ -54,7 +49,7 @@ pub fn with(shaders: &Shaders, file: &str, text: &str) -> Shaders {
     Shaders::read(folder.path()).expect("the copies")
 }
 
-/// The shared files by themselves: that naga accepts them shows that they read no binding and no override.
+/// Returns the shared files alone; naga accepts them, so they use no binding and no override.
 pub fn shared_source() -> Source {
     shaders().shared()
 }
@@ -64,26 +59,24 @@ pub fn parse(source: &Source) -> Module {
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string_with_path(&source.text, "composed.wgsl")))
 }
 
-/// The file that something in a module comes from.
 pub fn file_of(source: &Source, span: naga::Span) -> String {
     let range = span.to_range().expect("naga knows where everything was written");
     source.locate(range.start).expect("inside of the text").0.to_string()
 }
 
-/// A name and a type, which is written as in WGSL: `vec3<f32>`, `Primitive`.
+/// A name and a WGSL type: `vec3<f32>`, `Primitive`.
 pub type Named = (String, String);
 
-/// A function's or a record's outside.
+/// A function or a record.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Signature {
     pub name: String,
-    /// A function's arguments; a record's fields.
+    /// Arguments or fields.
     pub parts: Vec<Named>,
-    /// A function's result.
     pub result: Option<String>,
 }
 
-/// The functions of a WGSL file, in its order.
+/// Returns the functions in source order.
 pub fn wgsl_functions(module: &Module, source: &Source, file: &str) -> Vec<Signature> {
     let mut functions: Vec<(naga::Span, Signature)> = Vec::new();
     for (handle, function) in module.functions.iter() {
@@ -102,7 +95,7 @@ pub fn wgsl_functions(module: &Module, source: &Source, file: &str) -> Vec<Signa
     functions.into_iter().map(|(_, signature)| signature).collect()
 }
 
-/// The records that a WGSL file declares, in its order.
+/// Returns the records in source order.
 pub fn wgsl_records(module: &Module, source: &Source, file: &str) -> Vec<Signature> {
     let mut records: Vec<(naga::Span, Signature)> = Vec::new();
     for (handle, ty) in module.types.iter() {
@@ -150,15 +143,14 @@ pub fn type_name(module: &Module, ty: naga::Handle<naga::Type>) -> String {
     }
 }
 
-/// A Rust file of the project, read when the test runs.
 pub fn rust(relative: &str) -> syn::File {
     let path = path(relative);
     let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// All functions of a Rust file outside of its tests and `impl`s, in its order. A function that updates an argument in
-/// place has the signature of the WGSL function that takes the value before and returns the value after.
+/// Returns the functions outside of tests and `impl`s. One that updates an argument in place has the signature of the
+/// WGSL function that takes and returns it.
 pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
     let updated = |function: &syn::ItemFn| {
         let arguments = function.sig.inputs.iter();
@@ -192,7 +184,7 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
     file.items.iter().filter_map(function).collect()
 }
 
-/// The structs of a Rust file, in its order.
+/// Returns the structs in source order.
 pub fn rust_records(file: &syn::File) -> Vec<Signature> {
     let field = |f: &syn::Field| {
         (
@@ -211,7 +203,7 @@ pub fn rust_records(file: &syn::File) -> Vec<Signature> {
     file.items.iter().filter_map(record).collect()
 }
 
-/// A Rust type as WGSL writes it. Records are passed by reference in Rust and by value in WGSL.
+/// Returns the WGSL type. Records are by reference in Rust, by value in WGSL.
 fn rust_type(ty: &Type) -> String {
     match ty {
         Type::Reference(reference) => rust_type(&reference.elem),
@@ -221,7 +213,7 @@ fn rust_type(ty: &Type) -> String {
                     lit: syn::Lit::Int(length),
                     ..
                 }) => length.base10_digits().to_string(),
-                other => format!("{other:?}"), // like nothing in WGSL: the length of a shared array is a literal
+                other => format!("{other:?}"), // matches nothing: a shared array has a literal length
             };
             format!("array<{}, {length}>", rust_type(&array.elem))
         }
@@ -239,11 +231,11 @@ fn rust_type(ty: &Type) -> String {
                 name
             }
         }
-        other => format!("{other:?}"), // like nothing in WGSL
+        other => format!("{other:?}"), // matches nothing
     }
 }
 
-/// How two lists differ, as lines for a person; nothing where they are the same.
+/// Returns readable differences; empty if equal.
 pub fn differences(place: &str, wgsl: &[Signature], rust: &[Signature]) -> Vec<String> {
     let mut problems = Vec::new();
     for w in wgsl {

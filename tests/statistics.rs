@@ -1,5 +1,5 @@
-//! Random patterns are uniform, together and in their projections, and pictures by them have the mean of pictures by
-//! grids. The numbers are the same in every run, so that a test that passes once passes always.
+//! Random patterns are uniform, jointly and in projections, and have the same image mean as grids. Deterministic: the
+//! random numbers are fixed.
 
 use glam::Vec2;
 use wgray::scene::Pattern;
@@ -11,11 +11,11 @@ use crate::probes::twin;
 use crate::sources::{parse, shared_source};
 use crate::{adapter, patterns, scenes};
 
-/// The chance that a sound pattern is called unsound; each test asks some dozens of questions.
+/// Probability of rejecting a uniform pattern; each test makes dozens of checks.
 const SIGNIFICANCE: f64 = 1e-6;
 
-/// Positions of a pattern for many pixels: `sets` sets of `count`, as the renderer asks for them. From the device, where
-/// there is one: the probes hold that the twins give the same.
+/// Returns `sets` pixels with `count` positions. From the GPU if available; `tests/probes.rs` shows that the twins
+/// agree.
 fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
     let mut description = scenes::scene("cornell.toml");
     description.render.pixel_samples = patterns::samples(pattern, count);
@@ -34,7 +34,7 @@ fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
         .collect()
 }
 
-/// A shared function with two words of a result, over the words of many calls.
+/// Evaluates a shared function with a two-word result.
 fn evaluate(name: &str, words: Vec<u32>) -> Vec<u32> {
     let Some(device) = adapter::device() else {
         return twin(name).results(&words, 2);
@@ -46,21 +46,20 @@ fn evaluate(name: &str, words: Vec<u32>) -> Vec<u32> {
     function.run(device, &words)
 }
 
-/// Whether the pattern is the same in every pixel.
 fn fixed(pattern: Pattern) -> bool {
     let sets = positions(pattern, 16, 2);
     sets[0] == sets[1]
 }
 
-/// The chance of a chi-square value as large as this or larger, by the cube-root approximation of Wilson and Hilferty,
-/// "The Distribution of Chi-Square", 1931.
+/// Returns the p-value of a chi-square, by the cube-root approximation of Wilson and Hilferty, "The Distribution of
+/// Chi-Square", 1931.
 fn chance(chi_square: f64, freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     let z = ((chi_square / freedom).cbrt() - (1.0 - spread)) / spread.sqrt();
     upper_tail(z)
 }
 
-/// The chance of a normal deviate above z: Abramowitz and Stegun, 26.2.17.
+/// Returns the p-value of a normal deviate: Abramowitz and Stegun, 26.2.17.
 fn upper_tail(z: f64) -> f64 {
     if z < 0.0 {
         return 1.0 - upper_tail(-z);
@@ -77,7 +76,7 @@ fn upper_tail(z: f64) -> f64 {
     (-z * z / 2.0).exp() / std::f64::consts::TAU.sqrt() * sum
 }
 
-/// Pearson's chi-square of counts that should be equal.
+/// Returns Pearson's chi-square for equal expected counts.
 fn chi_square(counts: &[u32]) -> f64 {
     let expected = f64::from(counts.iter().sum::<u32>()) / counts.len() as f64;
     counts
@@ -86,7 +85,7 @@ fn chi_square(counts: &[u32]) -> f64 {
         .sum()
 }
 
-/// What is not uniform in a list of independent positions: the square, either coordinate, or two sums of them.
+/// Returns a projection of independent positions that is not uniform.
 fn flaw(positions: &[Vec2]) -> Option<String> {
     const CELLS: usize = 16;
     let cell = |x: f32| ((x * CELLS as f32) as usize).min(CELLS - 1);
@@ -118,7 +117,7 @@ fn the_chances_are_those_of_the_tables() {
     for (z, expected) in [(0.0, 0.5), (1.0, 0.158_655), (3.0, 0.001_349_9), (-1.0, 0.841_345)] {
         assert!((upper_tail(z) - expected).abs() < 1e-6, "{z}");
     }
-    // Abramowitz and Stegun, table 26.8
+    // Abramowitz and Stegun, table 26.8.
     for (chi_square, freedom, expected) in [(24.996, 15.0, 0.05), (37.697, 15.0, 0.001), (124.342, 100.0, 0.05)] {
         assert!(
             (chance(chi_square, freedom) / expected - 1.0).abs() < 0.05,
@@ -139,13 +138,13 @@ fn positions_are_on_the_unit_square() {
     }
 }
 
-/// One position of each set alone is uniform over the sets, whichever it is.
+/// Each single position, and all of a pixel together, are uniform.
 #[test]
 fn random_patterns_are_uniform_over_pixels() {
     let mut tested = 0;
     for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !fixed(*pattern)) {
         let sets = positions(pattern, 16, 40_000);
-        // A position may be confined to a cell of a grid; all of a set together are not.
+        // Some patterns confine a position to a grid cell.
         for (first, last) in [(0, 0), (7, 7), (15, 15), (0, 15)] {
             let confined = first == last
                 && sets
@@ -161,14 +160,14 @@ fn random_patterns_are_uniform_over_pixels() {
     assert!(tested >= 1, "no pattern is random");
 }
 
-/// The mean of a set's positions is the middle of the square, over all sets.
+/// The mean position is the center of the square.
 #[test]
 fn all_patterns_are_centred() {
     for (name, pattern) in patterns::all() {
         let sets = positions(pattern, 16, 10_000);
         let n = (sets.len() * sets[0].len()) as f64;
         let mean = sets.iter().flatten().map(|p| p.as_dvec2()).sum::<glam::DVec2>() / n;
-        // No pattern is worse than independent positions, whose standard error this is.
+        // Standard error of independent positions; no pattern is worse.
         let error = (1.0 / 12.0 / n).sqrt();
         assert!(((mean - 0.5) / error).abs().max_element() < 5.0, "{name}: {mean}");
     }
@@ -194,7 +193,7 @@ fn a_biased_pattern_is_found() {
     }
 }
 
-/// The scene with these samples, so small that edges are everywhere.
+/// Returns an image so small that edges are everywhere.
 fn noisy(pattern: Pattern, seed: u32, counts: (u32, u32)) -> Packed {
     let mut d = scenes::scene("cornell.toml");
     (d.image.width, d.image.height) = (20, 20);
@@ -204,7 +203,7 @@ fn noisy(pattern: Pattern, seed: u32, counts: (u32, u32)) -> Packed {
     scenes::packed(&d)
 }
 
-/// For each pixel, how many standard errors the mean over the seeds is from the truth.
+/// Returns each pixel's deviation from the reference, in standard errors over the seeds.
 fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
     let n = pictures.len() as f64;
     let pixel = |i: usize| {
@@ -212,13 +211,13 @@ fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let expected: f64 = truth[i].iter().sum();
-        // The truth is a fine grid, and has an error of its own.
+        // The reference is a fine grid with its own error.
         (mean - expected) / ((variance / n).sqrt() + 1e-3 * expected)
     };
     (0..truth.len()).map(pixel).collect()
 }
 
-/// The mean and the mean square of the deviations are those of a normal distribution, or nearer to 0.
+/// Mean and mean square are at most those of a normal distribution.
 fn unbiased(deviations: &[f64]) -> Result<(), String> {
     let n = deviations.len() as f64;
     let mean = deviations.iter().sum::<f64>() / n;
@@ -238,7 +237,7 @@ fn pictures_of_random_patterns_have_the_mean_of_grids() {
         let pictures: Vec<_> = (0..48).map(picture).collect();
         let result = unbiased(&deviations(&pictures, &truth));
         assert!(result.is_ok(), "{name}: {}", result.unwrap_err());
-        // A picture that is two per cent too bright, or one of another camera, is not its mean.
+        // Control: 2% too bright, and another camera.
         let brighter: Vec<[f64; 3]> = truth.iter().map(|pixel| pixel.map(|v| v * 1.02)).collect();
         assert!(
             unbiased(&deviations(&pictures, &brighter)).is_err(),

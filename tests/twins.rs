@@ -1,5 +1,4 @@
-//! The shared mathematics are the same functions in WGSL and in Rust, and what the device gets of them holds no
-//! floating-point operation that a driver may compute in another way.
+//! WGSL and Rust have the same shared functions, and SPIR-V has no floating-point operation that depends on the driver.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +11,7 @@ use wgray_render::records::Packed;
 use crate::scenes;
 use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};
 
-/// Files without a twin, and why.
+/// Files without a twin, with reasons.
 const WITHOUT_TWIN: &[(&str, &str)] = &[
     ("bindings.wgsl", "buffers only"),
     ("completion.wgsl", "the CPU truncates no loop"),
@@ -40,7 +39,7 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
     ),
 ];
 
-/// Files of `crates/render/src/cpu` that are no file's twin.
+/// Rust files that are not twins.
 const NO_TWIN: &[&str] = &[
     "ewa.rs",
     "mod.rs",
@@ -51,7 +50,7 @@ const NO_TWIN: &[&str] = &[
     "traversal",
 ];
 
-/// Functions and records that only one side has, or that differ, and why: file, name, reason.
+/// One-sided or different functions and records: file, name, reason.
 const ONE_SIDED: &[(&str, &str, &str)] = &[
     (
         "linear_primitives.wgsl",
@@ -96,7 +95,6 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// How the functions and records of a WGSL file differ from those of its twin.
 fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String> {
     let module = parse(source);
     let two_sided = |s: &Signature| !ONE_SIDED.iter().any(|(f, name, _)| *f == file && *name == s.name);
@@ -105,7 +103,7 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         .filter(two_sided)
         .collect();
     let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
-    // WGSL names an argument `before` where Rust updates it in place.
+    // WGSL's `before` is updated in place in Rust.
     let in_place = |wgsl: &Signature, twin: &Signature| {
         let names =
             |s: &Signature, name: &str| s.parts.iter().any(|(n, ty)| n == name && Some(ty) == s.result.as_ref());
@@ -149,7 +147,7 @@ fn functions_and_records_are_the_same() {
         if file.starts_with("kernels/") || WITHOUT_TWIN.iter().any(|(f, _)| *f == file) {
             continue;
         }
-        // What reads overrides or bindings, in the kernel: its twins take the scene first.
+        // Files that use overrides or bindings are parsed in a kernel; their twins take the scene first.
         let kernel = kernels.iter().find(|kernel| kernel.start_of(file).is_some());
         let source = if is_shared(file) {
             &shared
@@ -232,8 +230,7 @@ fn every_twin_is_some_files() {
     }
 }
 
-/// SPIR-V's instructions that may be in a kernel, by what they are. Of those on floats: the arithmetic that
-/// `NoContraction` protects, comparisons, conversions, and what moves bits.
+/// Allowed SPIR-V instructions. On floats: arithmetic protected by `NoContraction`, comparisons, conversions, moves.
 mod opcode {
     use std::ops::RangeInclusive;
 
@@ -242,7 +239,7 @@ mod opcode {
         &[3..=8, 10..=11, 14..=17, 19..=24, 28..=30, 32..=33, 41..=46, 71..=72];
     /// Functions, memory and control flow.
     pub const STRUCTURE: &[RangeInclusive<u16>] = &[1..=1, 54..=57, 59..=59, 61..=62, 65..=65, 68..=68, 245..=255];
-    /// Vectors and records put together and taken apart; copies; selections; bits read as another type.
+    /// Composites, copies, selections, bit casts.
     pub const MOVES: &[RangeInclusive<u16>] = &[77..=83, 124..=124, 169..=169];
     /// Integers, logic and comparisons.
     pub const INTEGERS: &[RangeInclusive<u16>] = &[
@@ -260,25 +257,24 @@ mod opcode {
         228..=228, // atomic store and addition: the completion of a dispatch
         234..=234,
     ];
-    /// Comparisons of floats, but for `!=`: naga makes it an ordered one, false where either is no number.
+    /// Floats, except `!=`: naga makes it ordered, false for NaN.
     pub const COMPARISONS: &[RangeInclusive<u16>] = &[156..=157, 180..=181, 184..=191];
-    /// Which must be decorated: negate, add, subtract, multiply, divide, vector times scalar; conversions between floats
-    /// and integers.
+    /// Must be decorated: negate, add, subtract, multiply, divide, vector times scalar; conversions between floats and
+    /// integers.
     pub const PROTECTED: &[u16] = &[127, 129, 131, 133, 136, 142, 109, 110, 111, 112];
 
     pub const FUNCTION: u16 = 54;
     pub const EXTENDED: u16 = 12;
     pub const DECORATE: u16 = 71;
     pub const NO_CONTRACTION: u32 = 42;
-    /// Of GLSL.std.450: absolute value of a float and of an integer, square root, integer minimum,
-    /// maximum and clamp, the place of the first bit.
+    /// GLSL.std.450: absolute values, square root, integer minimum, maximum and clamp, first bit.
     pub const EXTENDED_ALLOWED: &[u32] = &[4, 5, 31, 38, 39, 41, 42, 44, 45, 73, 74, 75];
-    /// Of GLSL.std.450: naga clamps a float with it before it makes an integer of it, which is exact but for NaN.
+    /// GLSL.std.450 `FClamp`: naga's before conversion to integers, exact except for NaN.
     pub const FLOAT_CLAMP: u32 = 43;
     pub const FLOAT_TO_INTEGER: &[u16] = &[109, 110];
 }
 
-/// The floating-point operations of a module that two devices may compute differently.
+/// Returns the operations that may depend on the device.
 fn violations(module: &[u32]) -> Vec<String> {
     let decorated: BTreeSet<u32> = instructions(module)
         .filter(|(op, words)| *op == opcode::DECORATE && words[2] == opcode::NO_CONTRACTION)
@@ -309,7 +305,7 @@ fn violations(module: &[u32]) -> Vec<String> {
     problems
 }
 
-/// Whether a result goes nowhere but into conversions to integers.
+/// Returns true if only conversions to integers use a result.
 fn only_made_integer(module: &[u32], result: u32) -> bool {
     let defines = |op: u16, words: &[u32]| op == opcode::EXTENDED && words[2] == result;
     let functions = instructions(module).skip_while(|(op, _)| *op != opcode::FUNCTION);
@@ -390,9 +386,9 @@ fn an_operation_that_devices_may_compute_differently_is_found() {
     assert_eq!(violations(&without).len(), 1, "one undecorated operation");
 }
 
-/// Where the instructions of a module start.
+/// Returns the positions of the instructions.
 fn positions(module: &[u32]) -> impl Iterator<Item = usize> {
-    let mut at = 5; // behind the header
+    let mut at = 5; // after the header
     instructions(module).map(move |(_, words)| {
         let start = at;
         at += words.len();

@@ -1,6 +1,5 @@
-//! Images have the bits that they had: checksums of the linear images of all scenes, and of those in `tests/unchanged`, are kept in
-//! `tests/unchanged.txt`. A change that is to alter images says so by new lines there, which `WGRAY_TEST_RECORD=1` writes. Other tests
-//! show that the images are right.
+//! Image regression test: checksums of the linear images of all scenes and of `tests/unchanged` against
+//! `tests/unchanged.txt`. After an intended change, `WGRAY_TEST_RECORD=1` updates it. Other tests verify correctness.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -18,18 +17,17 @@ use crate::render::{small_scenes, variations};
 use crate::sources;
 
 const KEPT: &str = "tests/unchanged.txt";
-/// Scenes and models of features that the project's scenes do not have. Those named `random` were random scenes; the files of
-/// [`any_scene::folder`] are beside them.
+/// Features that the project's scenes lack. Those named `random` were generated and use [`any_scene::folder`].
 const FOLDER: &str = "tests/unchanged";
 
-/// The normal, depth, texture coordinates, shape and material: what lines of the file are of.
+/// Returns normal, depth, texture coordinates, shape and material, which the checksums cover.
 fn old_words(hit: &FirstHit) -> [u32; 8] {
     let [x, y, z] = hit.normal.to_array().map(f32::to_bits);
     let [u, v] = hit.uv.to_array().map(f32::to_bits);
     [x, y, z, hit.depth.to_bits(), u, v, hit.shape, hit.material]
 }
 
-/// The scenes and models of [`FOLDER`]. Every other random scene has layers, if its integrator has any.
+/// Loads [`FOLDER`]. Every other path-traced scene has layers.
 fn special_scenes() -> Vec<(String, Packed)> {
     let entries = fs::read_dir(sources::path(FOLDER)).expect("the folder");
     let mut paths: Vec<_> = entries.map(|entry| entry.expect("an entry").path()).collect();
@@ -60,7 +58,7 @@ fn special_scenes() -> Vec<(String, Packed)> {
     paths.into_iter().enumerate().map(packed).collect()
 }
 
-/// Checksums of the CPU's film of a scene, and of its first hits.
+/// Returns the checksums of the CPU's film and first hits.
 fn line(name: &str, packed: &Packed) -> String {
     let Film {
         sums, moments, layers, ..

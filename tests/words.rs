@@ -1,4 +1,4 @@
-//! Values as the 32-bit words of their scalars, in the order of their fields: how they travel to a kernel and back.
+//! Values as 32-bit words for kernels: one per scalar, in field order.
 
 use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray_render::cpu::dielectric::DielectricSample;
@@ -24,13 +24,11 @@ use wgray_render::records::{
 };
 
 pub trait Words: Sized {
-    /// Takes its words from the front.
+    /// Reads from the front and advances.
     fn read(words: &mut &[u32]) -> Self;
-    /// Adds its words.
     fn write(&self, words: &mut Vec<u32>);
 }
 
-/// The scalars that a word may be of.
 macro_rules! scalars {
     ($($ty:ty: |$bits:ident| $from:expr, |$value:ident| $to:expr;)*) => {$(
         impl Words for $ty {
@@ -53,7 +51,7 @@ scalars! {
     bool: |bits| *bits != 0, |x| u32::from(x);
 }
 
-/// Types with nothing but their words, uploaded as they are.
+/// Plain data, uploaded as is.
 macro_rules! pod {
     ($($ty:ty),* $(,)?) => {$(
         impl Words for $ty {
@@ -83,7 +81,7 @@ pod![
     Instance
 ];
 
-/// Records of `crates/render/src/cpu/`; a field that is missing here does not compile.
+/// Records of `crates/render/src/cpu/`; a missing field does not compile.
 macro_rules! records {
     ($($ty:ident { $($field:ident),* $(,)? })*) => {$(
         impl Words for $ty {
@@ -135,7 +133,7 @@ records! {
     }
 }
 
-/// Something that a twin takes as an argument, by value or by reference.
+/// An argument of a twin, by value or by reference.
 pub trait Argument<'a>: Sized {
     type Owned: Words;
     fn of(owned: &'a Self::Owned) -> Self;

@@ -1,26 +1,25 @@
-// The integrator `path`: light from surface to surface. A path goes from the camera to what it meets; at each surface one sample of
-// light is taken, and one direction to go on, and where both find the same light they are weighed against each other: Kajiya, "The
-// Rendering Equation", SIGGRAPH 1986; Veach, "Robust Monte Carlo Methods for Light Transport Simulation", thesis, 1997, chapter 9.
+// The integrator `path`: path tracing with one light sample (NEE) and one BSDF sample per surface, combined by multiple
+// importance sampling (MIS). Kajiya, "The Rendering Equation", SIGGRAPH 1986; Veach, "Robust Monte Carlo Methods for
+// Light Transport Simulation", thesis, 1997, chapter 9.
 
-// A path under way, for one sample of a pixel.
+// The path of one sample of a pixel.
 struct PathState {
-    path: Path,            // the ray to go along
-    radiance: vec3f,       // found so far
-    pdf: f32,              // of the ray's direction, per solid angle; 0 where no sample of light finds what the ray does
-    eta2: f32,             // the product of the squared ratios of indices in the throughput
-    absorption: vec3f,     // of the medium that the ray is in
-    sample: u32,           // of the pixel
+    path: Path,            // with the next ray
+    radiance: vec3f,       // so far
+    pdf: f32,              // of the ray's direction, per solid angle; 0 if NEE cannot sample what it hits
+    eta2: f32,             // product of the squared index ratios in the throughput
+    absorption: vec3f,     // of the ray's medium
+    sample: u32,           // index in the pixel
     weight: f32,           // of the sample
     ended: bool,
-    layers: Layers,        // of the sample, where layers are wanted
-    albedo_recorded: bool,       // whether they have the albedo
-    prev_position: vec3f,  // where the path was last scattered, if a tree chooses lights
-    prev_normal: vec3f,   // the normal there, or 0 where light may come from both sides; also for an environment map
-    skipped_distance: f32, // from the last bounce to the ray's start, past surfaces that are not there, or that the camera does not see
-    skips: u32,            // how many of these there were
+    layers: Layers,        // if enabled
+    albedo_recorded: bool,
+    prev_position: vec3f,  // of the last scattering, for a light tree
+    prev_normal: vec3f,    // there, or 0 if light may arrive from both sides; also for an environment map
+    skipped_distance: f32, // from the last bounce to the ray's origin, by alpha or camera visibility
+    skips: u32,            // number of surfaces skipped by alpha
 }
 
-// The sample's path at the camera.
 fn begin_path(pixel: vec2u, sample: u32) -> PathState {
     let start = camera_sample(pixel, sample);
     var path = Path(start.ray, start.differential, vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);
@@ -33,8 +32,8 @@ fn begin_path(pixel: vec2u, sample: u32) -> PathState {
                      vec3f(0.0), vec3f(0.0), skipped_distance, 0u);
 }
 
-// The path after one more surface. What comes of a path that ends here is computed and not taken, where that is short: software
-// Vulkan computes both sides of a branch, and all that it then keeps of each costs as much again.
+// Advances a path by one surface. Short code also runs for a path that ends, and its results are discarded: software
+// Vulkan executes both sides of a branch, and each value that it keeps adds cost.
 fn advance(before: PathState, pixel: vec2u) -> PathState {
     var state = before;
     let path = before.path;
@@ -71,7 +70,8 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         }
     }
     if ABSORPTION != 0u {
-        // What may not be there says nothing of what is behind it. What is there tells of the whole way to it.
+        // With alpha, a surface may have been skipped on entry and says nothing of the medium. An opaque one determines
+        // the whole segment.
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
         let absorption = select(state.absorption, material.absorption, inside);
         state.path.throughput *= transmittance(absorption, hit.t + state.skipped_distance);
@@ -98,7 +98,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     let goes_on = met & (path.depth < BOUNCES) & (material.kind != EMITTER);
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 1u + 2u * path.depth));
     let other_key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 2u + 2u * path.depth));
-    var choices = vec2u(0u); // of a lobe, of an end
+    var choices = vec2u(0u); // lobe, Russian roulette
     if ((MATERIALS & ~((1u << DIFFUSE) | (1u << EMITTER))) != 0u) | (RR_DEPTH < BOUNCES) {
         choices = decision_set(other_key.zw, state.sample);
     }
@@ -145,12 +145,11 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     return state;
 }
 
-// What a sample adds to its pixel: its radiance times its weight, and its weight.
+// Returns the weighted radiance and the weight.
 fn path_value(state: PathState) -> vec4f {
     return vec4f(state.radiance * state.weight, state.weight);
 }
 
-// The layers' part of that.
 fn path_layers(state: PathState) -> Layers {
     let layers = state.layers;
     let weight = state.weight;
@@ -158,8 +157,8 @@ fn path_layers(state: PathState) -> Layers {
                   layers.normal * weight);
 }
 
-// Two numbers of 32 bits for a decision: a set over the pixel's samples, apart for every key. Burley, "Practical Hash-based Owen
-// Scrambling", JCGT 9(4), 2020, section 5.
+// Returns two 32-bit numbers of a randomized (0,2)-sequence over the pixel's samples, independent for each key. Burley,
+// "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020, section 5.
 fn decision_set(key: vec2u, sample: u32) -> vec2u {
     if PIXEL_PATTERN == RANDOM {
         return hash4(vec4u(key.x, key.y, sample, 0u)).xy;
@@ -167,13 +166,13 @@ fn decision_set(key: vec2u, sample: u32) -> vec2u {
     return sobol_bits(sample, key);
 }
 
-// The same as a point of the unit square.
+// Returns `decision_set` on the unit square.
 fn decision(key: vec2u, sample: u32) -> vec2f {
     let bits = decision_set(key, sample);
     return vec2f(unit_float(bits.x), unit_float(bits.y));
 }
 
-// With light that came by so many bounces, if it is `taken`.
+// Adds radiance that arrives after `bounces` bounces, if `taken`, with indirect samples clamped.
 fn add_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> PathState {
     var state = before;
     var radiance = select(vec3f(0.0), found, taken);
@@ -190,7 +189,7 @@ fn add_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> P
     return state;
 }
 
-// With what the surface that was met, if any was, radiates itself.
+// Adds the emission of the hit surface, with its MIS weight.
 fn add_emission(state: PathState, prim: HitPrimitive, hit: Hit, surface: Surface, material: Material, met: bool) -> PathState {
     let one_sided = material.kind == EMITTER;
     let shines = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
@@ -211,7 +210,7 @@ fn add_emission(state: PathState, prim: HitPrimitive, hit: Hit, surface: Surface
     return add_radiance(state, state.path.throughput * material.emission * weight, met & shines, state.path.depth);
 }
 
-// The path beyond a surface that is not there for it.
+// Continues behind a surface that the ray skips.
 fn past(before: PathState, surface: Surface, at: HitDifferential, t: f32) -> PathState {
     var state = before;
     state.path = pass_through_path(before.path, surface, at);
@@ -228,7 +227,7 @@ fn past(before: PathState, surface: Surface, at: HitDifferential, t: f32) -> Pat
     return state;
 }
 
-// What layers tell of the first surface, and of the first that neither mirrors nor refracts.
+// Records layers of the first hit, and the albedo of the first non-specular one.
 fn record_first_hit_layers(before: PathState, surface: Surface, material: Material) -> PathState {
     var state = before;
     if state.path.depth == 0u {
@@ -242,7 +241,7 @@ fn record_first_hit_layers(before: PathState, surface: Surface, material: Materi
     return state;
 }
 
-// The path mirrored or refracted.
+// Samples reflection or refraction.
 fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, material: Material, random: f32) -> PathState {
     var state = before;
     state.pdf = 0.0;
@@ -277,7 +276,7 @@ fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, m
     return state;
 }
 
-// With the light of one sample of what was chosen, if that is `wanted`.
+// Adds an NEE sample of the selected emitter, if `wanted`.
 fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, chosen: EmitterSelection, u: vec2f,
               wanted: bool, pixel: vec2u) -> PathState {
     let light = sample_emitter(chosen, surface.ray_origin, lit_normal(surface, material), u);
@@ -308,7 +307,7 @@ fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, mate
     return add_radiance(state, found, !hidden, state.path.depth + 1u);
 }
 
-// The path in a direction that is chosen by how the surface reflects.
+// Samples the next direction.
 fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, u: vec2f,
              random: f32) -> PathState {
     var state = before;
@@ -345,7 +344,7 @@ fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material
     return state;
 }
 
-// The same, by a lobe in the frame of the surface, perhaps through it.
+// Applies a sample in the surface's frame, reflected or transmitted.
 fn apply_lobe_sample(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, found: LobeSample) -> PathState {
     var state = before;
     let frame = Tangents(surface.du, surface.dv);
@@ -365,7 +364,7 @@ fn apply_lobe_sample(before: PathState, prim: HitPrimitive, surface: Surface, ma
     return state;
 }
 
-// From a certain bounce on, paths that can carry little light end at random, and those that go on stand for them.
+// Applies Russian roulette from bounce RR_DEPTH on.
 fn with_roulette(before: PathState, random: f32) -> PathState {
     var state = before;
     if state.path.depth < RR_DEPTH {

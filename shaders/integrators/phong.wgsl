@@ -1,8 +1,7 @@
 // The integrator `phong`: direct light by Phong's model, seen directly or through mirrors and glass.
 
-// The radiance that comes along a camera's ray. The paths through glass form a tree; it is walked depth first, each
-// path as far as its end, and the branches that wait are fewer than LEAVES. A path that meets a mirror or glass after
-// BOUNCES bounces is cut off: there it sees the background.
+// Returns the radiance along a camera ray. Paths branch at glass; branches are traced depth first, with at most
+// MAX_SPLIT_DEPTH pending. A path that hits a mirror or glass after BOUNCES bounces sees the background.
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
     var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);
     if CAMERA_INVISIBLE != 0u {
@@ -68,7 +67,7 @@ fn scatter(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample: u32) 
     return glass_path(path, surface, at, material, unit_float(bits.x));
 }
 
-// The radiance of what a path ends at.
+// Returns the radiance at the end of a path.
 fn radiance_from(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
     let plain = material_of(prim);
     if plain.kind == EMITTER {
@@ -106,7 +105,7 @@ fn radiance_from(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample:
     return sum;
 }
 
-// Phong's lobes, summed over all samples of a light.
+// Returns Phong's lobes, summed over a light's samples.
 fn lobes_of_light(prim: HitPrimitive, surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
                   pixel: vec2u, sample: u32) -> Lobes {
     let to = segments_to_light(light, surface.position);

@@ -1,8 +1,7 @@
-//! Wrong command lines and bad scenes: one message, the promised exit code, and no file.
+//! Invalid command lines and scenes: one message, the documented exit code, no output file.
 
 use super::{NO_DRIVER, Place, Ran, SCENE};
 
-/// A failure says why on standard error, and does nothing else.
 #[track_caller]
 fn assert_failed(place: &Place, ran: &Ran, code: i32, message: &str) {
     assert_eq!(ran.code, code, "{}", ran.stderr);
@@ -95,7 +94,7 @@ fn a_size_in_the_option_makes_room_for_the_crop() {
     place.quietly(&["render", "small.toml", "--size", "20x20", "--crop", "0,0,11,7"]);
 }
 
-/// Every rule of scene files has its test beside the parser; these are the ways a message reaches the user.
+/// Checks how messages reach the user. Each rule of scene files is tested next to the parser.
 #[test]
 fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
     let cases = [
@@ -157,7 +156,7 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
     }
 }
 
-/// What only paths have is refused where another integrator is asked for, in the words of the file.
+/// Keys that only apply to the path integrator are rejected under another integrator, with the message of the file.
 #[test]
 fn an_integrator_in_the_option_needs_a_scene_for_it() {
     let place = Place::new();

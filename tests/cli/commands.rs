@@ -1,4 +1,4 @@
-//! The commands beside `render`, and the help.
+//! Commands other than `render`, and the help.
 
 use super::{NO_DRIVER, Place, project_scene};
 

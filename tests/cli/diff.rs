@@ -1,4 +1,4 @@
-//! `wgray diff`: every exit code, every option, and the ends.
+//! `wgray diff`: exit codes, options and edge cases.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use exr::prelude::{Encoding, Image};
 
 use super::{Place, Ran};
 
-/// Writes a PNG of 8 bits; the number of values tells its colours.
+/// Writes an 8-bit PNG; the number of values determines the color type.
 fn png(place: &Place, name: &str, (width, height): (u32, u32), values: &[u8]) {
     let color = match values.len() / (width * height) as usize {
         1 => png::ColorType::Grayscale,
@@ -29,7 +29,6 @@ fn write_png(place: &Place, name: &str, size: (u32, u32), color: png::ColorType,
     encoder.write_header().unwrap().write_image_data(values).unwrap();
 }
 
-/// Writes an EXR of these channels.
 fn exr(place: &Place, name: &str, size: (usize, usize), channels: Vec<(&str, FlatSamples)>) {
     exr_parts(place, name, size, vec![("part", channels)], Encoding::FAST_LOSSLESS);
 }
@@ -61,16 +60,16 @@ fn floats(values: &[f32]) -> FlatSamples {
     FlatSamples::F32(values.to_vec())
 }
 
-/// Red, green and blue of the same values.
+/// Returns channels R, G and B with the same values.
 fn gray(values: &[f32]) -> Vec<(&'static str, FlatSamples)> {
     ["R", "G", "B"].into_iter().map(|name| (name, floats(values))).collect()
 }
 
-/// Two pictures of 4 x 2 pixels, of which one value is 10 steps apart.
+/// Writes two images of 4 x 2 pixels that differ by 10 steps in one value.
 fn two(place: &Place) -> (Vec<u8>, Vec<u8>) {
     let a: Vec<u8> = (0..24).map(|i| i * 9).collect();
     let mut b = a.clone();
-    b[16] += 10; // the pixel (1, 1), green
+    b[16] += 10; // pixel (1, 1), green
     png(place, "a.png", (4, 2), &a);
     png(place, "b.png", (4, 2), &b);
     (a, b)
@@ -142,7 +141,7 @@ fn json_has_the_same_names() {
         assert!(layer[metric].is_number(), "{metric}");
         assert!(text.contains(&format!("\n  {metric:<9}  ")), "{metric}");
     }
-    // what JSON has no number for
+    // infinity, which JSON cannot represent
     let same = json(&place.run(&["diff", "a.png", "a.png", "--json"]));
     assert_eq!(
         (&same["passes"], &same["layers"][0]["psnr"]),
@@ -184,7 +183,7 @@ fn limits_say_what_is_too_much() {
         };
         assert!(!passed && text.contains(&format!("fails: color: {metric} ")), "{text}");
         assert!(text.contains(&format!(" is {word} {limit}\n")), "{text}");
-        // one limit that is kept does not make up for one that is not
+        // one satisfied limit does not make up for a violated one
         assert!(!passes(&[good, bad]).0 && !passes(&[bad, good]).0, "{bad}");
     }
     assert!(passes(&["rmse=0.1", "psnr=20", "flip=0.5"]).0);
@@ -283,12 +282,12 @@ fn what_is_no_picture_exits_with_1() {
             assert_eq!(ran.stdout, "", "{name}");
         }
     }
-    // the cause is told once
+    // the cause is printed only once
     for arguments in [["diff", "absent.png", "a.png"], ["diff", "a.png", "absent.png"]] {
         let told = "error: absent.png: cannot be read: No such file or directory (os error 2)\n";
         assert_eq!(place.run(&arguments).stderr, told);
     }
-    // the name's end says nothing
+    // the format comes from the content, not from the extension
     png(&place, "a.exr", (4, 2), &a);
     says(&place.run(&["diff", "a.exr", "a.png"]), 0, "identical\n");
 }
@@ -302,7 +301,7 @@ fn different_sizes_and_places_differ() {
     says(&ran, 5, "fails: A has 4 x 2 pixels, B 8 x 1\n");
     says(&ran, 5, "note: out.png: not written");
     assert!(!place.path("out.png").exists());
-    // crops of a picture, of one size
+    // two crops of equal size of one image
     for (name, crop) in [("left.exr", "0,0,2,2"), ("right.exr", "2,0,4,2")] {
         place.quietly(&["render", "small.toml", "--device", "cpu", "-o", name, "--crop", crop]);
     }
@@ -334,7 +333,7 @@ fn channels_that_one_lacks_differ_unless_left_out() {
         0,
         "identical\n",
     );
-    // a layer that differs is told, and those that do not are told to be the same
+    // differing layers are listed, and identical ones are reported as such
     let ran = place.run(&["diff", "both.exr", "deeper.exr"]);
     says(&ran, 5, "color R G B: identical\ndepth depth.Z\n");
     says(&ran, 5, "  largest    0.5 in depth.Z at (1, 0): 2 instead of 2.5\n");
@@ -349,7 +348,6 @@ fn channels_that_one_lacks_differ_unless_left_out() {
         5,
         "fails: depth: rmse 0.353553 is above 0.3\n",
     );
-    // the picture shows the layer
     let ran = place.run(&["diff", "both.exr", "deeper.exr", "--out", "out.png"]);
     says(&ran, 5, "note: out.png: shows layer depth\n");
     assert!(place.path("out.png").exists());
@@ -367,7 +365,7 @@ fn what_is_no_finite_number_is_counted_and_fails() {
     exr(&place, "odd.exr", (4, 1), red(&[0.5, nan, inf, -inf]));
     exr(&place, "even.exr", (4, 1), red(&[0.5; 4]));
     let text = "color: 1 NaN and 2 infinite values in A, 1 and 2 in B, the first at (1, 0)";
-    // also where both have the same, and whatever is allowed
+    // also fails for identical files, whatever the limits
     let same = ["diff", "odd.exr", "odd.exr"];
     says(&place.run(&same), 5, text);
     says(&place.run(&[&same[..], &["--fail", "rmse=9"]].concat()), 5, text);
@@ -378,7 +376,7 @@ fn what_is_no_finite_number_is_counted_and_fails() {
         layer["not_finite"],
         serde_json::json!({"nan_a": 1, "nan_b": 0, "infinite_a": 2, "infinite_b": 0, "first": {"x": 1, "y": 0}})
     );
-    // they count as different, and as 0 in both elsewhere
+    // they count as different pixels, and as 0 in the other metrics
     assert_eq!((&layer["different"], &layer["share"]), (&3.into(), &0.75.into()));
     for metric in ["largest", "rmse", "rel_mse", "flip"] {
         assert_eq!(layer[metric], 0.0, "{metric}");
@@ -457,7 +455,7 @@ fn how_a_file_stores_values_does_not_matter() {
         10, 20, 30, 200, 100, 0, 10, 20, 30, 10, 20, 30, 200, 100, 0, 200, 100, 0, 10, 20, 30, 10, 20, 30,
     ];
     png(&place, "rgb.png", (4, 2), &colors);
-    // 0 1 0 0 / 1 1 0 0 of a palette
+    // palette indices 0 1 0 0 / 1 1 0 0
     write_png(
         &place,
         "palette.png",
@@ -490,11 +488,10 @@ fn how_a_file_stores_values_does_not_matter() {
         5,
         " in A at (1, 0): 0.996078 instead of 1\n",
     );
-    // gray is a colour
     png(&place, "gray.png", (2, 1), &[7, 9]);
     png(&place, "grays.png", (2, 1), &[7, 7, 7, 9, 9, 9]);
     says(&place.run(&["diff", "gray.png", "grays.png"]), 0, "identical\n");
-    // EXR: half and float, tiles and lines, packed and not, whole numbers
+    // EXR: half and float, compressed and not, tiles and scan lines, integers
     let values = [0.5_f32, 1.0, 1.5, 65504.0];
     let halves = FlatSamples::F16(values.map(f16::from_f32).to_vec());
     let half = ["R", "G", "B"].map(|name| (name, halves.clone())).to_vec();
@@ -520,7 +517,7 @@ fn how_a_file_stores_values_does_not_matter() {
     exr(&place, "id.exr", (2, 1), numbers(u32::MAX));
     exr(&place, "next.exr", (2, 1), numbers(u32::MAX - 1));
     says(&place.run(&["diff", "id.exr", "id.exr"]), 0, "identical\n");
-    // in floats of 32 bits these would be one
+    // equal if converted to f32
     says(
         &place.run(&["diff", "id.exr", "next.exr"]),
         5,
@@ -545,7 +542,7 @@ fn jpegs_and_interlaced_pngs_are_read() {
     );
     says(&place.run(&["diff", "a.jpg", "decoded.png"]), 0, "identical\n");
     says(&place.run(&["diff", "a.jpg", "b.jpg"]), 5, "128 of 128 pixels");
-    // two pixels in a row: the first is in the first pass of seven, the second in the sixth, each pass with its filter, 0
+    // two pixels in a row: the first in pass 1 of 7, the second in pass 6, each row with filter 0
     let chunk = |kind: &[u8; 4], data: &[u8]| {
         let body = [kind.as_slice(), data].concat();
         let length = (data.len() as u32).to_be_bytes();
@@ -626,7 +623,7 @@ fn standard_input_and_pipes_are_read() {
         1,
         "error: standard input: is not an image",
     );
-    // a full standard output is a failure, a reader that leaves is not
+    // a full standard output is an error, a closed pipe is not
     says(
         &place.shell("sh", "\"$0\" diff a.png a.png > /dev/full"),
         8,
@@ -637,7 +634,7 @@ fn standard_input_and_pipes_are_read() {
 #[test]
 fn a_picture_of_the_difference_shows_where_it_is() {
     let place = Place::new();
-    // one bit of one pixel of half a million
+    // one bit of one pixel in half a million
     let (width, height) = (1000, 500);
     let mut values = vec![60; width * height * 3];
     png(&place, "a.png", (width as u32, height as u32), &values);
@@ -655,14 +652,14 @@ fn a_picture_of_the_difference_shows_where_it_is() {
         assert!(high - low < 40, "{low} {high}");
         (low + high) / 2
     };
-    // the map is to the right of both pictures, below a label of 20 rows and a gap of 8
+    // the map is to the right of both images, below a label of 20 rows and a gap of 8
     let middle = (ends(|place| place.0), ends(|place| place.1));
     let expected = (8 + 2 * (width + 8) + 456, 8 + 20 + 123);
     assert!(
         middle.0.abs_diff(expected.0) < 20 && middle.1.abs_diff(expected.1) < 20,
         "{middle:?} {expected:?}"
     );
-    // the same picture has no line
+    // identical images have no marker
     says(
         &place.run(&["diff", "a.png", "a.png", "--out", "out.png"]),
         0,
@@ -713,7 +710,7 @@ fn the_smallest_and_the_longest_pictures_have_all_figures() {
         let layer = &json(&ran)["layers"][0];
         let figure = |name: &str| layer[name].as_f64().unwrap();
         assert!((figure("rmse") - 30.0 / 255.0).abs() < 1e-12);
-        // two even pictures: (2 a b + C1) / (a² + b² + C1)
+        // SSIM of two constant images: (2 a b + C1) / (a² + b² + C1)
         let (a, b) = (50.0 / 255.0, 80.0 / 255.0);
         let expected = (2.0 * a * b + 1e-4) / (a * a + b * b + 1e-4);
         assert!((figure("ssim") - expected).abs() < 1e-9, "{width} x {height}");

@@ -1,4 +1,4 @@
-//! Files appear when they are whole, and nothing else is left.
+//! Atomic output files: a file appears only when complete, and no temporary files remain.
 
 use std::fs;
 
@@ -58,7 +58,7 @@ mod unix {
         assert_eq!(mode("stats.json"), mode("small.toml"));
     }
 
-    /// A disk that fills up: here, a limit on the size of files.
+    /// Simulates a full disk by a limit on file sizes.
     #[test]
     fn half_a_file_is_not_kept() {
         let place = Place::new();
@@ -83,7 +83,7 @@ mod unix {
         );
     }
 
-    /// A render that would take minutes, of so many samples, once it has begun its file.
+    /// Starts a render that would take minutes and waits until its temporary file exists.
     fn long_render(place: &Place, shell: &str, options: &[&str]) -> Child {
         let before = temporary(place);
         let child = Command::new("sh")
@@ -137,7 +137,7 @@ mod unix {
             let place = Place::new();
             place.write("out.exr", "old");
             let mut child = long_render(&place, "", &["--spp", "400", "--device", device]);
-            std::thread::sleep(Duration::from_millis(100)); // for the handler, which comes after the file
+            std::thread::sleep(Duration::from_millis(100)); // the signal handler is installed after the file is created
             send(signal, &child);
             assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
             assert_eq!(place.files(), ["out.exr"]);
@@ -145,7 +145,7 @@ mod unix {
         }
     }
 
-    /// As `nohup` ignores SIGHUP, and shells SIGINT for what runs in the background.
+    /// Signals that `nohup` (SIGHUP) and shells (SIGINT, for background jobs) ignore for their children.
     #[test]
     fn signals_that_were_ignored_at_the_start_stay_so() {
         for signal in ["HUP", "INT", "TERM"] {
@@ -171,7 +171,7 @@ mod unix {
         let [left] = temporary(&place).try_into().unwrap();
         let process = format!(".wgray-{}@", killed.id());
         assert!(left.starts_with(&process) && left.ends_with("-out.exr"), "{left}");
-        // What is another's, or is not surely ours, stays: another output's, another machine's, a folder, a living one's.
+        // Files of another output, another machine or a running process stay, as does a folder.
         let other_machine = left.replace('@', "@not-");
         let other_output = left.replace("-out.exr", "-about.exr");
         let folder = left.replace(&process, ".wgray-1@");

@@ -1,4 +1,4 @@
-//! `--frames`, `--skip-existing` and `--define`: which pictures are made, of what, under which names.
+//! `--frames`, `--skip-existing` and `--define`: the rendered frames and their file names.
 
 use std::fs;
 use std::time::{Duration, SystemTime};
@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use super::{NO_DRIVER, Place, SCENE};
 use crate::gltf::build::png;
 
-/// The small scene with a camera that goes from the left to the right, in front of it at frame 5.
+/// Writes the test scene with a camera that moves from left to right and is centered at frame 5.
 fn moving(place: &Place, interpolation: &str) {
     let keys = "{ frame = 1, position = [-2, -5, 1] }, { frame = 5, position = [0, -5, 1] }, { frame = 9, position = [2, -5, 1] }";
     let path = format!("fov = 40, path = {{ interpolation = \"{interpolation}\", keys = [{keys}] }} }}");
@@ -14,7 +14,7 @@ fn moving(place: &Place, interpolation: &str) {
     place.write("moving.toml", &SCENE.replace("fov = 40 }", &path));
 }
 
-/// The size and the bits of an EXR's colours. What else is in the file may say where it comes from.
+/// Returns the width and the bits of the colors of an EXR. The metadata may depend on the source file.
 fn bits(place: &Place, name: &str) -> (u32, Vec<u32>) {
     let picture = image::open(place.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     let picture = picture.into_rgb32f();
@@ -30,7 +30,7 @@ fn quietly(place: &Place, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &CPU[..]].concat());
 }
 
-/// A render that must be refused, by this code and message, with nothing written.
+/// Runs a render that must be rejected with this code and message and write no file.
 fn refused(place: &Place, arguments: &[&str], code: i32, told: &str) {
     let before = place.files();
     let ran = place.run(&[&["render"], arguments, &CPU[..]].concat());
@@ -55,7 +55,6 @@ fn a_frame_is_what_the_camera_sees_from_there() {
             ["moving.toml", "out.001.exr", "out.005.exr", "out.009.exr"].map(String::from)
         );
         for (frame, x) in [(1, -2), (5, 0), (9, 2)] {
-            // The same camera, written into the scene without a path.
             place.write("still.toml", &SCENE.replace("[0, -5, 1]", &format!("[{x}, -5, 1]")));
             quietly(&place, &["still.toml", "-o", "still.exr"]);
             assert_eq!(
@@ -65,7 +64,7 @@ fn a_frame_is_what_the_camera_sees_from_there() {
             );
         }
         assert_ne!(bits(&place, "out.001.exr"), bits(&place, "out.009.exr"));
-        // Half the way, by itself and with others, in any order.
+        // Halfway between two keys, as a single frame and in any order with others.
         place.write("still.toml", &SCENE.replace("[0, -5, 1]", "[-1, -5, 1]"));
         quietly(&place, &["still.toml", "-o", "still.exr"]);
         quietly(&place, &["moving.toml", "--frames", "3", "-o", "alone.exr"]);
@@ -73,7 +72,7 @@ fn a_frame_is_what_the_camera_sees_from_there() {
         for name in ["alone.exr", "3.exr"] {
             assert_eq!(bits(&place, name), bits(&place, "still.exr"), "{name}");
         }
-        // Without a frame it is as it stands by itself.
+        // Without `--frames`, the camera of the file outside of its path.
         quietly(&place, &["moving.toml", "-o", "itself.exr"]);
         assert_eq!(bits(&place, "itself.exr"), bits(&place, "out.005.exr"));
     }
@@ -129,7 +128,7 @@ fn names_have_the_numbers_and_folders_keep_their_marks() {
     assert_eq!(inner, wanted);
     let stats: serde_json::Value = serde_json::from_slice(&place.read("s10.json")).unwrap();
     assert_eq!(stats["frame"], 10);
-    // The name that the scene gives.
+    // The default name, from the scene file.
     fs::rename(place.path("moving.toml"), place.path("m#.toml")).unwrap();
     quietly(&place, &["m#.toml", "--frames", "3,12345"]);
     quietly(&place, &["m#.toml"]);
@@ -137,7 +136,7 @@ fn names_have_the_numbers_and_folders_keep_their_marks() {
     for name in ["m#.0003.png", "m#.12345.png", "m#.png"] {
         assert!(files.contains(&name.to_owned()), "{files:?}");
     }
-    // One frame needs no number, and without frames a mark is a letter.
+    // A single frame needs no number, and without `--frames` a # is literal.
     quietly(&place, &["m#.toml", "--frames", "4", "-o", "one.png"]);
     quietly(&place, &["m#.toml", "-o", "#.##.png"]);
     assert!(place.files().contains(&"#.##.png".to_owned()));
@@ -157,7 +156,7 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
     refused(&place, &figures, 2, &format!("--stats: s.json: {rule}"));
     let twice = ["moving.toml", "--frames", "1-2", "-o", "#.#.png"];
     refused(&place, &twice, 2, "--output: #.#.png: must have a single group of #");
-    // Names that the numbers make the same.
+    // Names that collide once the numbers are inserted.
     let same = ["moving.toml", "--frames", "1-12", "-o", "b#.png", "-o", "b1#.png"];
     refused(
         &place,
@@ -165,7 +164,7 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
         2,
         "--output: b11.png: frames 1 and 11 would be written to this file",
     );
-    // What is wrong with the last one alone is told before the first is rendered.
+    // Problems of the last frame are reported before the first one is rendered.
     place.write("2.exr", "");
     let mut mode = fs::metadata(place.path("2.exr")).unwrap().permissions();
     mode.set_readonly(true);
@@ -262,12 +261,12 @@ fn frames_that_are_there_stay_if_that_is_asked_for() {
     };
     again("note: skipped 3 of 3: the output files exist\n");
     assert!(all.into_iter().all(is_old));
-    // A frame is there if all of its files are.
+    // A frame is complete only if all of its files exist.
     fs::remove_file(place.path("2.normal.png")).unwrap();
     again("note: skipped 2 of 3: the output files exist\n");
     let renewed: Vec<_> = all.into_iter().filter(|name| !is_old(name)).collect();
     assert_eq!(renewed, ["2.png", "2.normal.png"]);
-    // Figures are files too, and may be streams.
+    // Statistics count as output files, and may be streams.
     let more = [&["render"], &arguments[..], &CPU, &["--stats", "#.json"]].concat();
     assert_eq!(place.run(&more).stderr, "");
     assert!(place.run(&more).stderr.starts_with("note: skipped 3 of 3"));
@@ -278,11 +277,9 @@ fn frames_that_are_there_stay_if_that_is_asked_for() {
         "{}",
         ran.stderr
     );
-    // Without being asked for, all are made anew.
     all.iter().copied().for_each(age);
     quietly(&place, &arguments[..7]);
     assert!(!all.into_iter().any(is_old));
-    // One picture by itself.
     place.write("p.png", "");
     let one = [
         &["render", "moving.toml", "-o", "p.png", "--skip-existing", "--quiet"],
@@ -321,7 +318,7 @@ fn a_camera_without_a_view_is_refused_before_anything_is_rendered() {
 fn a_frame_that_fails_ends_the_run_and_what_was_done_stays() {
     let place = Place::new();
     moving(&place, "linear");
-    // It is no file, and was none when all were looked at: the second frame opens it, and it takes nothing.
+    // /dev/full passes the check at the start, as it is not a regular file. Writing the second frame to it fails.
     #[cfg(target_os = "linux")]
     {
         std::os::unix::fs::symlink("/dev/full", place.path("s.2.json")).unwrap();
@@ -437,7 +434,7 @@ fn a_defined_render_is_that_of_an_edited_scene() {
         quietly(&place, &["small.toml", "-o", "plain.exr"]);
         assert_ne!(bits(&place, "defined.exr"), bits(&place, "plain.exr"), "{name}");
     }
-    // The option of the same goes before it.
+    // A dedicated option takes precedence over `--define`.
     quietly(
         &place,
         &["small.toml", "-o", "a.exr", "-D", "render.seed=9", "--seed", "4"],
@@ -481,7 +478,6 @@ fn bad_defines_are_told() {
         assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{define}: {}", ran.stderr);
         assert!(ran.stderr.contains(told), "{define}: {}", ran.stderr);
     }
-    // The file's own mistakes are told with its lines.
     place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
     refused(
         &place,
@@ -490,7 +486,7 @@ fn bad_defines_are_told() {
         "bad.toml:22: shapes[0].radius: -1 must",
     );
     quietly(&place, &["bad.toml", "-o", "x.png", "-D", "shapes[0].radius=1"]);
-    // An invalid value of a model names the option too.
+    // An invalid value for a model file without a scene also names the option.
     place.write("tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     for (define, told) in [
         (

@@ -1,11 +1,10 @@
-//! glTF files on the command line: what is shown of them, and the scenes that `wgray convert` makes of them.
+//! glTF files on the command line: rendering options and `wgray convert`.
 
 use std::fs;
 
 use super::{Place, SCENE, read_png};
 use crate::model::Model;
 
-/// Small and quick.
 const QUICK: [&str; 6] = ["--size", "24x16", "--spp", "2", "--device", "cpu"];
 
 fn place(model: &Model) -> Place {
@@ -26,7 +25,7 @@ fn quietly(place: &Place, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &QUICK].concat());
 }
 
-/// The bits of what is rendered with these options.
+/// Returns the pixels as bits, rendered with these options.
 fn bits(place: &Place, arguments: &[&str]) -> Vec<u32> {
     quietly(place, &[arguments, &["-o", "bits.exr"]].concat());
     pixels(place, "bits.exr")
@@ -62,7 +61,7 @@ fn a_model_by_itself_is_a_picture() {
             "{line}"
         );
     }
-    // The picture is the model's in any form, and reaches its margins: 5 % of 24 x 16 pixels are less than one.
+    // Both file forms give the same image. Its margin of 5 % is less than a pixel.
     quietly(
         &place,
         &["box.glb", "--background", "none", "-o", "box.png", "-o", "box.exr"],
@@ -90,7 +89,6 @@ fn a_model_by_itself_is_a_picture() {
     );
     let middle = picture.get_pixel(12, 10).0;
     assert!(middle[0] > middle[2], "the box is of clay: {middle:?}");
-    // Without a word on its name.
     quietly(&place, &["box.gltf"]);
     assert_eq!(read_png(&place.path("box.png")).0, 24);
 }
@@ -121,7 +119,6 @@ fn each_option_shows_something_else_and_names_and_numbers_are_alike() {
     );
     other(&[&["--variant", "golden"], &["--variant", "0"]], &mut seen);
     other(&[&["--environment", "sky"]], &mut seen);
-    // What is chosen anyway, and the first camera.
     for options in [
         ["--camera", "front camera"],
         ["--camera", "0"],
@@ -134,7 +131,7 @@ fn each_option_shows_something_else_and_names_and_numbers_are_alike() {
             "{options:?}"
         );
     }
-    // The camera's aspect is the picture's, unless a size is named.
+    // The aspect ratio of the image is the camera's, unless a size is given.
     for (options, size) in [
         (&["--camera", "0"][..], "720 x 480"),
         (&["--camera", "1"], "720 x 720"),
@@ -259,7 +256,7 @@ fn frames_are_moments_of_the_animation() {
         assert_eq!(pixels(&place, frame), moment(&place, time), "{frame}");
     }
     assert_ne!(pixels(&place, "f.00.exr"), pixels(&place, "f.12.exr"));
-    // A moment that is named stays.
+    // `--time` takes precedence over the frame.
     let ran = place.run(
         &[
             &[
@@ -279,7 +276,7 @@ fn frames_are_moments_of_the_animation() {
     assert_eq!(ran.code, 0);
     assert!(ran.stderr.contains("all frames are equal"), "{}", ran.stderr);
     assert_eq!(pixels(&place, "named.exr"), moment(&place, "0.25"));
-    // A camera that frames it stands still: what rises does not make the rest smaller.
+    // A generated camera does not move: a rising part does not change the framing of the rest.
     Model::default().write_glb(place.folder(), "box.glb");
     quietly(&place, &["box.glb", "--frames", "0-18:6", "-o", "s##.exr"]);
     quietly(&place, &["box.glb", "--frames", "18", "-o", "alone.exr"]);
@@ -339,7 +336,6 @@ fn a_converted_scene_has_the_same_bits() {
         assert!(text.contains("file = \"models/a box.glb\""), "{text}");
         assert!(text.lines().count() < 45, "{text}");
     }
-    // The file is a scene like any other.
     let ran = place.run(&["check", "scenes/box.toml"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
 }
@@ -393,7 +389,6 @@ fn a_conversion_keeps_what_it_reads_and_names_files_from_where_it_is() {
         3,
         "lies outside of the scene's folder",
     );
-    // A scene in TOML is written again.
     place.quietly(&["convert", "small.toml", "-o", "other.toml"]);
     place.quietly(&["render", "small.toml", "-o", "a.exr", "--device", "cpu"]);
     place.quietly(&["render", "other.toml", "-o", "b.exr", "--device", "cpu"]);
@@ -423,7 +418,7 @@ fn info_lists_what_options_select() {
         (&"box.glb".into(), &serde_json::json!(["golden"]))
     );
     assert_eq!(model["cameras"].as_array().map(Vec::len), Some(2));
-    // Each number and name that is listed can be selected.
+    // Each listed number and name can be selected.
     for (list, option) in [
         ("cameras", "--camera"),
         ("animations", "--animation"),
@@ -462,7 +457,6 @@ fn a_conversion_overwrites_a_file_only_by_force() {
     place.quietly(&[&convert[..], &["--force"]].concat());
     assert!(place.read("mine.toml").starts_with(b"# box.glb, as a scene. "));
     refused(&place, &convert, 2, "already exists");
-    // Force does not replace an input.
     let same = ["convert", "mine.toml", "-o", "./mine.toml", "--force"];
     refused(&place, &same, 2, "is an input of the scene");
 }
@@ -491,7 +485,7 @@ fn a_conversion_prints_the_asset_root_to_pass() {
 #[test]
 fn a_turntable_shows_a_model_from_all_around() {
     let place = place(&Model::default());
-    // 5 % of these are two pixels and more.
+    // The margin of 5 % is at least two pixels.
     let small = ["--size", "60x40", "--spp", "1", "--device", "cpu"];
     let around = [
         "render",

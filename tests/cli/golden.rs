@@ -1,4 +1,4 @@
-//! The example of `docs/golden-pictures.md`, as a reader runs it.
+//! The example of `docs/golden-pictures.md`, run as documented.
 #![cfg(unix)]
 
 use std::fs;
@@ -7,7 +7,6 @@ use std::process::Command;
 use super::{Ran, program};
 use crate::sources::path as project;
 
-/// A copy of the example.
 struct Example {
     folder: tempfile::TempDir,
 }
@@ -42,7 +41,7 @@ impl Example {
         )
     }
 
-    /// Makes the change that the page makes.
+    /// Applies the change that the page describes.
     fn change(&self) {
         let scene = self.folder.path().join("scenes/ball.toml");
         let text = fs::read_to_string(&scene).unwrap();
@@ -78,7 +77,6 @@ fn a_changed_scene_fails_as_the_page_says_until_it_is_taken() {
         ran.stdout.contains("out/balls.png against golden/balls.png"),
         "all are checked"
     );
-    // the picture in the page is the one that is made
     let made = image::open(example.folder.path().join("out/ball.diff.png")).unwrap();
     assert_eq!(
         made,
@@ -102,7 +100,7 @@ fn a_scene_without_a_golden_picture_fails_until_it_has_one() {
     assert!(ran.stderr.contains("golden/new.exr: cannot be read"), "{}", ran.stderr);
     assert_eq!(example.check(&["update"]).stdout, "golden/new.exr is new\n");
     assert_eq!(example.check(&[]).code, 0);
-    // a scene that cannot be rendered is told as such
+    // a scene that cannot be rendered keeps its own exit code
     fs::write(scenes.join("new.toml"), "image = 3").unwrap();
     assert_eq!(example.check(&[]).code, 3);
 }
@@ -110,7 +108,7 @@ fn a_scene_without_a_golden_picture_fails_until_it_has_one() {
 #[test]
 fn the_page_names_what_there_is() {
     let (page, help) = (page(), super::Place::new().run(&["diff", "--help"]).stdout);
-    let help = help.split_whitespace().collect::<Vec<_>>().join(" "); // lines are as long as the terminal
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" "); // help lines wrap at the terminal width
     for metric in [
         "different",
         "largest",

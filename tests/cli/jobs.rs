@@ -1,4 +1,4 @@
-//! Jobs that end early and go on, and pictures in parts: by the program itself, its signals and its files.
+//! Interrupted and resumed renders, and images in parts, tested through the program with signals and damaged files.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::{Place, Ran, program};
 
-/// A render that takes a few seconds, with layers of both kinds.
+/// A render that takes a few seconds, with an auxiliary layer.
 const LONG: [&str; 8] = [
     "render",
     "small.toml",
@@ -20,7 +20,7 @@ const LONG: [&str; 8] = [
     "normal",
 ];
 
-/// The uninterrupted picture.
+/// Returns the image of an uninterrupted render.
 fn expected(place: &Place) -> Vec<u8> {
     let mut arguments = LONG.to_vec();
     arguments.extend(["-o", "whole.exr", "--reproducible", "--device", "cpu"]);
@@ -32,14 +32,14 @@ fn start(place: &Place, arguments: &[&str]) -> Child {
     Command::new(program())
         .current_dir(place.path("."))
         .args(LONG)
-        .args(["--reproducible", "--threads", "1"]) // so that it takes a while on any machine
+        .args(["--reproducible", "--threads", "1"]) // takes a while on any machine
         .args(arguments)
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program")
 }
 
-/// Waits until there is more in the checkpoint than so many bytes.
+/// Waits until the checkpoint is larger than this number of bytes.
 fn wait_for(place: &Place, file: &str, bytes: u64) {
     let start = Instant::now();
     while fs::metadata(place.path(file)).map_or(0, |data| data.len()) <= bytes {
@@ -48,13 +48,13 @@ fn wait_for(place: &Place, file: &str, bytes: u64) {
     }
 }
 
-/// Waits until the program has worked for a while by its own clock, so that on a busy machine too its handlers are there and something is done.
+/// Waits for 0.15 s of CPU time of the process: its signal handlers are installed then, even on a busy machine.
 fn work_of(child: &Child) {
     let ticks = || {
         let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
         let fields: Vec<&str> = stat.rsplit(") ").next()?.split(' ').collect();
         let number = |i: usize| fields.get(i)?.parse::<u64>().ok();
-        Some(number(11)? + number(12)?) // hundredths of a second, of itself and in the kernel
+        Some(number(11)? + number(12)?) // user and system time in 1/100 s
     };
     let start = Instant::now();
     while ticks().is_some_and(|ticks| ticks < 15) && start.elapsed() < Duration::from_secs(60) {
@@ -73,7 +73,7 @@ fn ended(child: Child) -> Ran {
     )
 }
 
-/// Runs the program on the given checkpoint, from what is there to the end.
+/// Resumes from the checkpoint and renders to the end.
 fn go_on(place: &Place, device: &str) -> Ran {
     let mut arguments = LONG.to_vec();
     arguments.extend(["--reproducible", "--checkpoint", "c", "--resume", "--device", device]);
@@ -109,7 +109,7 @@ fn a_killed_render_goes_on_where_it_was() {
     let ran = go_on(&place, "cpu");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(place.read("out.exr") == expected);
-    // It remains, whole, and is gone on from at once.
+    // The complete checkpoint remains and can be resumed from at once.
     let ran = go_on(&place, "gpu");
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(place.read("out.exr") == expected);
@@ -131,12 +131,12 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
         ("-TERM", 143, &[], kept("SIGTERM")),
         ("-HUP", 129, &[], kept("SIGHUP")),
         ("-TERM", 75, requeue, retry),
-        ("-INT", 130, requeue, kept("Ctrl+C (SIGINT)")), // the user ended it
+        ("-INT", 130, requeue, kept("Ctrl+C (SIGINT)")), // the user interrupted it
     ] {
         if !more.is_empty() && place.path("c").exists() {
-            fs::remove_file(place.path("c")).expect("a checkpoint"); // so that there is work left
+            fs::remove_file(place.path("c")).expect("a checkpoint"); // so that work is left
         }
-        // Nothing is kept for an hour, but at the signal.
+        // The checkpoint is written at the signal only.
         let child = start(
             &place,
             &[
@@ -202,7 +202,7 @@ fn a_second_writer_waits_and_goes_on() {
     let ran = ended(second);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(place.read("second.exr") == expected);
-    // What the first had done was not done again: the file has each finished piece once.
+    // The second process reused the pieces of the first: the file contains each finished piece once.
     let third = start(
         &place,
         &[&options[..], &["-o", "third.exr", "--stats", "stats.json"]].concat(),
@@ -216,7 +216,7 @@ fn a_second_writer_waits_and_goes_on() {
     );
 }
 
-/// SIGTERM requests another attempt before the render has begun, too.
+/// SIGTERM before the render has started also exits with the code for another attempt.
 #[cfg(target_os = "linux")]
 fn a_farm_ends_one_that_waits(place: &Place, options: &[&str]) {
     let waiting = start(place, &[options, &["-o", "third.exr", "--requeue-exit", "75"]].concat());
@@ -235,7 +235,7 @@ fn a_farm_ends_one_that_waits(place: &Place, options: &[&str]) {
     assert_eq!(ended(waiting).code, 75);
 }
 
-/// What is written after a checkpoint that is there, under other options, or is none.
+/// Checks the messages for a checkpoint that exists, belongs to other options, or is not a checkpoint.
 #[test]
 fn checkpoints_of_other_jobs_are_refused() {
     let place = Place::new();
@@ -316,7 +316,6 @@ fn checkpoints_of_other_jobs_are_refused() {
     }
 }
 
-/// In a folder no job meets what another has left.
 #[test]
 fn a_folder_has_a_checkpoint_for_each_job() {
     let place = Place::new();
@@ -353,7 +352,6 @@ fn a_folder_has_a_checkpoint_for_each_job() {
         let now = files();
         let new: Vec<_> = now.difference(&seen).cloned().collect();
         let [new] = &new[..] else { panic!("{more:?}: {new:?}") };
-        // It is there now, as any other would be.
         let ran = run(more);
         let told = format!("error: --checkpoint: kept/{new}: already exists; pass --resume to continue it");
         assert!(
@@ -370,7 +368,7 @@ fn a_folder_has_a_checkpoint_for_each_job() {
     assert!(ran.stderr.contains("--checkpoint: kept: needs #"), "{}", ran.stderr);
 }
 
-/// Pieces of another job, moved behind the header of this one.
+/// Pieces of another job behind the header of this one are rejected.
 #[test]
 fn pieces_of_another_job_are_not_believed() {
     let place = Place::new();
@@ -391,7 +389,7 @@ fn pieces_of_another_job_are_not_believed() {
     assert!(place.read("c.exr") == place.read("a.exr") && place.read("a.exr") != place.read("b.exr"));
 }
 
-/// Somebody moves, removes or replaces the checkpoint while it is written.
+/// The checkpoint is moved, removed or replaced while the render writes to it.
 #[cfg(unix)]
 #[test]
 fn a_checkpoint_that_goes_away_is_put_back_or_told_of() {
@@ -452,7 +450,6 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
         ran.stderr
     );
     assert!(place.read("out.exr") == expected);
-    // An append that was cut short.
     let mut file = fs::File::options().append(true).open(place.path("c")).expect("a file");
     file.write_all(&bytes[200..900]).expect("bytes");
     let ran = go_on(&place, "cpu");
@@ -461,13 +458,13 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
     assert!(place.read("out.exr") == expected);
 }
 
-/// A disk that fills up under a render: the picture fails, what was kept is there, and with room the work goes on.
+/// A full disk during a render: the output fails, the checkpoint remains, and with free space the render resumes.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_loses_no_kept_work() {
     let place = Place::new();
     let expected = expected(&place);
-    // 250 KiB at most for each file: the checkpoint takes 400.
+    // At most 250 KiB for each file; the checkpoint needs 400.
     let line = "trap '' XFSZ; ulimit -f 500; exec \"$0\" render small.toml --size 160x160 --spp 300 --aov normal \
                 --reproducible --checkpoint c --checkpoint-interval 0.02 -o out.exr --exr-compression none --device cpu";
     let ran = place.shell("sh", line);
@@ -485,8 +482,8 @@ fn a_full_disk_loses_no_kept_work() {
     assert!(place.read("out.exr") == expected);
 }
 
-/// A file system that is full, or read-only, in a name space of its own; where the system has none for us, the limit on files
-/// above stands for the first, and the mode of a folder for the second.
+/// A full and a read-only file system, in a separate mount namespace. Where that is not permitted, the file size limit
+/// above and a read-only folder stand in for them.
 #[cfg(target_os = "linux")]
 #[test]
 fn full_and_read_only_file_systems() {
@@ -589,7 +586,7 @@ fn parts_make_the_same_picture() {
     );
     render(&["--tile", "2/3", "-o", "other.part"]);
     refused(&[&shuffled[..], &["other.part"]].concat(), "other.part: overlaps");
-    // Parts of several divisions that fit.
+    // Parts of different divisions that fit together.
     render(&["--tile", "1/1", "-o", "all.part"]);
     assert_eq!(merge(&["all.part"]).code, 0);
     for end in ["png", "exr", "normal.png", "depth.png", "instance.png"] {
@@ -740,7 +737,7 @@ fn a_time_limit_ends_with_a_whole_picture() {
             ran.stderr
         );
     }
-    // Enough time: the same picture. And one that was stopped goes on to the same picture.
+    // With enough time the limit has no effect, and a stopped render resumes to the same image.
     let short = [
         "render",
         "small.toml",

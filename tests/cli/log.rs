@@ -1,4 +1,4 @@
-//! Messages as JSON: each line of standard error is an object, whatever happens.
+//! `--log-format json`: each line of standard error is a JSON object.
 
 #[cfg(unix)]
 use std::io::{BufRead as _, BufReader};
@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::program;
 use super::{NO_DRIVER, Place, Ran, SCENE};
 
-/// The lines of standard error.
+/// Parses the lines of standard error and checks the keys that all objects have.
 fn lines(ran: &Ran) -> Vec<Value> {
     let lines = ran.stderr.lines().map(|line| {
         let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
@@ -64,7 +64,6 @@ fn a_render_tells_how_far_it_is_and_what_it_took() {
         (&last["files"][0], &last["stats"]["width"]),
         (&"a.png".into(), &200.into())
     );
-    // The same without lines of progress, and with all there is.
     let (_, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--progress", "none"]);
     assert_eq!(lines.len(), 1, "{lines:?}");
     let (_, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--verbose"]);
@@ -87,7 +86,6 @@ fn a_render_tells_how_far_it_is_and_what_it_took() {
         "{lines:?}"
     );
     assert!(lines.iter().any(|line| line["level"] == "warning"), "{lines:?}");
-    // Text is as it was.
     let ran = place.run(&["render", "small.toml", "-o", "a.png", "--log-format", "text"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
 }
@@ -183,10 +181,9 @@ fn errors_tell_their_place_and_exit_code() {
             "{usage}"
         );
     }
-    // Of several scenes each has its line.
     let (code, lines) = log(&place, &["check", "value.toml", "syntax.toml", "small.toml"]);
     assert_eq!((code, lines.len()), (3, 2));
-    // Names that are no words are one line too.
+    // Control characters in a name do not break the line.
     let odd = one(&["render", "a\n\"b\".toml"]);
     assert_eq!(odd["file"], "a\n\"b\".toml");
 }
@@ -234,7 +231,7 @@ fn a_signal_is_an_error_with_its_exit_code() {
     let mut told = BufReader::new(child.stderr.take().expect("a pipe"))
         .lines()
         .map_while(Result::ok);
-    // From there on signals are deferred.
+    // From here on the signals are handled.
     assert!(told.any(|line| line.contains("\"ready\"")));
     // SAFETY: the process is a child that was not waited for.
     unsafe { libc::kill(child.id() as i32, libc::SIGTERM) };

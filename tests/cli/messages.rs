@@ -1,4 +1,4 @@
-//! Messages: none ends a job, whatever became of the stream that they go to, and each says what helps.
+//! Text messages: a closed or full stream does not fail a render, and each message names a remedy.
 
 use super::{Place, Ran, SCENE};
 
@@ -10,22 +10,22 @@ mod unix {
         place.shell("sh", line)
     }
 
-    /// Streams that take nothing: full, closed, or with a reader who has gone.
-    const NO_PRIMITIVE: [&str; 3] = ["2>/dev/full", "2>&-", "2>&1 >&3 3>&- | true"];
+    /// Redirections to a stream that cannot be written to: full, closed, or without a reader.
+    const UNWRITABLE: [&str; 3] = ["2>/dev/full", "2>&-", "2>&1 >&3 3>&- | true"];
 
     #[test]
     fn a_render_is_done_whatever_became_of_standard_error() {
-        for nowhere in NO_PRIMITIVE {
+        for redirection in UNWRITABLE {
             for options in [
                 "--progress plain --size 64x64",
                 "--verbose",
-                // The driver is not there: a warning.
+                // No driver is found, which prints a warning.
                 "--device auto",
             ] {
                 let place = Place::new();
                 let driver = "VK_DRIVER_FILES=/nonexistent.json VK_ICD_FILENAMES=/nonexistent.json";
                 let line = format!(
-                    "{{ {{ {driver} $0 render small.toml {options}; echo $? > code; }} {nowhere}; }} 3>&1; exit $(cat code)"
+                    "{{ {{ {driver} $0 render small.toml {options}; echo $? > code; }} {redirection}; }} 3>&1; exit $(cat code)"
                 );
                 let ran = sh(&place, &line);
                 assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
@@ -42,7 +42,7 @@ mod unix {
     fn exit_codes_stay_whatever_became_of_standard_error() {
         let place = Place::new();
         place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
-        for nowhere in NO_PRIMITIVE {
+        for redirection in UNWRITABLE {
             for (command, code) in [
                 ("check bad.toml", 3),
                 ("render bad.toml", 3),
@@ -52,14 +52,14 @@ mod unix {
                 ("dev bad.toml --no-page", 2),
                 ("", 2),
             ] {
-                let line = format!("{{ {{ $0 {command}; echo $? > code; }} {nowhere}; }} 3>&1; exit $(cat code)");
+                let line = format!("{{ {{ $0 {command}; echo $? > code; }} {redirection}; }} 3>&1; exit $(cat code)");
                 let ran = sh(&place, &line);
                 assert_eq!(ran.code, code, "{line}: {}", ran.stderr);
             }
         }
     }
 
-    /// A reader who has gone has seen enough; a full disk is a failure.
+    /// A closed pipe is not an error, a full disk is.
     #[test]
     fn what_is_printed_is_complete_or_the_exit_code_says_so() {
         let place = Place::new();
@@ -92,7 +92,7 @@ mod unix {
     }
 }
 
-/// The message of a scene in which a line was put in place of the radius, or of one of [render].
+/// Returns the message for the scene with `from` replaced by `to`.
 fn told(from: &str, to: &str) -> String {
     let place = Place::new();
     assert!(SCENE.contains(from), "{from}");
@@ -175,7 +175,7 @@ fn values_of_a_wrong_kind_are_told_with_the_right_kind() {
     }
 }
 
-/// What the parser says of a whole number is what the checks say of it.
+/// The parser and the validation print the same range for an integer.
 #[test]
 fn a_whole_numbers_range_is_the_same_wherever_it_is_told() {
     let render = |line: &str| (String::from("[render]"), format!("[render]\n{line}"));
@@ -329,7 +329,7 @@ fn words_of_a_bad_command_line_are_shown_and_short() {
         assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{arguments:?}");
         assert!(ran.stderr.starts_with(told), "{arguments:?}: {}", ran.stderr);
     }
-    // What is plain has its advice.
+    // Plain words get a suggestion.
     let ran = place.run(&["rendr"]);
     assert!(ran.stderr.contains("'render'"), "{}", ran.stderr);
     let long = "a.".repeat(30_000);

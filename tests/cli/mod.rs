@@ -1,4 +1,4 @@
-//! The program, driven as a user drives it.
+//! End-to-end tests of the `wgray` binary.
 
 mod bad_input;
 mod commands;
@@ -31,8 +31,8 @@ use std::path::Path;
 use crate::place::Place;
 use crate::sources::path as project;
 
-/// Lets the programs that this process starts be interrupted, and told that their terminal is gone. A shell starts jobs in the background so
-/// that they ignore the one, `nohup` starts them so that they ignore the other, and so would the programs.
+/// Restores the default actions of SIGINT and SIGHUP for child processes. Shells ignore the former for background jobs,
+/// `nohup` ignores the latter.
 #[cfg(unix)]
 pub fn heed_interrupts() {
     // SAFETY: setting the default action of a signal has no precondition; no handler of this process is lost.
@@ -42,13 +42,12 @@ pub fn heed_interrupts() {
     }
 }
 
-/// The result of a run of the program.
 struct Ran {
     code: i32,
     stdout: String,
-    /// Standard error without the lines of `summary`.
+    /// Standard error without the lines in `summary`.
     stderr: String,
-    /// The lines about written images, `box.png: 1024 x 1024, 64 spp, 12.3 s`, and the progress that slow machines print.
+    /// Lines about written images, `box.png: 1024 x 1024, 64 spp, 12.3 s`, and progress lines of slow machines.
     summary: Vec<String>,
 }
 
@@ -67,7 +66,6 @@ impl Ran {
     }
 }
 
-/// Returns standard error without the lines about written images.
 pub fn without_summary(stderr: &str) -> String {
     stderr.split_inclusive('\n').filter(|line| !is_summary(line)).collect()
 }
@@ -90,7 +88,7 @@ fn is_summary(line: &str) -> bool {
     }
 }
 
-/// 10 x 6 pixels, in which everything random differs from pixel to pixel.
+/// A scene of 10 x 6 pixels in which all random numbers differ between pixels.
 const SCENE: &str = r#"image = { width = 10, height = 6 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
 [render]
@@ -122,12 +120,12 @@ tangent = [1, 0, 0]
 "#;
 
 impl Place {
-    /// A folder with a small scene in it.
+    /// Creates a folder with the scene `small.toml`.
     fn new() -> Place {
         Place::with_file("small.toml", SCENE)
     }
 
-    /// The names of the files, hidden ones too, but for the small scene.
+    /// Returns the names of all files, hidden ones included, except `small.toml`.
     fn files(&self) -> Vec<String> {
         self.files_but(|name| name == "small.toml")
     }
@@ -136,7 +134,6 @@ impl Place {
         self.run_with(arguments, &[])
     }
 
-    /// Runs the program with further variables in its environment.
     fn run_with(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Ran {
         let mut command = assert_cmd::Command::new(program());
         command
@@ -152,7 +149,7 @@ impl Place {
         Ran::new(output.status.code(), stdout, &stderr, arguments)
     }
 
-    /// Runs a line of a shell in which `$0` is the program.
+    /// Runs a shell command in which `$0` is the program.
     #[cfg(unix)]
     fn shell(&self, shell: &str, line: &str) -> Ran {
         let output = std::process::Command::new(shell)
@@ -182,13 +179,12 @@ fn program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_wgray"))
 }
 
-/// An environment without any Vulkan driver.
 const NO_DRIVER: [(&str, &str); 2] = [
     ("VK_DRIVER_FILES", "/nonexistent.json"),
     ("VK_ICD_FILENAMES", "/nonexistent.json"),
 ];
 
-/// Width, height and bytes of a PNG of 8-bit RGB.
+/// Returns the width, height and bytes of an 8-bit RGB PNG.
 fn read_png(path: &Path) -> (u32, u32, Vec<u8>) {
     let picture = image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let image::DynamicImage::ImageRgb8(picture) = picture else {
@@ -197,7 +193,6 @@ fn read_png(path: &Path) -> (u32, u32, Vec<u8>) {
     (picture.width(), picture.height(), picture.into_raw())
 }
 
-/// The path of a scene of the project, as an argument.
 fn project_scene(name: &str) -> String {
     project("scenes").join(name).display().to_string()
 }

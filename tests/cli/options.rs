@@ -1,10 +1,9 @@
-//! What each option does.
+//! The effect of each option of `render`.
 
 use wgray::image::read_exr;
 
 use super::{NO_DRIVER, Place, SCENE, read_png};
 
-/// A render with options is the render of a scene that says the same.
 #[test]
 fn options_stand_in_for_the_scenes_values() {
     let place = Place::new();
@@ -32,7 +31,7 @@ fn options_stand_in_for_the_scenes_values() {
 #[test]
 fn bounces_are_as_many_as_the_option_says() {
     let place = Place::new();
-    // With one bounce light enters the ball, and does not leave it.
+    // With a depth of 1, light enters the glass but does not leave it.
     let ball = SCENE.replacen("material = \"gray\"", "material = \"glass\"", 1);
     let ball = ball.replace(
         "[materials.gray]",
@@ -47,7 +46,7 @@ fn bounces_are_as_many_as_the_option_says() {
     assert_ne!(place.read("option.exr"), place.read("plain.exr"));
 }
 
-/// What the integrator of an option ignores is told, as it is of a scene's own.
+/// The warning about ignored keys is the same for the option and the key.
 #[test]
 fn an_integrator_stands_in_for_the_scenes() {
     let place = Place::new();
@@ -128,7 +127,7 @@ fn devices_are_chosen_by_kind_and_by_part_of_a_name() {
     }
 }
 
-/// Software Vulkan's own quotients and square roots are rounded correctly, so that nothing changes.
+/// Software Vulkan divides and takes square roots with correct rounding, so that the option has no effect.
 #[test]
 fn rounding_in_software_gives_the_same_picture() {
     let place = Place::new();
@@ -171,7 +170,7 @@ fn progress_is_told_as_asked() {
     assert_eq!((plain.code, plain.stdout.as_str()), (0, ""));
     assert!(plain.stderr.contains("100 % done after"), "{}", plain.stderr);
     place.quietly(&["render", "small.toml", "--progress", "none"]);
-    place.quietly(&["render", "small.toml", "--progress", "auto"]); // standard error is no terminal here
+    place.quietly(&["render", "small.toml", "--progress", "auto"]); // standard error is not a terminal here
     place.quietly(&["render", "small.toml", "--progress", "plain", "-q"]);
     let verbose = place.run(&["render", "small.toml", "-v"]);
     assert_eq!((verbose.code, verbose.stdout.as_str()), (0, ""));

@@ -1,4 +1,4 @@
-//! What a render writes: pictures, layers and figures.
+//! Output files of a render: images, layers and statistics.
 
 use wgray::image::{difference, encode, read_exr};
 use wgray_image::Region;
@@ -180,7 +180,7 @@ fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
     let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
     let rays = counts.iter().map(|count| u64::from(*count)).sum::<u64>();
     assert_eq!(stats["camera_rays"].as_u64(), Some(rays));
-    // Beside a PNG: the most samples are white, and the least are not.
+    // In the PNG, pixels with the maximum number of samples are white.
     place.quietly(
         &[
             &["render", "small.toml"],
@@ -199,7 +199,7 @@ fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
     }
 }
 
-/// The small scene, along paths, before a transparent background.
+/// Returns the test scene for the path integrator, with a finite floor.
 fn path_scene(settings: &str) -> String {
     SCENE
         .replace("[render]", &format!("[render]\nintegrator = \"path\"\n{settings}"))
@@ -307,7 +307,7 @@ fn layers_of_paths_are_pictures_beside_a_png() {
             "{name}"
         );
     }
-    // Each sample's normal has a colour, or none where nothing is hit; these are mixed.
+    // The sum of the normals is mapped to colors; samples without a hit are black.
     let (_, _, normals) = read_png(&place.path("out.shading_normal.png"));
     for (i, found) in normals.chunks(3).enumerate() {
         let (sum, share) = (film.layers[4][i] / film.sums[i].w, film.alpha(i));
@@ -336,7 +336,7 @@ fn layers_of_paths_are_pictures_beside_a_png() {
         match alpha {
             0.0 => none += 1,
             1.0 => all += 1,
-            // Colours that were weighted would be darker.
+            // Colors must not be premultiplied.
             _ => some += usize::from(pixel.0[..3] != [mean.x, mean.y, mean.z].map(encode)),
         }
     }
@@ -370,7 +370,7 @@ fn aovs_are_files_beside_a_png() {
         let at = 3 * (10 * y + x);
         [bytes[at], bytes[at + 1], bytes[at + 2]]
     };
-    // the sphere in the middle, the ground below, the sky above
+    // the sphere in the middle, the floor below, the background above
     let [facing, ground, sky] = [(5, 3), (0, 5), (0, 0)].map(|(x, y)| pixel("a.b.normal.png", x, y));
     assert!(facing[1] < 20 && facing[0] > 128, "{facing:?}");
     assert_eq!((ground, sky), ([128, 128, 255], [0, 0, 0]));
@@ -450,7 +450,7 @@ fn stats_have_the_promised_fields() {
     }
 }
 
-/// Whatever the driver: where it ends loops early and a sample is too long for it, the CPU takes over and a line says so.
+/// If the driver truncates loops and a sample exceeds its limit, the CPU renders instead and a message reports it.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_all_the_same() {
     if crate::adapter::device().is_none() {

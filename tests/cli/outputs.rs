@@ -1,10 +1,10 @@
-//! Where a render may write to: no input, nothing twice, through pipes and devices, and never instead of them.
+//! Output destinations: inputs are protected, no file is written twice, and pipes and devices are written through.
 
 use std::fs;
 
 use super::{Place, Ran, SCENE};
 
-/// A scene with an image, a normal map, and an image that no material names.
+/// Writes a scene with a texture image, a normal map and an unused texture image.
 fn textured(place: &Place) {
     let texture = |name: &str, file: &str, encoding: &str| {
         image::RgbImage::new(2, 2).save(place.path(file)).unwrap();
@@ -23,7 +23,7 @@ fn textured(place: &Place) {
     place.write("tiles.toml", &scene);
 }
 
-/// A scene with a mesh of two materials, one of which has an image; and an image of a material that is not used.
+/// Writes a scene with a mesh whose .mtl file has two used materials, one of them textured, and an unused one.
 fn with_materials(place: &Place) {
     for name in ["wood.png", "spare.png"] {
         image::RgbImage::new(2, 2).save(place.path(name)).unwrap();
@@ -76,7 +76,7 @@ fn a_mesh_has_the_colours_of_its_file() {
         place.read("a.exr")
     };
     let with_own = picture("box.toml");
-    // The same material by the scene.
+    // The same materials, defined in the scene.
     let material = "[materials.red]\ntype = 'phong'\ncolor = [1, 0, 0]\nspecular = [0, 0, 0]\n";
     let texture = "[textures.wood]\ntype = 'image'\nfile = 'wood.png'\n[materials.wood]\ntype = 'phong'\n\
                    color = { texture = 'wood' }\nspecular = [0, 0, 0]\n";
@@ -88,7 +88,7 @@ fn a_mesh_has_the_colours_of_its_file() {
     assert!(picture("other.toml") != with_own);
 }
 
-/// The render refused, and every file is as it was.
+/// Checks that the render is rejected and leaves all files unchanged.
 #[track_caller]
 pub fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {
     let content = |place: &Place| -> Vec<(String, Vec<u8>)> {
@@ -136,7 +136,7 @@ fn no_input_is_replaced() {
     );
     fs::copy(place.path("small.toml"), place.path("scene.png")).unwrap();
     refused(&place, &["scene.png"], 2, &format!("scene.png {foreign}"));
-    // An EXR has its AOVs inside, so that it replaces nothing.
+    // An EXR contains its layers, so that no separate layer file collides.
     place.quietly(&[
         "render",
         "tiles.toml",
@@ -278,7 +278,7 @@ mod unix {
         );
     }
 
-    /// The picture on standard output is the file that would be there.
+    /// Standard output receives the same bytes as a file.
     #[test]
     fn standard_output_takes_a_picture_or_figures() {
         let place = Place::new();
@@ -448,7 +448,7 @@ mod unix {
         );
     }
 
-    /// By its mode alone: these tests may run as root, who may write everything.
+    /// Judged by the mode bits, as root can write to any file.
     #[test]
     fn a_read_only_file_is_refused_and_others_keep_their_mode() {
         let place = Place::new();
@@ -473,7 +473,7 @@ mod unix {
         assert_eq!(mode & 0o777, 0o640);
     }
 
-    /// A pipe that nobody reads keeps the program waiting, and Ctrl+C still ends it.
+    /// Opening a pipe without a reader blocks; Ctrl+C still ends the program.
     #[test]
     fn waiting_for_a_reader_can_be_interrupted() {
         crate::cli::heed_interrupts();

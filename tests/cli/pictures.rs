@@ -1,4 +1,4 @@
-//! Formats, what they hold and what is told in them; several of one render; how light is shown.
+//! Image formats: bit depth, compression, metadata, several outputs of a render, and view transforms.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,25 +10,22 @@ use wgray::scene::{ViewSettings, ViewTransform};
 use super::outputs::refused;
 use super::{Place, SCENE, read_png};
 
-/// Runs a render on the CPU, in silence.
 fn render(place: &Place, arguments: &[&str]) {
     place.quietly(&[&["render", "small.toml", "--device", "cpu"], arguments].concat());
 }
 
-/// What a PNG says of itself.
 fn png_info(path: &Path) -> png::Info<'static> {
     let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
     png::Decoder::new(file).read_info().unwrap().info().clone()
 }
 
-/// The texts of a PNG.
 fn texts(path: &Path) -> BTreeMap<String, String> {
     let info = png_info(path);
     let texts = info.uncompressed_latin1_text.iter();
     texts.map(|chunk| (chunk.keyword.clone(), chunk.text.clone())).collect()
 }
 
-/// The samples of an EXR by channel, as bits; halves as they are.
+/// Returns the sample bits of each channel of an EXR; half floats as 16 bits.
 fn samples(path: &Path) -> BTreeMap<String, Vec<u32>> {
     let image = exr::prelude::read_first_flat_layer_from_file(path).unwrap();
     let bits = |samples: &FlatSamples| match samples {
@@ -124,7 +121,7 @@ fn a_picture_that_fails_leaves_none_of_the_others() {
     ]);
     assert_ne!(ran.code, 0);
     assert!(ran.stderr.contains("/dev/full: cannot be written"), "{}", ran.stderr);
-    // Files get their names one after the other: those before it may be there, whole; none after it.
+    // Outputs are renamed one after the other: those before the failure may exist complete, those after it must not.
     assert!(!place.files().contains(&"b.png".to_owned()), "{:?}", place.files());
     assert!(
         place.files().iter().all(|name| !name.starts_with('.')),
@@ -202,7 +199,7 @@ fn the_scene_says_how_it_is_shown_and_options_stand_in() {
         shown(&["--exposure", "-2"]),
         plain(&["--view-transform", "khronos-pbr-neutral", "--exposure", "-2"])
     );
-    // An EXR is linear, whatever the scene says; and the library's pictures are the program's.
+    // An EXR is linear, whatever the view settings. The library writes the same images as the program.
     place.quietly(&["render", "shown.toml", "--device", "cpu", "-o", "s.exr"]);
     render(&place, &["-o", "p.exr"]);
     assert_eq!(place.read("s.exr"), place.read("p.exr"));
@@ -256,7 +253,7 @@ fn exrs_are_compressed_in_every_way_without_loss() {
             render(&place, &[&["-o", "a.exr"], &aovs[..], &options].concat());
             assert!(samples(&place.path("a.exr")) == *expected, "{method} {numbers}");
             sizes.insert((method, numbers), place.read("a.exr").len());
-            // A part whose first row is inside of a block, and whose last block is not full.
+            // A crop that starts and ends inside a compression block.
             render(
                 &place,
                 &[&["-o", "c.exr", "--crop", "3,5,70,62"], &aovs[..], &options].concat(),
@@ -299,7 +296,7 @@ fn halves_that_are_too_large_are_counted() {
     let infinite = |name: &str| found[name].iter().filter(|bits| **bits == 0x7c00).count();
     let of_blue = infinite("B");
     assert!(of_blue > 5, "{of_blue}");
-    // What is nearer to 65504 than to the next step, 65536, is that.
+    // Values up to 65520, halfway to the next step, round to 65504.
     assert_eq!((infinite("R"), infinite("G")), (0, 0));
     let told = format!(
         "warning: h.exr: {of_blue} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float\n"
@@ -377,7 +374,7 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
     let part = png.pixels().filter(|pixel| !matches!(pixel.0[3], 0 | 255)).count();
     assert!(clear > 5 && part > 3, "{clear}, {part}");
     for (a, b) in png.pixels().zip(webp.pixels()) {
-        // Where nothing is no colour is told.
+        // The color of transparent pixels is undefined.
         assert!(a == b || (a.0[3], b.0[3]) == (0, 0), "{a:?} {b:?}");
     }
     let jpeg = image::open(place.path("a.jpg")).unwrap().into_rgb8();
@@ -389,7 +386,7 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
     }
 }
 
-/// Light is shown as the picture is, a share of light by the curve alone, and all else as it is.
+/// Radiance layers use the view settings of the image, albedo only the sRGB curve, and other layers no transform.
 #[test]
 fn layers_of_light_are_shown_as_the_picture() {
     let place = Place::new();
@@ -424,7 +421,6 @@ fn layers_of_light_are_shown_as_the_picture() {
     let (_, _, bent) = read_png(&place.path("a.normal.png"));
     render(&place, &["-o", "b.png", "--aov", "normal"]);
     assert_eq!(read_png(&place.path("b.normal.png")).2, bent);
-    // With 16 bits alpha has them too.
     render(&place, &["-o", "c.png", "--bit-depth", "16"]);
     let image::DynamicImage::ImageRgba16(deep) = image::open(place.path("c.png")).unwrap() else {
         panic!("not 16 bits with alpha");
@@ -596,7 +592,6 @@ fn options_that_no_picture_heeds_are_refused() {
             ran.stderr
         );
     }
-    // A picture that tells is heeded.
     render(
         &place,
         &[
@@ -616,7 +611,7 @@ fn options_that_no_picture_heeds_are_refused() {
     assert!(samples(&place.path("b")).contains_key("R"));
 }
 
-/// Told before anything is rendered: a picture of that size would take long.
+/// Rejected before rendering, as an image of that size would take long.
 #[test]
 fn pictures_that_a_format_has_no_room_for_are_refused() {
     let place = Place::new();
@@ -639,7 +634,7 @@ fn pictures_that_a_format_has_no_room_for_are_refused() {
             told,
         );
     }
-    // A crop that fits is no such picture, and the largest ones are written.
+    // A crop within the limits is accepted, and the maximum sizes are written.
     let crop = [
         "--size",
         "65536x60000",

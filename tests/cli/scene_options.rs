@@ -1,10 +1,10 @@
-//! `--environment`, `--background` and `--turntable`: what stands in for a scene's own surroundings and camera.
+//! `--environment`, `--background` and `--turntable`, which override parts of a scene.
 
 use std::fs;
 
 use super::{Place, SCENE, read_png};
 
-/// A rough ball that a grey sky lights, under `path`.
+/// A sphere of a principled material under a gray environment.
 const BALL: &str = "image = { width = 12, height = 8 }\n\
                     camera = { position = [0, -4, 1], look_at = [0.5, 0, 0], fov = 40 }\n\
                     render = { integrator = 'path', pixel_samples = { count = 4 } }\n\
@@ -20,7 +20,7 @@ fn quietly(place: &Place, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &["--device", "cpu"]].concat());
 }
 
-/// An image of 4 x 2 texels, brighter to one side.
+/// Writes an environment map of 4 x 2 texels with a gradient.
 fn write_room(place: &Place, name: &str) {
     let room = image::Rgb32FImage::from_fn(4, 2, |x, y| image::Rgb([1.0 + x as f32, 0.5, 0.25 + y as f32]));
     room.save(place.path(name)).unwrap();
@@ -46,7 +46,7 @@ fn surroundings_stand_in_for_the_scenes() {
         );
         place.write("other.toml", &says);
         quietly(&place, &["other.toml", "-o", "other.exr"]);
-        // The image is in the current folder, wherever the scene is.
+        // The path is relative to the current folder, not to the scene.
         for scene in ["ball.toml", "sub/ball.toml"] {
             quietly(&place, &[scene, "--environment", option, "-o", "option.exr"]);
             assert_eq!(place.read("option.exr"), place.read("other.exr"), "{option} {scene}");
@@ -87,7 +87,6 @@ fn a_background_is_seen_and_lights_nothing() {
     }
     assert_eq!(seen, 4);
     assert_ne!(plain.get_pixel(0, 0), colored.get_pixel(0, 0));
-    // What the file says does the same.
     place.write("says.toml", &format!("{BALL}environment.background = [1, 0, 2]\n"));
     quietly(&place, &["says.toml", "-o", "says.exr"]);
     quietly(&place, &["ball.toml", "--background", "1,0,2", "-o", "option.exr"]);
@@ -97,7 +96,7 @@ fn a_background_is_seen_and_lights_nothing() {
     assert!(picture.color().has_alpha());
     let alpha = |x, y| picture.to_rgba8().get_pixel(x, y).0[3];
     assert_eq!((alpha(0, 0), alpha(5, 4)), (0, 255));
-    // Direct light has a background of its own.
+    // The direct integrator has its own background key.
     place.write("small.toml", SCENE);
     place.write(
         "other.toml",
@@ -193,7 +192,7 @@ fn a_turntable_goes_once_around() {
     let names = ["t.01.exr", "t.02.exr", "t.03.exr", "t.04.exr"];
     let there = place.files_but(|name| !name.starts_with("t."));
     assert_eq!(there, names);
-    // The first is the picture without a turn; by a quarter the camera is at +x of what it looks at, by a half at +y.
+    // The first frame is the still image. After a quarter turn the camera is at +x of its target, after a half at +y.
     assert_eq!(place.read("t.01.exr"), place.read("still.exr"));
     assert_eq!(place.read("t.03.exr"), place.read("alone.exr"));
     let at = |position: &str, name: &str| {

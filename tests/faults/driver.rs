@@ -1,4 +1,4 @@
-//! The driver that fails on demand, made ready, and the program run on it.
+//! The fault-injecting Vulkan driver: builds it and runs the program on it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -10,7 +10,7 @@ use crate::cli::without_summary;
 use crate::place::Place;
 use crate::sources::path as project;
 
-/// A scene of 40 x 30 pixels in which everything random differs from pixel to pixel.
+/// A scene of 40 x 30 pixels in which all random numbers differ between pixels.
 pub const SCENE: &str = r#"image = { width = 40, height = 30 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
 [render]
@@ -41,14 +41,14 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 "#;
 
-/// What Vulkan's loader and the driver need in their environment.
+/// The files that the Vulkan loader and the driver need.
 pub struct Driver {
     manifest: PathBuf,
     library: PathBuf,
     lavapipe: PathBuf,
 }
 
-/// The driver, compiled. `None` only where the environment says to do without one; else it is an error of the tests.
+/// Builds the driver. Without lavapipe, returns `None` if `WGRAY_TEST_WITHOUT_GPU` is 1, and panics otherwise.
 pub fn driver() -> Option<&'static Driver> {
     static DRIVER: OnceLock<Option<Driver>> = OnceLock::new();
     DRIVER.get_or_init(prepare).as_ref()
@@ -65,7 +65,7 @@ fn prepare() -> Option<Driver> {
     };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faults");
     fs::create_dir_all(&folder).expect("a folder below target/");
-    // Under names of their own until they are whole, as other tests may run too.
+    // Renamed when complete, as other tests may run concurrently.
     let [library, manifest] = ["libfaults.so", "faults.json"].map(|name| folder.join(name));
     let own = tempfile::tempdir_in(&folder).expect("a temporary folder");
     let made = own.path().join("libfaults.so");
@@ -90,7 +90,7 @@ fn prepare() -> Option<Driver> {
     })
 }
 
-/// lavapipe's library and the version of Vulkan that it has, from its manifest.
+/// Returns lavapipe's library and its Vulkan version, from its manifest.
 fn lavapipe() -> Option<(PathBuf, String)> {
     let mut manifests = Vec::new();
     for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
@@ -105,7 +105,7 @@ fn lavapipe() -> Option<(PathBuf, String)> {
         let json: serde_json::Value = serde_json::from_str(&text).ok()?;
         let of_driver = |key: &str| Some(json.get("ICD")?.get(key)?.as_str()?.to_string());
         let library = of_driver("library_path")?;
-        let is_path = library.contains('/'); // else the system knows where it is
+        let is_path = library.contains('/'); // otherwise the dynamic linker finds it
         let is_lavapipe = library.contains("libvulkan_lvp");
         let library = match is_path {
             true => manifest.parent()?.join(library),
@@ -115,38 +115,33 @@ fn lavapipe() -> Option<(PathBuf, String)> {
     })
 }
 
-/// What a run of the program left.
 pub struct Ran {
     pub code: i32,
     pub stderr: String,
-    /// What the driver has done, line for line.
     pub log: Vec<String>,
-    /// The picture with its layers, as bits.
     pub picture: Option<Picture>,
 }
 
-/// The channels' names and the bits of their values.
+/// Channel names and the bits of the values.
 pub type Picture = Vec<(String, Vec<u32>)>;
 
 impl Ran {
-    /// How many lines of the driver's log start so.
+    /// Returns the number of log lines that start with `start`.
     pub fn count(&self, start: &str) -> usize {
         self.log.iter().filter(|line| line.starts_with(start)).count()
     }
 
-    /// The lines on standard error.
     pub fn lines(&self) -> Vec<&str> {
         self.stderr.lines().collect()
     }
 }
 
 impl Place {
-    /// A folder with a scene in it.
     pub fn of(scene: &str) -> Place {
         Place::with_file("scene.toml", scene)
     }
 
-    /// The program, on the driver that has these faults.
+    /// Returns a command that runs the program on the driver with these faults.
     pub fn command_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wgray"));
         command
@@ -158,11 +153,11 @@ impl Place {
         command
     }
 
-    /// Runs the program, which leaves nothing but a picture.
+    /// Runs the program and checks that it leaves no files except an image.
     pub fn run_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Ran {
         let out = self.path("out.exr");
         for name in ["out.exr", "log"] {
-            let _ = fs::remove_file(self.path(name)); // of the run before, if there was one
+            let _ = fs::remove_file(self.path(name)); // of an earlier run
         }
         let mut command = assert_cmd::Command::from_std(self.command_on(driver, arguments, faults));
         let output = command
@@ -186,14 +181,13 @@ impl Place {
         }
     }
 
-    /// The picture by the CPU, which has no driver.
+    /// Renders the image on the CPU, which uses no driver.
     pub fn expected(&self, driver: &Driver, arguments: &[&str]) -> Picture {
         let ran = self.run_on(driver, &[arguments, &["--device", "cpu"]].concat(), &[]);
         assert_eq!((ran.code, ran.stderr.as_str(), ran.log.len()), (0, "", 0));
         ran.picture.expect("a picture")
     }
 
-    /// Starts the program.
     pub fn start(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Child {
         let mut command = self.command_on(driver, arguments, faults);
         command.stderr(Stdio::piped()).spawn().expect("the program starts")
@@ -201,7 +195,7 @@ impl Place {
 }
 
 impl Driver {
-    /// The environment of a program that is to meet this driver and no other.
+    /// Returns environment variables that select only this driver.
     pub fn environment(&self, log: &Path) -> [(&'static str, PathBuf); 5] {
         [
             ("VK_DRIVER_FILES", self.manifest.clone()),

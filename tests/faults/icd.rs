@@ -1,23 +1,23 @@
-//! A Vulkan driver that fails on demand. It hands everything on to another driver, and in between loses its device, opens none,
-//! has no memory, or is slow. Compiled by the tests by itself, as a library that Vulkan's loader takes for a driver.
+//! A Vulkan driver that injects faults and otherwise forwards to another driver. It can lose its device, refuse to open
+//! one, run out of memory, or be slow. The tests compile it separately, as a library for the Vulkan loader.
 //!
-//! What it does is in the environment; numbers count from 1, submits and allocations over all devices of a process:
+//! Environment variables control it. Numbers count from 1; submits and allocations of all devices of a process count:
 //!
 //! | variable | meaning |
 //! | --- | --- |
-//! | `FAULTS_DRIVER` | the library of the driver that does the work |
-//! | `FAULTS_ITSELF` | this library, which stays loaded and goes on counting |
-//! | `FAULTS_LOG` | a file that gets a line for everything that is done here |
-//! | `FAULTS_LOSE` | the submits that lose the device, with commas between them, or `every:N`, the N-th of each device |
-//! | `FAULTS_LOSE_IN` | what tells of the loss first: `submit`, `status` (a question whether work has ended) or `wait` |
-//! | `FAULTS_REFUSE` | so many devices are refused after each loss |
-//! | `FAULTS_REFUSE_FIRST` | so many devices are refused at first |
-//! | `FAULTS_REFUSE_WITH` | the code that they are refused with, else that of a driver that cannot be initialised |
-//! | `FAULTS_IDLE` | the code that waiting for a queue of a lost device returns, else that of the loss |
-//! | `FAULTS_LARGEST` | allocations of more bytes are refused for want of memory |
-//! | `FAULTS_NO_MEMORY_FROM` | from this allocation on all are refused |
-//! | `FAULTS_NO_MEMORY_IN` | the submit that is refused for want of memory |
-//! | `FAULTS_SLEEP` | `N:MS`, the N-th submit first sleeps for MS milliseconds |
+//! | `FAULTS_DRIVER` | the library of the driver to forward to |
+//! | `FAULTS_ITSELF` | this library, which stays loaded to keep its counters |
+//! | `FAULTS_LOG` | a file to which a line per event is appended |
+//! | `FAULTS_LOSE` | comma-separated submits that lose the device, or `every:N` for the N-th submit of each device |
+//! | `FAULTS_LOSE_IN` | function that returns the loss first: `submit`, `status` (fence or semaphore query), `wait` |
+//! | `FAULTS_REFUSE` | number of device creations that fail after each loss |
+//! | `FAULTS_REFUSE_FIRST` | number of device creations that fail at the start |
+//! | `FAULTS_REFUSE_WITH` | error code of these failures, by default `VK_ERROR_INITIALIZATION_FAILED` |
+//! | `FAULTS_IDLE` | return code of waiting for an idle queue of a lost device, by default `VK_ERROR_DEVICE_LOST` |
+//! | `FAULTS_LARGEST` | maximum size in bytes of an allocation; larger ones fail |
+//! | `FAULTS_NO_MEMORY_FROM` | this allocation and all later ones fail |
+//! | `FAULTS_NO_MEMORY_IN` | the submit that fails for lack of memory |
+//! | `FAULTS_SLEEP` | `N:MS`: the N-th submit first sleeps for MS milliseconds |
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::io::Write;
@@ -46,11 +46,11 @@ const RTLD_NODELETE: c_int = 0x1000;
 static SUBMITS: AtomicU64 = AtomicU64::new(0);
 static SUBMITS_OF_DEVICE: AtomicU64 = AtomicU64::new(0);
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// The device is gone, and every call tells.
+/// The device is lost, and every function returns the loss.
 static LOST: AtomicBool = AtomicBool::new(false);
-/// The device is gone, and the call that is to tell of it first has not come yet.
+/// The device is lost, but the function of `FAULTS_LOSE_IN` has not been called yet.
 static LOST_UNTOLD: AtomicBool = AtomicBool::new(false);
-/// How many devices are still to be refused.
+/// Number of device creations still to fail.
 static TO_REFUSE: AtomicI64 = AtomicI64::new(-1);
 
 fn variable<T: FromStr>(name: &str) -> Option<T> {
@@ -63,7 +63,7 @@ fn log(line: &str) {
     let _ = file.and_then(|mut file| writeln!(file, "{line}"));
 }
 
-/// A function of the driver behind this one.
+/// Returns a function of the wrapped driver.
 fn of_driver(name: &CStr) -> *mut c_void {
     let path = std::env::var("FAULTS_DRIVER").expect("FAULTS_DRIVER names a driver");
     let path = CString::new(path).expect("a path");
@@ -97,12 +97,12 @@ pub unsafe extern "system" fn vk_icdGetInstanceProcAddr(instance: Handle, name: 
     unsafe { replaced(name, real(instance, name)) }
 }
 
-/// Functions of the driver that have others in their places: the type of each, where the driver's is kept, and what is called.
+/// Functions that replace those of the driver: names, static for the driver's function, replacement and its type.
 macro_rules! replacements {
     ($($name:literal $($other:literal)* => $place:ident, $function:ident: fn($($ty:ty),*) -> $result:ty;)*) => {
         $(static $place: AtomicPtr<c_void> = AtomicPtr::new(null_mut());)*
 
-        /// What a caller gets for the driver's function of a name.
+        /// Returns the replacement of a function of the driver, or the function.
         unsafe fn replaced(name: *const c_char, real: Function) -> Function {
             if real.is_null() {
                 return real;
@@ -117,7 +117,6 @@ macro_rules! replacements {
             }
         }
 
-        /// The driver's own functions.
         mod real {
             use super::*;
             $(pub unsafe fn $function() -> unsafe extern "system" fn($($ty),*) -> $result {
@@ -142,7 +141,6 @@ replacements! {
         GET_COUNTER, get_counter: fn(Handle, u64, *mut u64) -> Code;
 }
 
-/// `VkMemoryAllocateInfo`.
 #[repr(C)]
 struct Allocation {
     kind: i32,
@@ -187,7 +185,7 @@ unsafe extern "system" fn allocate_memory(device: Handle, info: *const Allocatio
     unsafe { real::allocate_memory()(device, info, host, out) }
 }
 
-/// Whether a submit, by its numbers in the process and of the device, is to lose the device.
+/// Returns true if a submit loses the device; `number` counts over the process, `of_device` over the device.
 fn loses(number: u64, of_device: u64) -> bool {
     let Ok(which) = std::env::var("FAULTS_LOSE") else {
         return false;
@@ -206,7 +204,7 @@ fn lose(by: &str) -> Code {
     DEVICE_LOST
 }
 
-/// Whether a call is the first that tells of a loss.
+/// Returns true if `by` is the first function to return the pending loss.
 fn tells(by: &str) -> bool {
     LOST_UNTOLD.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == by)
 }
@@ -234,7 +232,7 @@ unsafe fn submit(queue: Handle, forward: impl FnOnce() -> Code) -> Code {
     if !loses(number, of_device) {
         return forward();
     }
-    // The driver behind has ended all work before anybody is told, and gives back what is taken from it in peace.
+    // The wrapped driver finishes all work before the loss is returned, so that its objects can be released safely.
     let at_once = std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first != "submit");
     let code = if at_once { forward() } else { SUCCESS };
     unsafe { real::queue_wait_idle()(queue) };
@@ -253,7 +251,7 @@ unsafe extern "system" fn queue_submit_2(queue: Handle, count: u32, submits: Han
     unsafe { submit(queue, || real::queue_submit_2()(queue, count, submits, fence)) }
 }
 
-/// A call that tells of a loss, if there is one; else it is handed on.
+/// Returns the loss if the device is lost, or forwards.
 fn asked(by: &str, forward: impl FnOnce() -> Code) -> Code {
     if LOST.load(SeqCst) {
         return DEVICE_LOST;
@@ -261,7 +259,6 @@ fn asked(by: &str, forward: impl FnOnce() -> Code) -> Code {
     if tells(by) { lose(by) } else { forward() }
 }
 
-/// A call that waits until nothing is under way.
 fn idle(forward: impl FnOnce() -> Code) -> Code {
     if !LOST.load(SeqCst) {
         return forward();

@@ -1,4 +1,4 @@
-//! The library on a driver that loses its device, in a process of its own, as drivers are found by the environment.
+//! The library on a driver that loses its device. Runs in a child process, as environment variables select the driver.
 
 use std::ops::ControlFlow;
 use std::process::Command;
@@ -9,7 +9,7 @@ use crate::place::Place;
 
 use super::driver::{SCENE, driver};
 
-/// Set for the process that renders: to its scene file.
+/// Set in the child process to the path of the scene file.
 const FILE: &str = "WGRAY_TEST_FAULTS_SCENE";
 
 fn render(scene: &Scene, device: Device) -> Picture {
@@ -20,7 +20,7 @@ fn render(scene: &Scene, device: Device) -> Picture {
     wgray::render(scene, &options).expect("a picture")
 }
 
-/// Does nothing, but in the process that [`pictures_survive`] starts.
+/// Does nothing, except in the process that [`pictures_survive`] starts.
 #[test]
 fn in_a_process_of_its_own() {
     let Ok(file) = std::env::var(FILE) else { return };
@@ -29,7 +29,7 @@ fn in_a_process_of_its_own() {
     let picture = render(&scene, Device::Gpu);
     assert!(picture.device().name.starts_with("llvmpipe"));
     assert_eq!(picture.pixels(), expected.pixels());
-    // The picture is copied from the device after every call.
+    // The callback copies the image from the device after each dispatch.
     let options = Options {
         device: Device::Gpu,
         ..Options::default()
@@ -48,10 +48,10 @@ fn in_a_process_of_its_own() {
 fn pictures_survive() {
     let Some(driver) = driver() else { return };
     let place = Place::of(SCENE);
-    // Of the first picture the samples; of the second, which has 6 submits before it, the samples and a look at them.
+    // The first image loses its samples; the second, after 6 submits, its samples and a readback.
     for (lose, losses) in [("2", 1), ("2,7,10", 3), ("999", 0)] {
         let log = place.path("log");
-        let _ = std::fs::remove_file(&log); // of the one before
+        let _ = std::fs::remove_file(&log); // of the previous run
         let output = Command::new(std::env::current_exe().expect("this program"))
             .args(["--exact", "--nocapture", "faults::library::in_a_process_of_its_own"])
             .envs(driver.environment(&log))
@@ -64,7 +64,7 @@ fn pictures_survive() {
             "{lose}: {}",
             String::from_utf8_lossy(&output.stdout)
         );
-        // wgpu does panic, and this process has no hook that is silent about it. Without a loss it does not.
+        // wgpu panics at a loss, and this process has no quiet panic hook.
         let told = String::from_utf8_lossy(&output.stderr)
             .matches("Error in Device::poll")
             .count();

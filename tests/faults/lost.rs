@@ -1,5 +1,4 @@
-//! A device that is lost: opened anew, time after time if need be, until it does not come back. The picture is the same
-//! whatever happens.
+//! Device loss: the device is re-opened, up to a limit of losses in a row, and the image does not change.
 
 use std::io::{Read as _, Write as _};
 use std::process::Command;
@@ -9,16 +8,16 @@ use crate::place::Place;
 
 use super::driver::{Ran, SCENE, driver};
 
-/// What may tell of a loss first.
+/// The functions that may return a loss first.
 const WAYS: [&str; 3] = ["submit", "status", "wait"];
 
-/// The submits of [`SCENE`]: the warm-up, the samples, the film, the first hits, and these.
+/// Number of submits of [`SCENE`]: the warm-up, the samples, the film, the first hits, and their readback.
 const SUBMITS: usize = 5;
 
 const GPU: [&str; 2] = ["--device", "gpu"];
 const AUTO: [&str; 2] = ["--device", "auto"];
 
-/// Holds a run to so many warnings of a device that is opened anew, and nothing else on standard error but these lines.
+/// Checks for `anew` warnings about a re-opened device, followed only by the lines `rest`.
 fn warned(ran: &Ran, anew: usize, rest: &[&str]) {
     let lines = ran.lines();
     assert_eq!(lines.len(), anew + rest.len(), "{}", ran.stderr);
@@ -48,7 +47,7 @@ fn without_faults_the_driver_renders_as_lavapipe_does() {
         );
         assert!(ran.picture == Some(expected.clone()), "{device:?}");
     }
-    // Bits are compared: another seed is another picture.
+    // Negative control: another seed gives another image.
     let other = place.run_on(driver, &["--device", "gpu", "--seed", "7"], &[]);
     assert!(other.code == 0 && other.picture != Some(expected));
 }
@@ -84,11 +83,11 @@ fn a_device_that_is_lost_several_times_is_opened_as_often() {
     assert_eq!((twice.code, twice.count("lost")), (0, 2), "{}", twice.stderr);
     warned(&twice, 2, &[]);
     assert!(twice.picture == Some(expected.clone()));
-    // Twice in the samples, and, as these are finished then, twice again in the first hits: the last submit but one, and the one
-    // after the warm-up that follows. Four times in a row would be too often.
+    // Two losses in the samples and, once these are complete, two in the first hits: at the last submit but one and
+    // after the warm-up that follows. Four losses in a row would exceed the limit.
     let hits = twice.count("submit") - 1;
     let lose = format!("2,4,{hits},{}", hits + 2);
-    // How many submits there are before them is a matter of time: on a busy machine the aim may be missed.
+    // The number of submits before the first hits depends on timing, so that a run on a busy machine may miss them.
     let mut runs = (0..5).map(|_| place.run_on(driver, &GPU, &[("FAULTS_LOSE", &lose)]));
     let ran = runs.find(|ran| (ran.code, ran.count("lost")) == (0, 4));
     let ran = ran.unwrap_or_else(|| panic!("{lose}: no run of five survived four losses"));
@@ -96,7 +95,7 @@ fn a_device_that_is_lost_several_times_is_opened_as_often() {
     assert!(ran.picture == Some(expected));
 }
 
-/// In the midst of a call of several, in a picture that takes many.
+/// Losses in the middle of an image with many dispatches.
 #[test]
 fn a_long_render_survives() {
     let Some(driver) = driver() else { return };
@@ -120,7 +119,7 @@ fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
     let Some(driver) = driver() else { return };
     let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
-    // Each waits for some seconds, so they do so together.
+    // Each run waits for some seconds, hence they run in parallel.
     let never = |lose: &str, device: &str| {
         let place = Place::of(SCENE);
         let faults = [("FAULTS_LOSE", lose), ("FAULTS_REFUSE", "99")];
@@ -153,7 +152,7 @@ fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
     let ran = place.run_on(driver, &["--device", "auto", "--quiet"], &faults);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(ran.picture == Some(expected.clone()));
-    // One that comes back late is waited for.
+    // A device that reopens late is waited for.
     let late = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
     let ran = place.run_on(driver, &GPU, &late);
     assert_eq!((ran.code, ran.count("device refused")), (0, 2), "{}", ran.stderr);
@@ -166,7 +165,7 @@ fn a_device_that_is_lost_again_and_again_is_given_up() {
     let Some(driver) = driver() else { return };
     let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
-    // In the warm-up it never becomes ready; in the samples it does, and is told of each time.
+    // In the warm-up the device never becomes ready. In the samples it does, and each loss is reported.
     let again = |lose: &str, told: usize| {
         let place = Place::of(SCENE);
         let ran = place.run_on(driver, &GPU, &[("FAULTS_LOSE", lose)]);
@@ -191,7 +190,7 @@ fn a_device_that_is_lost_again_and_again_is_given_up() {
     });
 }
 
-/// wgpu panics where it gives back the queue of a device whose driver says so.
+/// wgpu panics when it drops the queue of a device whose driver returns these codes.
 #[test]
 fn a_lost_device_that_cannot_be_given_back_is_no_end() {
     let Some(driver) = driver() else { return };
@@ -209,7 +208,6 @@ fn a_lost_device_that_cannot_be_given_back_is_no_end() {
     }
 }
 
-/// A device that its driver does not open in the first place.
 #[test]
 fn a_device_that_cannot_be_opened_is_tried_again_if_it_was_asked_for() {
     let Some(driver) = driver() else { return };
@@ -248,7 +246,7 @@ fn waiting_for_a_device_can_be_interrupted() {
     let place = Place::of(SCENE);
     let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "99")];
     let mut child = place.start(driver, &GPU, &faults);
-    // Two devices were refused: the longest pause, of two seconds, has begun.
+    // After two failures, the longest pause (2 s) has begun.
     let log = place.path("log");
     let refused = || std::fs::read_to_string(&log).map_or(0, |log| log.matches("device refused").count());
     let start = Instant::now();
@@ -269,10 +267,10 @@ fn waiting_for_a_device_can_be_interrupted() {
     assert!(!place.path("out.exr").exists());
 }
 
-/// How many renders are disturbed at random.
+/// Environment variable with the number of random cases.
 const CASES: &str = "WGRAY_TEST_FAULTS";
 
-/// Faults by chance, of devices that come back and that do not. `scripts/test-slow faults` has many.
+/// Random faults, of devices that come back and of those that do not. `scripts/test-slow faults` runs many.
 #[test]
 fn faults_at_random_change_nothing() {
     let Some(driver) = driver() else { return };
@@ -304,8 +302,8 @@ fn faults_at_random_change_nothing() {
     assert!(losses as u64 >= cases, "{losses} losses in {cases} renders");
 }
 
-/// Losses, each some submits after the other, told in one of the ways; devices that are refused after each; and sometimes no
-/// memory from some allocation on.
+/// Returns losses a few submits apart, failing device creations after each, and sometimes a lack of memory from some
+/// allocation on.
 fn at_random(draws: &mut Draws) -> Vec<(&'static str, String)> {
     let mut submit = 1 + draws.below(5);
     let mut lose = submit.to_string();
@@ -324,7 +322,7 @@ fn at_random(draws: &mut Draws) -> Vec<(&'static str, String)> {
     faults
 }
 
-/// Numbers that look random, the same in every run.
+/// A deterministic random number generator.
 struct Draws(u64);
 
 impl Draws {
@@ -332,8 +330,8 @@ impl Draws {
         Draws(seed)
     }
 
-    /// A number below another: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014,
-    /// figure 17).
+    /// Returns a number below `end`: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number
+    /// generators", 2014, figure 17).
     fn below(&mut self, end: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

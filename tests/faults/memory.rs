@@ -1,4 +1,4 @@
-//! A device that has no memory for what is asked: a message with the sizes, or the CPU.
+//! Device memory exhaustion: an error with the sizes, or the fallback to the CPU.
 
 use crate::place::Place;
 
@@ -7,7 +7,7 @@ use super::driver::{Ran, SCENE, driver};
 const ADVICE: &str = "; render a crop or a smaller image, or use the CPU \
                       (--crop, --size, --device cpu)\n";
 
-/// Holds a run to one error for want of memory that tells this.
+/// Checks for a single out-of-memory error that contains `parts`.
 fn told(ran: &Ran, parts: &[&str]) {
     assert_eq!((ran.code, ran.picture.is_some()), (7, false), "{}", ran.stderr);
     assert!(ran.stderr.starts_with("error: llvmpipe"), "{}", ran.stderr);
@@ -30,7 +30,7 @@ fn a_film_that_does_not_fit_tells_its_size() {
     ];
     told(&ran, &parts);
     assert!(ran.count("allocation") > 0 && ran.log.iter().any(|line| line.ends_with("of 16777216 refused")));
-    // A part of it does fit, and so does everything in what is enough.
+    // A crop fits, as does the whole film below a higher limit.
     let crop = ["--size", "1024x1024", "--crop", "0,0,1024,64", "--device", "gpu"];
     let ran = place.run_on(driver, &crop, &[("FAULTS_LARGEST", "8388608")]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
@@ -51,7 +51,7 @@ fn a_film_that_does_not_fit_tells_its_size() {
     assert!(ran.picture == Some(expected));
 }
 
-/// From any allocation on: while the device is opened, for the film, for the copies of it.
+/// Fails each allocation in turn: those of opening the device, of the film and of the readbacks.
 #[test]
 fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
     let Some(driver) = driver() else { return };
@@ -66,7 +66,7 @@ fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
         let from = from.to_string();
         let faults = [("FAULTS_NO_MEMORY_FROM", from.as_str())];
         let ran = place.run_on(driver, &[large, ["--device", "gpu"]].concat(), &faults);
-        // How many there are depends on how fast it goes.
+        // The number of allocations depends on timing.
         if ran.log.iter().any(|line| line.ends_with("refused")) {
             told(&ran, &[": out of memory: the driver has n"]);
             refused += 1;
@@ -86,7 +86,7 @@ fn a_scene_that_does_not_fit_tells_its_size() {
     let textured = SCENE.replace("color = [0.5, 0.4, 0.3]", "color = { texture = \"large\" }")
         + "[textures.large]\ntype = \"image\"\nfile = \"large.png\"\n";
     let place = Place::of(&textured);
-    // 4 MiB of texels, and a third of that of smaller copies.
+    // 4 MiB of texels, and a third of that for the mip levels.
     let large = image::RgbImage::from_fn(1024, 1024, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
     large.save(place.path("large.png")).expect("an image");
     let limit = [("FAULTS_LARGEST", "4194304")];
@@ -99,7 +99,7 @@ fn a_scene_that_does_not_fit_tells_its_size() {
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
 }
 
-/// Where a submit has no memory, wgpu gives up the device.
+/// wgpu drops the device when a submit runs out of memory.
 #[test]
 fn a_call_that_has_no_memory_is_no_loss() {
     let Some(driver) = driver() else { return };

@@ -1,4 +1,4 @@
-//! A glTF file with many features at once has the same bits on both paths.
+//! A glTF file with many features has the same bits on CPU and GPU.
 
 use serde_json::json;
 use wgray_render::pack::pack;
@@ -72,7 +72,7 @@ fn a_file_has_the_same_bits_on_both_paths() {
     for way in exact_ways().into_iter().filter(|way| *way == Way::Baked) {
         assert_eq!(differing(&render(&packed, way), &known), 0, "{way:?}");
     }
-    // A file with one number changed has another picture.
+    // The control.
     builder.get("materials")[material]["normalTexture"]["scale"] = json!(0.6);
     let mut other = scene_with(&builder.write(folder.path(), "other", Packing::Binary), "");
     (other.width, other.height) = (24, 24);

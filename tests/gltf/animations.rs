@@ -1,4 +1,4 @@
-//! Animations at a time, and skins.
+//! glTF animations, skins and morph target weights.
 
 use glam::{DMat4, DQuat, DVec3};
 use serde_json::{Value, json};
@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 use super::build::{Builder, Component, QUAD};
 use super::read::{assert_corners, refusal, scene, scene_by};
 
-/// A quad whose node is moved by one channel.
 fn moving<const N: usize>(path: &str, interpolation: &str, times: &[f64], values: &[[f64; N]]) -> Builder {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
@@ -37,13 +36,12 @@ fn animate<const N: usize>(
     );
 }
 
-/// The corners of [`QUAD`] after a map.
+/// Returns the triangles of the transformed [`QUAD`].
 fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
     let p = QUAD.map(|corner| map(DVec3::from_array(corner)).to_array());
     [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
 }
 
-/// Holds a file at times to maps of the quad.
 fn assert_at(builder: &Builder, name: &str, known: impl Fn(f64) -> Box<dyn Fn(DVec3) -> DVec3>, times: &[f64]) {
     for (i, time) in times.iter().enumerate() {
         let name = format!("{name}-{i}");
@@ -62,7 +60,7 @@ fn steps_stay_until_the_next_key() {
         Box::new(move |p| p + DVec3::X * x)
     };
     assert_at(&builder, "step", known, &[0.0, 1.0, 1.5, 1.999, 2.0, 7.0]);
-    // Without a time it is as its nodes say, and not as any key.
+    // Without a time the node transforms apply.
     assert_corners(&scene(&builder, "step"), &quad_by(|p| p));
 }
 
@@ -88,7 +86,7 @@ fn linear_values_go_straight_and_stay_beyond_their_keys() {
 
 #[test]
 fn cubic_splines_are_hermites() {
-    // In-tangent, value and out-tangent of two keys 2 s apart: glTF 2.0, C.5.
+    // In-tangent, value and out-tangent of two keys 2 s apart (glTF 2.0, C.5).
     let keys = [
         [9.0; 3],
         [0.0, 1.0, 0.0],
@@ -113,7 +111,7 @@ fn cubic_splines_are_hermites() {
 #[test]
 fn turns_go_the_shortest_way_at_constant_speed() {
     let turn = |degrees: f64| DQuat::from_axis_angle(DVec3::Z, degrees.to_radians());
-    // The same turn has two quaternions: from the one of the other sign the way is as short.
+    // q and -q are the same rotation: either takes the shorter arc.
     for sign in [1.0, -1.0] {
         let values = [turn(10.0).to_array(), turn(130.0).to_array().map(|x| sign * x)];
         let builder = moving("rotation", "LINEAR", &[0.0, 1.0], &values);
@@ -122,7 +120,7 @@ fn turns_go_the_shortest_way_at_constant_speed() {
         };
         assert_at(&builder, &format!("turn{sign}"), known, &[0.0, 0.25, 0.5, 1.0]);
     }
-    // Keys that are nearly the same.
+    // The sine of the angle in between is almost 0.
     let values = [turn(10.0).to_array(), turn(10.001).to_array()];
     let builder = moving("rotation", "LINEAR", &[0.0, 1.0], &values);
     let known = move |_: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| turn(10.0005) * p) };
@@ -134,7 +132,7 @@ fn turns_on_splines_are_normalized() {
     let (a, b) = (DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::Z, 2.0));
     let keys = [[0.0; 4], a.to_array(), [0.0; 4], [0.0; 4], b.to_array(), [0.0; 4]];
     let builder = moving("rotation", "CUBICSPLINE", &[0.0, 1.0], &keys);
-    // Half way between two keys without slopes the sum is that of both.
+    // Zero tangents: both values have weight 1/2.
     let half = (a + b).normalize();
     let known = move |_: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| half * p) };
     assert_at(&builder, "turn-cubic", known, &[0.5]);
@@ -249,7 +247,7 @@ fn weights_of_targets_may_be_animated() {
     let known =
         |time: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| p + DVec3::new(2.0 * time, 1.0 - time, 0.0)) };
     assert_at(&builder, "weights", known, &[0.0, 0.25, 1.0]);
-    // Of splines each key has its slopes of all targets, then the values, then slopes again.
+    // Each key has all in-tangents, all values, all out-tangents.
     let mut builder = builder.clone();
     let keys = [
         [0.0],
@@ -278,7 +276,7 @@ fn weights_of_targets_may_be_animated() {
     assert_corners(&scene, &quad_by(|p| p + DVec3::new(1.0, 0.5, 0.0)));
 }
 
-/// A strip of two squares, one above the other, on two joints: the lower corners follow the first, the upper the second.
+/// Returns a strip whose lower corners follow the first joint and whose upper ones follow the second.
 fn arm(component: Component) -> Builder {
     let mut builder = Builder::new();
     let points = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 2.0, 0.0], [1.0, 2.0, 0.0]];
@@ -298,7 +296,7 @@ fn arm(component: Component) -> Builder {
         "meshes",
         json!({ "primitives": [{ "attributes": attributes, "indices": indices }] }),
     );
-    // The second joint is one unit above the first, and so the mesh was bound.
+    // In the bind pose the joints are 1 apart.
     let matrices = [DMat4::IDENTITY, DMat4::from_translation(-DVec3::Y)].map(|m| m.to_cols_array());
     let inverse = builder.accessor("MAT4", Component::F32, matrices.as_flattened());
     let elbow = builder.add("nodes", json!({ "translation": [0, 1, 0] }));
@@ -307,7 +305,7 @@ fn arm(component: Component) -> Builder {
         "skins",
         json!({ "joints": [shoulder, elbow], "inverseBindMatrices": inverse }),
     );
-    // What the node of a skinned mesh says of its place is ignored: glTF 2.0, 3.7.3.3.
+    // Ignored for a skinned mesh (glTF 2.0, 3.7.3.3).
     builder.root_node(json!({ "mesh": mesh, "skin": skin }));
     builder
 }
@@ -341,7 +339,6 @@ fn the_place_of_a_skinned_node_is_ignored() {
     let mut builder = arm(Component::F32);
     builder.get("nodes")[2]["translation"] = json!([5, 6, 7]);
     assert_corners(&scene(&builder, "skin-moved-node"), &arm_corners(|p| p));
-    // That of its joints is not.
     builder.get("nodes")[1]["translation"] = json!([0, 0, 3]);
     let known = arm_corners(|p| p).map(|t| t.map(|[x, y, z]| [x, y, z + 3.0]));
     assert_corners(&scene(&builder, "skin-moved-joint"), &known);
@@ -374,7 +371,7 @@ fn a_vertex_may_have_eight_joints() {
         .map(|i| builder.add("nodes", json!({ "translation": [i, 0, 0] })))
         .collect();
     builder.get("nodes")[parent]["children"] = json!(joints);
-    // Without matrices they are ones.
+    // Inverse bind matrices default to identity.
     let skin = builder.add("skins", json!({ "joints": joints }));
     builder.root_node(json!({ "mesh": mesh, "skin": skin }));
     let x = 0.1 * (1.0 + 2.0 + 3.0) + 0.6 * 4.0;

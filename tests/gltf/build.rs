@@ -1,12 +1,11 @@
-//! Small glTF files made in code: their JSON as it is, their numbers in one buffer, written in each of the ways that a file may
-//! have.
+//! Builder of small glTF files, with the buffer in any of the permitted places.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-/// A component's type, by its number in glTF (glTF 2.0, 3.6.2.2).
+/// Component types by their codes (glTF 2.0, 3.6.2.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Component {
     I8 = 5120,
@@ -26,7 +25,7 @@ impl Component {
         }
     }
 
-    /// What a value of 1 is stored as where values are normalized.
+    /// Returns the stored value of a normalized 1.
     pub fn one(self) -> f64 {
         match self {
             Component::I8 => 127.0,
@@ -49,14 +48,14 @@ impl Component {
     }
 }
 
-/// Where a file keeps its buffer.
+/// Location of the buffer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Packing {
-    /// One .glb file.
+    /// In the .glb file.
     Binary,
-    /// A .gltf file with a file beside it, whose name has a space, as `%20`.
+    /// In a file with a space in its name, which the URI encodes as `%20`.
     Beside,
-    /// A .gltf file with a data URI.
+    /// In a data URI.
     Embedded,
 }
 
@@ -64,21 +63,20 @@ impl Packing {
     pub const ALL: [Packing; 3] = [Packing::Binary, Packing::Beside, Packing::Embedded];
 }
 
-/// A glTF file that is being made.
+/// A glTF file under construction.
 #[derive(Clone)]
 pub struct Builder {
     root: Map<String, Value>,
     bytes: Vec<u8>,
 }
 
-/// Two triangles in the plane z = 0 from (-1, -1) to (1, 1), seen from +z.
+/// Two triangles from (-1, -1, 0) to (1, 1, 0), facing +z.
 pub const QUAD: [[f64; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
-/// Texture coordinates of [`QUAD`]: an image is upright on it.
+/// Texture coordinates of [`QUAD`], for an upright image.
 pub const QUAD_UVS: [[f64; 2]; 4] = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
-/// Indices of [`QUAD`].
 pub const QUAD_INDICES: [u32; 6] = [0, 1, 2, 0, 2, 3];
 
-/// How many numbers an element has, and the rows of its columns, which start at multiples of 4 bytes.
+/// Returns columns and rows of an accessor type. Matrix columns start at multiples of 4 bytes.
 fn shape(kind: &str) -> (usize, usize) {
     match kind {
         "SCALAR" => (1, 1),
@@ -93,7 +91,7 @@ fn shape(kind: &str) -> (usize, usize) {
 }
 
 impl Builder {
-    /// A file without anything in it.
+    /// Returns an empty file.
     pub fn new() -> Builder {
         let mut root = Map::new();
         root.insert("asset".into(), json!({ "version": "2.0" }));
@@ -103,7 +101,7 @@ impl Builder {
         }
     }
 
-    /// Adds to one of the lists of the file (`"nodes"`, `"materials"`): the index there.
+    /// Appends to a top-level list such as `"nodes"`. Returns the index.
     pub fn add(&mut self, list: &str, value: Value) -> usize {
         let list = self.root.entry(list).or_insert_with(|| json!([]));
         let list = list.as_array_mut().expect("a list");
@@ -111,17 +109,14 @@ impl Builder {
         list.len() - 1
     }
 
-    /// Sets a value at the top of the file.
     pub fn set(&mut self, key: &str, value: Value) {
         self.root.insert(key.into(), value);
     }
 
-    /// What is at the top of the file.
     pub fn get(&mut self, key: &str) -> &mut Value {
         self.root.get_mut(key).unwrap_or_else(|| panic!("no {key}"))
     }
 
-    /// Names an extension that is used.
     pub fn uses(&mut self, extension: &str) {
         let names = self.root.entry("extensionsUsed").or_insert_with(|| json!([]));
         let names = names.as_array_mut().expect("a list");
@@ -130,13 +125,13 @@ impl Builder {
         }
     }
 
-    /// Names an extension that a reader must know.
+    /// Adds to `extensionsUsed` and `extensionsRequired`.
     pub fn requires(&mut self, extension: &str) {
         self.uses(extension);
         self.add("extensionsRequired", json!(extension));
     }
 
-    /// Bytes in the buffer, from a multiple of 4 on: the index of their view.
+    /// Appends bytes at a multiple of 4. Returns the buffer view.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
@@ -144,7 +139,7 @@ impl Builder {
         self.add("bufferViews", view)
     }
 
-    /// The bytes of elements, each from a multiple of `align` on.
+    /// Encodes elements, each aligned to `align` bytes.
     pub fn elements(kind: &str, component: Component, values: &[f64], align: usize) -> Vec<u8> {
         let (columns, rows) = shape(kind);
         let mut bytes = Vec::new();
@@ -161,7 +156,7 @@ impl Builder {
         bytes
     }
 
-    /// An accessor over values as they are stored, tightly packed: its index.
+    /// Adds stored values, tightly packed. Returns the accessor.
     pub fn accessor(&mut self, kind: &str, component: Component, values: &[f64]) -> usize {
         let (columns, rows) = shape(kind);
         let bytes = Builder::elements(kind, component, values, 1);
@@ -173,8 +168,7 @@ impl Builder {
         )
     }
 
-    /// An accessor of a vertex attribute: elements start at multiples of 4 bytes, and its least and largest values are told,
-    /// as those of positions must be.
+    /// Adds a vertex attribute with `min` and `max` and 4-byte alignment. Returns the accessor.
     pub fn attribute<const N: usize>(&mut self, component: Component, normalized: bool, values: &[[f64; N]]) -> usize {
         let kind = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][N];
         let stored = |value: f64| match (component, normalized) {
@@ -216,12 +210,11 @@ impl Builder {
         self.add("accessors", accessor)
     }
 
-    /// An accessor of floats for vertices.
     pub fn floats<const N: usize>(&mut self, values: &[[f64; N]]) -> usize {
         self.attribute(Component::F32, false, values)
     }
 
-    /// An accessor of floats that no vertex has, such as a sampler's input and output: its least and largest values are told.
+    /// Adds floats that are not a vertex attribute, such as keys of an animation. Returns the accessor.
     pub fn samples<const N: usize>(&mut self, values: &[[f64; N]]) -> usize {
         let index = self.floats(values);
         let view = self.get("accessors")[index]["bufferView"].as_u64().expect("a view") as usize;
@@ -231,12 +224,11 @@ impl Builder {
         index
     }
 
-    /// Indices of 32 bits.
     pub fn indices(&mut self, values: &[u32]) -> usize {
         self.indices_of(Component::U32, values)
     }
 
-    /// Indices of a type.
+    /// Adds indices. Returns the accessor.
     pub fn indices_of(&mut self, component: Component, values: &[u32]) -> usize {
         let values: Vec<f64> = values.iter().map(|index| f64::from(*index)).collect();
         let index = self.accessor("SCALAR", component, &values);
@@ -245,7 +237,7 @@ impl Builder {
         index
     }
 
-    /// The attributes of [`QUAD`]: positions, normals and texture coordinates.
+    /// Adds positions, normals and texture coordinates of [`QUAD`]. Returns the attributes.
     pub fn quad_attributes(&mut self) -> Value {
         let position = self.floats(&QUAD);
         let normal = self.floats(&[[0.0, 0.0, 1.0]; 4]);
@@ -253,7 +245,7 @@ impl Builder {
         json!({ "POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv })
     }
 
-    /// A mesh of one primitive, [`QUAD`] with these attributes.
+    /// Adds a mesh of [`QUAD`] with other attributes. Returns its index.
     pub fn quad_with(&mut self, attributes: Value, material: Option<usize>) -> usize {
         let indices = self.indices(&QUAD_INDICES);
         let mut primitive = json!({ "attributes": attributes, "indices": indices });
@@ -263,13 +255,13 @@ impl Builder {
         self.add("meshes", json!({ "primitives": [primitive] }))
     }
 
-    /// A mesh that is [`QUAD`].
+    /// Adds a mesh of [`QUAD`]. Returns its index.
     pub fn quad(&mut self, material: Option<usize>) -> usize {
         let attributes = self.quad_attributes();
         self.quad_with(attributes, material)
     }
 
-    /// A node, and a scene that has it, or that it is added to: the node's index.
+    /// Adds a root node, and a scene if the file has none. Returns the node's index.
     pub fn root_node(&mut self, node: Value) -> usize {
         let node = self.add("nodes", node);
         if !self.root.contains_key("scenes") {
@@ -281,25 +273,24 @@ impl Builder {
         node
     }
 
-    /// An image in the buffer.
+    /// Adds an image in the buffer. Returns its index.
     pub fn image(&mut self, bytes: &[u8], kind: &str) -> usize {
         let view = self.view(bytes);
         self.add("images", json!({ "bufferView": view, "mimeType": kind }))
     }
 
-    /// A texture of a PNG image, without filtering: its index.
+    /// Adds a texture with nearest filtering. Returns its index.
     pub fn texture(&mut self, width: u32, texels: &[[u8; 4]]) -> usize {
         let image = self.image(&png(width, texels), "image/png");
         let sampler = self.add("samplers", json!({ "magFilter": 9728, "minFilter": 9728 }));
         self.add("textures", json!({ "source": image, "sampler": sampler }))
     }
 
-    /// A texture all of whose texels are the same.
     pub fn plain_texture(&mut self, texel: [u8; 4]) -> usize {
         self.texture(2, &[texel; 4])
     }
 
-    /// A material that only shines, in its base colour: the picture has that colour exactly.
+    /// Adds an unlit material, which renders as exactly its base color. Returns its index.
     pub fn unlit(&mut self, mut pbr: Value) -> usize {
         self.uses("KHR_materials_unlit");
         let map = pbr.as_object_mut().expect("a table");
@@ -311,7 +302,7 @@ impl Builder {
         )
     }
 
-    /// The JSON of the file, with this URI for its buffer.
+    /// Returns the JSON; `uri` is that of the buffer.
     fn json(&self, uri: Option<String>) -> Vec<u8> {
         let mut root = self.root.clone();
         if !self.bytes.is_empty() {
@@ -324,7 +315,7 @@ impl Builder {
         serde_json::to_vec_pretty(&Value::Object(root)).expect("JSON")
     }
 
-    /// The bytes of a .glb file (glTF 2.0, 4.4).
+    /// Returns the bytes of a .glb file (glTF 2.0, 4.4).
     pub fn glb(&self) -> Vec<u8> {
         let mut json = self.json(None);
         json.resize(json.len().next_multiple_of(4), b' ');
@@ -345,8 +336,8 @@ impl Builder {
         file
     }
 
-    /// Writes the file into a folder, `NAME.glb` or `NAME.gltf`: its path. Where `WGRAY_TEST_GLTF` names a folder, it is
-    /// written there too, for `scripts/check-gltf` to look at.
+    /// Writes `NAME.glb` or `NAME.gltf` and returns its path. `WGRAY_TEST_GLTF` is a folder for a copy for
+    /// `scripts/check-gltf`.
     pub fn write(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
         if let Some(kept) = std::env::var_os("WGRAY_TEST_GLTF") {
             self.write_into(Path::new(&kept), name, packing);
@@ -354,7 +345,7 @@ impl Builder {
         self.write_into(folder, name, packing)
     }
 
-    /// Writes a file that is meant to be wrong: nothing but the program looks at it.
+    /// Writes an invalid file, without a copy.
     pub fn write_unsound(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
         self.write_into(folder, name, packing)
     }
@@ -377,7 +368,7 @@ impl Builder {
     }
 }
 
-/// The bytes of a PNG file of 8-bit RGBA texels, row by row from the top.
+/// Returns a PNG file of 8-bit RGBA texels from the top left.
 pub fn png(width: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, texels.len() as u32 / width);
@@ -389,7 +380,7 @@ pub fn png(width: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     bytes
 }
 
-/// Bytes as text (RFC 4648, section 4).
+/// Encodes bytes as Base64 (RFC 4648, section 4).
 pub fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::new();
@@ -421,7 +412,7 @@ fn base64_is_that_of_the_rfc() {
 
 #[test]
 fn columns_of_matrices_start_at_multiples_of_four_bytes() {
-    // glTF 2.0, 3.6.2.4: a 3 x 3 matrix of bytes takes 12, but for the padding of its last column.
+    // Columns of 3 bytes are padded to 4 (glTF 2.0, 3.6.2.4).
     let matrix = Builder::elements("MAT3", Component::U8, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 4);
     assert_eq!(matrix, [1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0]);
 }

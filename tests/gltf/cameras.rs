@@ -1,4 +1,4 @@
-//! Cameras of a file, and the one that it is seen by where it has none.
+//! Cameras of a glTF file, and the default camera.
 
 use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use super::build::{Builder, Packing};
 use super::read::{assert_near, to_file, triangles};
 use crate::place::Place;
 
-/// A quad, and a camera on a turned node below a moved and scaled one.
+/// Returns a quad and a camera on a rotated node below a scaled one.
 fn seen_by(camera: Value) -> Builder {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
@@ -71,11 +71,11 @@ fn the_files_camera_is_where_its_node_is() {
         let wide = perspective["aspectRatio"].is_number();
         let builder = seen_by(json!({ "type": "perspective", "perspective": perspective }));
         let scene = load(&builder, name);
-        // The picture has the camera's aspect, where it has one.
+        // The camera's aspect ratio applies.
         assert_eq!((scene.width, scene.height), (720, if wide { 360 } else { 720 }));
         let camera = scene.camera;
         assert_near(to_file(camera.position).to_array(), [1.0, 2.0, 5.0]);
-        // It looks along -z of its node; its scale is without effect.
+        // It looks along -z of its node, without the scale.
         let forward = DQuat::from_rotation_y(0.5) * -DVec3::Z;
         assert_near(to_file(camera.forward).to_array(), forward.to_array());
         assert_near(to_file(camera.up).to_array(), [0.0, 1.0, 0.0]);
@@ -130,9 +130,8 @@ fn a_file_without_a_camera_is_in_the_picture() {
                 most = most.max((to.dot(to_file(axis)) / away / (fov / 2.0).tan()).abs());
             }
         }
-        // All of it, and not from far away.
+        // Inside of the image, and at least half as large.
         assert!(most < 1.0 && most > 0.5, "{scale:?}: {most}");
-        // Seen from the front, which is +z of the file.
         assert!(to_file(camera.forward).z < 0.0, "{:?}", camera.forward);
     }
 }

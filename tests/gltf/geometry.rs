@@ -1,4 +1,4 @@
-//! Accessors, primitives and their attributes: positions of corners, texture coordinates, colours.
+//! glTF accessors, primitive modes and vertex attributes.
 
 use glam::DVec3;
 use serde_json::json;
@@ -8,7 +8,7 @@ use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES, QUAD_UVS};
 use super::read::{assert_all, assert_corners, corners, pixels, refusal, scene, scene_with, triangles};
 use crate::place::Place;
 
-/// The two triangles of [`QUAD`].
+/// Triangle corners of [`QUAD`].
 const QUAD_CORNERS: [[[f64; 3]; 3]; 2] = [[QUAD[0], QUAD[1], QUAD[2]], [QUAD[0], QUAD[2], QUAD[3]]];
 
 fn quad() -> Builder {
@@ -32,7 +32,7 @@ fn a_buffer_in_the_file_beside_it_and_in_a_data_uri_is_the_same() {
                 assert_eq!((uv.x, uv.y), ((corner.x + 1.0) / 2.0, (1.0 - corner.y) / 2.0));
             }
         }
-        // The file and its buffer are what a page watches.
+        // The watched files.
         let beside = usize::from(packing == Packing::Beside);
         assert_eq!(scene.files.len(), 1 + beside, "{:?}", scene.files);
     }
@@ -51,14 +51,14 @@ fn indices_may_be_of_each_type() {
     }
 }
 
-/// What a value is after it was stored as a normalized whole number (glTF 2.0, 3.6.2.2, and `KHR_mesh_quantization`).
+/// Returns a value as a normalized integer stores it (glTF 2.0, 3.6.2.2; `KHR_mesh_quantization`).
 fn rounded(component: Component, value: f64) -> f64 {
     (value * component.one()).round() / component.one()
 }
 
 #[test]
 fn positions_may_be_whole_numbers_of_each_type() {
-    // Multiplied by a node, as the quantization of a program has it.
+    // The scale of the node dequantizes, as in files of quantization tools.
     for component in [Component::I8, Component::U8, Component::I16, Component::U16] {
         for normalized in [false, true] {
             let signed = matches!(component, Component::I8 | Component::I16);
@@ -143,7 +143,7 @@ fn normals_of_whole_numbers_are_unit_vectors() {
 
 #[test]
 fn strips_and_fans_have_their_triangles_the_right_way_round() {
-    // A zigzag for a strip, and a circle for a fan, both seen from +z: glTF 2.0, 3.7.2.1.
+    // A strip and a fan, counterclockwise from +z (glTF 2.0, 3.7.2.1).
     let zigzag = [
         [0.0, 1.0, 0.0],
         [0.0, 0.0, 0.0],
@@ -213,7 +213,7 @@ fn points_and_lines_are_left_out_and_said() {
             .collect::<Vec<_>>()
             .join("\n");
         assert!(notes.contains(word) && notes.contains(".glb"), "{notes:?}");
-        // Without a triangle there is nothing to see.
+        // A file without triangles is an error.
         builder.get("meshes")[0]["primitives"] = json!([other]);
         let message = refusal(&builder, "");
         assert!(message.contains("triangle"), "{message}");
@@ -248,7 +248,7 @@ fn sparse_accessors_replace_what_is_there_or_zeros() {
         accessor["min"] = json!(end(f64::min));
         accessor["max"] = json!(end(f64::max));
         let position = builder.add("accessors", accessor);
-        // With zeros alone two corners are the same: one triangle of three different points.
+        // Without a base two corners are zero: only one triangle has three different corners.
         let order: &[u32] = if based { &QUAD_INDICES } else { &[0, 1, 3] };
         let indices = builder.indices(order);
         let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });
@@ -295,7 +295,7 @@ fn attributes_may_lie_between_each_other() {
 
 #[test]
 fn without_normals_triangles_are_flat() {
-    // A roof: glTF 2.0, 3.7.2.1, asks for flat normals, not for those of a smooth mesh.
+    // Missing normals mean flat shading (glTF 2.0, 3.7.2.1).
     let points = [[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, -1.0]];
     let mut builder = Builder::new();
     let position = builder.floats(&points);
@@ -315,7 +315,7 @@ fn without_normals_triangles_are_flat() {
     }
 }
 
-/// A quad with colours for its vertices, and nothing but these to see.
+/// Returns an unlit quad with vertex colors.
 fn colored<const N: usize>(component: Component, colors: &[[f64; N]; 4], alpha: &str) -> Builder {
     let mut builder = Builder::new();
     let material = builder.unlit(json!({ "baseColorFactor": [1, 0.5, 1, 1] }));
@@ -332,10 +332,10 @@ fn vertex_colors_of_each_type_are_factors_of_the_base_color() {
     for component in [Component::U8, Component::U16, Component::F32] {
         let three = colored(component, &[[0.2, 0.4, 0.8]; 4], "OPAQUE");
         assert_all(&scene(&three, &format!("colors-{component:?}-3")), [0.2, 0.2, 0.8]);
-        // Alpha is without effect on what is opaque.
+        // `OPAQUE` ignores alpha.
         let four = colored(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "OPAQUE");
         assert_all(&scene(&four, &format!("colors-{component:?}-4")), [0.2, 0.2, 0.8]);
-        // What is less opaque than the cutoff is not there: the surroundings are seen.
+        // Alpha below the cutoff: the white environment is visible.
         let mask = colored(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "MASK");
         assert_all(&scene(&mask, &format!("colors-{component:?}-mask")), [1.0, 1.0, 1.0]);
     }
@@ -384,10 +384,10 @@ fn morph_targets_are_added_by_their_weights() {
     for normal in triangles(&by_mesh).iter().flat_map(|triangle| triangle.normals) {
         assert!(normal.distance(bent) < 1e-5, "{normal}, not {bent}");
     }
-    // A node's weights go before the mesh's.
+    // Weights of the node override those of the mesh.
     builder.get("nodes")[node]["weights"] = json!([1.0, -0.5]);
     assert_corners(&scene(&builder, "morph-node"), &known(1.0, -0.5));
-    // Two nodes with the same mesh have weights of their own.
+    // Instances have independent weights.
     builder.root_node(json!({ "mesh": mesh }));
     let known = [known(1.0, -0.5), known(0.5, 0.25)].concat();
     assert_corners(&scene(&builder, "morph-two"), &known);
@@ -404,7 +404,7 @@ fn a_file_by_itself_is_a_scene() {
         assert_eq!(scene.render.pixel_samples.count, 32);
         assert_eq!(scene.render.integrator, wgray::scene::Integrator::Path);
         assert_eq!(scene.view.transform, wgray::scene::ViewTransform::KhronosPbrNeutral);
-        // There is no light in it: a studio shines.
+        // Without lights the studio environment is used.
         assert!(scene.environment.is_some());
     }
 }

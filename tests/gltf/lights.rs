@@ -1,4 +1,4 @@
-//! `KHR_lights_punctual`: where lights are, which way they shine, and how brightly.
+//! `KHR_lights_punctual`: position, direction and intensity.
 
 use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use super::build::{Builder, Packing};
 use super::read::{assert_near, pixels, scene, scene_by, to_file};
 use crate::place::Place;
 
-/// A quad, and a light below two nodes, of which the upper one is scaled.
+/// Returns a quad and a light on a rotated node below a scaled one.
 fn lit(light: Value) -> Builder {
     let mut builder = Builder::new();
     builder.uses("KHR_lights_punctual");
@@ -39,7 +39,7 @@ fn candelas_are_intensity() {
 fn lux_are_irradiance() {
     let light = json!({ "type": "directional", "intensity": 3, "color": [1, 0.5, 0.25] });
     match &scene(&lit(light), "light-directional").lights[..] {
-        // It shines along -z of its node, which is turned to look down.
+        // Emission is along -z of the node, which points down.
         [Light::Directional { direction, color }] => {
             assert_near(to_file(*direction).to_array(), [0.0, -1.0, 0.0]);
             assert_near(color.to_array(), [3.0, 1.5, 0.75]);
@@ -67,7 +67,7 @@ fn spots_have_two_angles() {
             ] => {
                 assert_near(to_file(*position).to_array(), [1.0, 2.0, 3.0]);
                 assert_near(to_file(*direction).to_array(), [0.0, -1.0, 0.0]);
-                // Its defaults: white, 1 candela.
+                // Defaults: white, 1 cd.
                 assert_near(color.to_array(), [1.0; 3]);
                 assert_near([*cone, *within], [outer, inner]);
             }
@@ -94,7 +94,7 @@ fn a_light_of_no_intensity_is_taken() {
 
 #[test]
 fn a_rough_white_surface_under_lux_is_as_bright_as_the_formula_says() {
-    // A rough dielectric of ior 1 reflects nothing: what is left is Lambert's law, albedo / pi for each lux that comes straight.
+    // Without specular reflection at an IOR of 1 the BRDF is albedo / pi.
     let mut builder = Builder::new();
     builder.uses("KHR_lights_punctual");
     builder.uses("KHR_materials_ior");
@@ -108,12 +108,12 @@ fn a_rough_white_surface_under_lux_is_as_bright_as_the_formula_says() {
     let lights = json!([{ "type": "directional", "intensity": 5 }, { "type": "point", "intensity": 12 }]);
     builder.set("extensions", json!({ "KHR_lights_punctual": { "lights": lights } }));
     builder.root_node(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
-    // Far enough away that it shines on all of the quad as on its middle, but for a part in ten thousand.
+    // Far enough for an irradiance that is uniform to 1e-4.
     builder.root_node(json!({ "translation": [0, 0, 100], "extensions": { "KHR_lights_punctual": { "light": 1 } } }));
     builder.get("extensions")["KHR_lights_punctual"]["lights"][1]["intensity"] = json!(20_000);
     let place = Place::with_file("a", "");
     let file = builder.write(place.folder(), "lux", Packing::Binary);
-    // No light but the file's: the surroundings are black.
+    // The environment is black.
     let mut scene = super::read::scene_with(&file, "");
     scene.environment = None;
     scene.render.background = DVec3::ZERO;
@@ -122,7 +122,7 @@ fn a_rough_white_surface_under_lux_is_as_bright_as_the_formula_says() {
     for pixel in pixels(&scene) {
         for (k, albedo) in [0.8, 0.4, 0.2].into_iter().enumerate() {
             let known = albedo / std::f64::consts::PI * irradiance;
-            // One of two lights is chosen for each sample.
+            // Each sample selects one of two lights.
             assert!(
                 (f64::from(pixel[k]) / known - 1.0).abs() < 0.15,
                 "{pixel:?}, not {known}"

@@ -1,4 +1,4 @@
-//! What materials say in numbers, and what they say of alpha and of sides.
+//! glTF materials, their extensions, alpha modes, sidedness and variants.
 
 use serde_json::{Value, json};
 use wgray::scene::{AlphaMode, Scene};
@@ -9,7 +9,6 @@ use super::read::{
 };
 use crate::place::Place;
 
-/// A quad of a material.
 fn quad_of(material: Value) -> Builder {
     let mut builder = Builder::new();
     if let Some(extensions) = material["extensions"].as_object() {
@@ -21,7 +20,7 @@ fn quad_of(material: Value) -> Builder {
     builder
 }
 
-/// A material of one extension.
+/// Returns a dielectric with one extension.
 fn extended(extension: &str, values: Value) -> Value {
     json!({
         "pbrMetallicRoughness": { "metallicFactor": 0 },
@@ -38,14 +37,14 @@ fn what_a_file_does_not_say_is_as_the_specification_has_it() {
         let scene = scene(&builder, name);
         let material = material(&scene);
         let principled = principled(&scene);
-        // glTF 2.0, 3.9.2: white, a metal, rough.
+        // Defaults: white, metallic, rough (glTF 2.0, 3.9.2).
         assert_eq!(plain_color(principled.base_color), [1.0; 3]);
         assert_eq!(plain(principled.metallic), 1.0);
         assert_eq!(plain(principled.roughness), 1.0);
         assert_eq!(plain_color(material.emission), [0.0; 3]);
         assert_eq!(principled.alpha_mode, AlphaMode::Opaque);
         assert_eq!(material.normal_map, None);
-        // And what extensions add is not there.
+        // Defaults of extensions.
         assert_eq!(principled.ior, 1.5);
         assert_eq!(plain(principled.specular), 1.0);
         assert_eq!(plain_color(principled.specular_color), [1.0; 3]);
@@ -85,7 +84,7 @@ fn emission_may_be_stronger_than_one() {
 fn indices_of_refraction_are_taken() {
     let of = |ior: f64, name: &str| scene(&quad_of(extended("KHR_materials_ior", json!({ "ior": ior }))), name);
     assert_near([principled(&of(1.33, "ior")).ior], [1.33]);
-    // 0 is as good as infinity, for materials that reflect like paint of their own colour at every angle.
+    // An IOR of 0 means a Fresnel term of 1; a high IOR approximates it.
     assert!(principled(&of(0.0, "ior-zero")).ior >= 50.0);
 }
 
@@ -101,11 +100,11 @@ fn transmission_is_that_of_a_sheet_without_a_volume() {
             json!({ "thicknessFactor": thickness, "attenuationDistance": 2, "attenuationColor": [0.5, 0.25, 1] });
         scene(&quad_of(material), name)
     };
-    // A thickness of 0 is thin walled: KHR_materials_volume.
+    // 0 is thin-walled (`KHR_materials_volume`).
     assert!(principled(&volume(0.0, "volume-thin")).thin);
     let thick = volume(0.5, "volume");
     assert!(!principled(&thick).thin);
-    // The colour is what is left after the distance.
+    // Beer-Lambert: the color is the transmittance over the distance.
     let known = [0.5_f64, 0.25, 1.0].map(|left| -left.ln() / 2.0);
     assert_near(principled(&thick).absorption.to_array(), known);
 }
@@ -171,7 +170,7 @@ fn specular_and_glossiness_of_older_files_become_a_dielectric() {
     let principled = principled(&scene);
     assert_near(plain_color(principled.base_color), [0.1, 0.2, 0.3]);
     assert_near([plain(principled.metallic), plain(principled.roughness)], [0.0, 0.25]);
-    // What is reflected head-on is the specular colour: 0.04 of an index of 1.5, times the factor.
+    // F0 is the specular color times that of the IOR.
     let head_on = ((principled.ior - 1.0) / (principled.ior + 1.0)).powi(2);
     assert_near(
         plain_color(principled.specular_color).map(|x| x * head_on),
@@ -218,12 +217,12 @@ fn what_is_unlit_has_its_base_color() {
 
 #[test]
 fn polished_metal_in_white_light_has_its_base_color() {
-    // Head-on Schlick's curve is the colour itself, and all that is mirrored is white.
+    // At normal incidence Schlick's Fresnel term is the base color.
     let metal = json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.25, 0.5, 0.75, 1], "roughnessFactor": 0 } });
     assert_all(&scene(&quad_of(metal), "metal"), [0.25, 0.5, 0.75]);
 }
 
-/// An unlit quad of alpha 0.4.
+/// Returns an unlit quad of alpha 0.4 before a white environment.
 fn veil(mode: &str, cutoff: Option<f64>) -> Scene {
     let mut builder = Builder::new();
     let material = builder.unlit(json!({ "baseColorFactor": [0.25, 0.5, 0.75, 0.4] }));
@@ -244,7 +243,7 @@ fn alpha_does_what_its_mode_says() {
     assert_all(&veil("MASK", Some(0.375)), there);
     assert_all(&veil("MASK", Some(0.0)), there);
     assert_all(&veil("MASK", Some(2.0)), behind);
-    // Between the two by chance: the means over many samples.
+    // `BLEND` is stochastic.
     let mut scene = veil("BLEND", None);
     scene.render.pixel_samples.count = 64 * 64;
     let pixels = super::read::pixels(&scene);
@@ -334,7 +333,6 @@ fn a_scene_may_put_a_material_in_place_of_one_of_the_file() {
         assert!(row[..3].iter().all(|pixel| *pixel == [0.5; 3]), "{row:?}");
         assert!(row[3..].iter().all(|pixel| *pixel == [0.125, 0.25, 0.5]), "{row:?}");
     }
-    // A name that the file does not have.
     let keys = format!("materials = {{ green = \"lamp\" }}\n{lamp}");
     let message = super::read::try_scene(&file, &keys).expect_err("no such material");
     assert!(message.contains("green") && message.contains("red"), "{message}");

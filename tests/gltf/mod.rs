@@ -1,5 +1,4 @@
-//! What the program makes of glTF files, against what is known of them from elsewhere: each feature in a small file of its own,
-//! which `scripts/check-gltf` has looked at by the Khronos validator too.
+//! The glTF importer: one generated file per feature, which `scripts/check-gltf` also passes to the Khronos validator.
 
 mod agreement;
 mod animations;

@@ -1,4 +1,4 @@
-//! Scenes and their nodes: where things are, how often, and which side is outside.
+//! glTF scenes and nodes: transforms, instances, orientation.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use wgray::scene::{Geometry, Reflection, Scene, Shape};
 use super::build::{Builder, Component, QUAD};
 use super::read::{assert_corners, corners, plain_color, refusal, scene, scene_by, triangles};
 
-/// The corners of [`QUAD`] after a map.
+/// Returns the triangles of the transformed [`QUAD`].
 fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
     let p = QUAD.map(|corner| map(DVec3::from_array(corner)).to_array());
     [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
@@ -29,12 +29,11 @@ fn maps_of_nodes_are_multiplied_from_the_root_on() {
         "translation": [4, 5, 6], "rotation": turn.to_array(), "scale": [1, 2, 0.5], "children": [leaf],
     });
     builder.root_node(outer);
-    // What is scaled after it was turned is sheared.
+    // A scale after a rotation shears.
     let map = DAffine3::from_scale_rotation_translation(DVec3::new(1.0, 2.0, 0.5), turn, DVec3::new(4.0, 5.0, 6.0));
     let known = quad_by(|p| map.transform_point3(inner.transform_point3(p)));
     let scene = scene(&builder, "hierarchy");
     assert_corners(&scene, &known);
-    // Normals are at right angles to the sides.
     for triangle in triangles(&scene) {
         for normal in triangle.normals {
             assert!(normal.distance(triangle.side()) < 1e-5, "{triangle:?}");
@@ -54,7 +53,7 @@ fn mirrored_things_keep_their_outside() {
         builder.root_node(json!({ "mesh": mesh, "scale": scale }));
         let scene = scene(&builder, &format!("mirrored-{name}"));
         assert_corners(&scene, &quad_by(|p| p * DVec3::from_array(scale)));
-        // glTF 2.0, 3.7.4: where the determinant is negative clockwise triangles face the viewer.
+        // A negative determinant reverses the winding order (glTF 2.0, 3.7.4).
         let outside = DVec3::new(0.0, 0.0, if name == "three" { -1.0 } else { 1.0 });
         for triangle in triangles(&scene) {
             assert_eq!(triangle.side(), outside, "{name}");
@@ -83,7 +82,7 @@ fn what_a_scale_flattens_is_there() {
         builder.root_node(json!({ "mesh": mesh, "translation": [0, 0, 2], "scale": scale }));
         scene(&builder, "flattened")
     };
-    // Along its normal, and by less than an instance may be scaled.
+    // Along its normal, and below the minimum scale of an instance.
     for (scale, by) in [([1.0, 1.0, 0.0], 1.0), ([1e-7; 3], 1e-7), ([-1e-7; 3], -1e-7)] {
         let scene = flattened(scale);
         assert_corners(&scene, &quad_by(|p| p * by + 2.0 * DVec3::Z));
@@ -93,7 +92,7 @@ fn what_a_scale_flattens_is_there() {
             scene.notes
         );
     }
-    // Nothing is left of a quad that loses an axis of its own, as while it vanishes in an animation.
+    // Without one of its own axes, as when an animation hides it.
     for scale in [[1.0, 0.0, 1.0], [0.0; 3], [1e-12; 3]] {
         let scene = flattened(scale);
         assert!(scene.shapes.is_empty());
@@ -146,7 +145,7 @@ fn instances_of_a_node_are_below_it() {
     let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
     builder.root_node(json!({ "mesh": mesh, "scale": [1, 1, 2], "translation": [0, 10, 0], "extensions": instancing }));
     let first = quad_by(|p| p + DVec3::new(0.0, 10.0, 0.0));
-    // Scaled, turned by a right angle, moved; then the node.
+    // Scale, rotation by 90 degrees, translation, node.
     let second = quad_by(|p| DVec3::new(-p.y + 3.0, 2.0 * p.x + 10.0, p.z));
     assert_corners(&scene(&builder, "gpu-instancing"), &[first, second].concat());
 }
@@ -170,7 +169,7 @@ fn instances_may_be_turned_by_whole_numbers() {
     assert_corners(&scene(&builder, "gpu-instancing-i16"), &[first, second].concat());
 }
 
-/// Two scenes, each with a quad in another place, and a node that is in none.
+/// Returns two scenes with one quad each, and a node outside of both.
 fn two_scenes() -> Builder {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
@@ -204,7 +203,7 @@ fn nodes_that_go_in_circles_are_refused() {
     builder.get("nodes")[1]["children"] = json!([0]);
     let message = refusal(&builder, "");
     assert!(message.contains("nodes"), "{message}");
-    // A node below itself, and one that is below two.
+    // A node that is its own child.
     let mut builder = two_scenes();
     builder.get("nodes")[0]["children"] = json!([0]);
     assert!(refusal(&builder, "").contains("nodes"));
@@ -258,7 +257,7 @@ fn a_file_may_be_moved_turned_and_scaled() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh, "translation": [1, 0, 0] }));
-    // In the coordinates of the scene, whose z is the file's y.
+    // In scene coordinates, whose z is the y of the file.
     let keys = "scale = 2\nrotate = { axis = [0, 0, 1], degrees = 90 }\ntranslate = [0, 0, 5]";
     let turn = DMat3::from_axis_angle(DVec3::Y, std::f64::consts::FRAC_PI_2);
     let known = quad_by(|p| turn * (2.0 * (p + DVec3::X)) + 5.0 * DVec3::Y);

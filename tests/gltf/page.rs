@@ -1,4 +1,4 @@
-//! The tables of `docs/gltf.md`: every row names a test that is there, and every extension that is known has a row.
+//! `docs/gltf.md`: each row names an existing test, each known extension has a row.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,7 +9,7 @@ fn read(file: &str) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// What stands between backquotes in a line.
+/// Returns the texts in backquotes.
 fn quoted(line: &str) -> Vec<&str> {
     line.split('`').skip(1).step_by(2).collect()
 }

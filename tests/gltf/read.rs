@@ -1,4 +1,4 @@
-//! What a scene has of a glTF file, in the coordinates of the file, and how it looks.
+//! Loads and renders glTF files in the coordinates of the file.
 
 use std::path::Path;
 
@@ -9,8 +9,7 @@ use wgray::{Device, Options};
 use super::build::{Builder, Packing};
 use crate::place::Place;
 
-/// A camera that sees the square of [`QUAD`](super::build::QUAD) from +z of the file, which is -y here, and fills the picture
-/// with it; white light from everywhere.
+/// A camera at +z of the file (-y of the scene), whose image [`QUAD`](super::build::QUAD) fills; white environment.
 const SCENE: &str = r#"
 image = { width = 6, height = 6 }
 camera = { type = "orthographic", position = [0, -10, 0], look_at = [0, 0, 0], height = 2 }
@@ -23,22 +22,22 @@ color = [1, 1, 1]
 type = "gltf"
 "#;
 
-/// A triangle of the scene: what its corners have, in the coordinates of the file.
+/// A triangle of the scene in file coordinates.
 #[derive(Clone, Debug)]
 pub struct Triangle {
     pub corners: [DVec3; 3],
-    /// Zero where the mesh has no normals.
+    /// Zero if the mesh has none.
     pub normals: [DVec3; 3],
-    /// As the file has them: v downwards.
+    /// In glTF convention: v points down.
     pub uvs: [DVec2; 3],
     /// Index into [`Scene::materials`].
     pub material: usize,
-    /// Whether its instance is mirrored, so that its corners are clockwise from outside.
+    /// True if mirrored: the winding is clockwise.
     pub mirrored: bool,
 }
 
 impl Triangle {
-    /// Its outer side by its corners.
+    /// Returns the geometric normal.
     pub fn side(&self) -> DVec3 {
         let [a, b, c] = self.corners;
         let normal = (b - a).cross(c - a).normalize();
@@ -46,17 +45,17 @@ impl Triangle {
     }
 }
 
-/// The scene's (x, y, z) as the file has it: there +y is up.
+/// Converts scene to file coordinates, where +y is up.
 pub fn to_file(p: DVec3) -> DVec3 {
     DVec3::new(p.x, p.z, -p.y)
 }
 
-/// The scene that has a file alone, with further keys of its shape.
+/// Loads the scene of a file, with additional keys of its shape.
 pub fn scene_with(file: &Path, keys: &str) -> Scene {
     try_scene(file, keys).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The same, or the error.
+/// Loads it as [`scene_with`] does, or returns the error.
 pub fn try_scene(file: &Path, keys: &str) -> Result<Scene, String> {
     let folder = file.parent().expect("a folder");
     let name = file.file_name().expect("a name").to_string_lossy();
@@ -66,19 +65,18 @@ pub fn try_scene(file: &Path, keys: &str) -> Result<Scene, String> {
     Scene::load(&path).map_err(|error| error.to_string())
 }
 
-/// The scene of a file that is made here.
 pub fn scene(builder: &Builder, name: &str) -> Scene {
     let place = Place::with_file("a", "");
     scene_with(&builder.write(place.folder(), name, Packing::Binary), "")
 }
 
-/// The same with further keys of its shape.
+/// Loads it as [`scene`] does, with additional keys.
 pub fn scene_by(builder: &Builder, name: &str, keys: &str) -> Scene {
     let place = Place::with_file("a", "");
     scene_with(&builder.write(place.folder(), name, Packing::Binary), keys)
 }
 
-/// What is told of a file that is refused, which is wrong itself or asks for what is not there.
+/// Returns the error message of an invalid file or invalid keys.
 pub fn refusal(builder: &Builder, keys: &str) -> String {
     let place = Place::with_file("a", "");
     let file = builder.write_unsound(place.folder(), "bad", Packing::Binary);
@@ -88,7 +86,7 @@ pub fn refusal(builder: &Builder, keys: &str) -> String {
     }
 }
 
-/// All triangles of a scene, by their shapes and their order in the meshes.
+/// Returns all triangles in the order of shapes and meshes.
 pub fn triangles(scene: &Scene) -> Vec<Triangle> {
     let mut found = Vec::new();
     for thing in &scene.shapes {
@@ -123,12 +121,10 @@ pub fn triangles(scene: &Scene) -> Vec<Triangle> {
     found
 }
 
-/// The corners of a scene's triangles.
 pub fn corners(scene: &Scene) -> Vec<[DVec3; 3]> {
     triangles(scene).iter().map(|triangle| triangle.corners).collect()
 }
 
-/// Holds the corners of triangles to those that are known, in this order.
 #[track_caller]
 pub fn assert_corners(scene: &Scene, known: &[[[f64; 3]; 3]]) {
     let corners = corners(scene);
@@ -139,13 +135,13 @@ pub fn assert_corners(scene: &Scene, known: &[[[f64; 3]; 3]]) {
     }
 }
 
-/// The material of the scene's only mesh, or of its first triangle.
+/// Returns the material of the first triangle.
 pub fn material(scene: &Scene) -> &Material {
     let triangles = triangles(scene);
     &scene.materials[triangles.first().expect("a triangle").material]
 }
 
-/// What such a material reflects.
+/// Returns the BSDF of the first triangle.
 pub fn principled(scene: &Scene) -> &Principled {
     match &material(scene).reflection {
         Reflection::Principled(principled) => principled,
@@ -153,7 +149,7 @@ pub fn principled(scene: &Scene) -> &Principled {
     }
 }
 
-/// A value that comes from no texture.
+/// Returns a value that must be untextured.
 #[track_caller]
 pub fn plain(value: Value) -> f64 {
     match value {
@@ -162,7 +158,7 @@ pub fn plain(value: Value) -> f64 {
     }
 }
 
-/// A colour that comes from no texture.
+/// Returns a color that must be untextured.
 #[track_caller]
 pub fn plain_color(color: Color) -> [f64; 3] {
     match color {
@@ -171,14 +167,14 @@ pub fn plain_color(color: Color) -> [f64; 3] {
     }
 }
 
-/// Whether two numbers are the same but for the rounding of 32 bits.
+/// Asserts equality in single precision.
 #[track_caller]
 pub fn assert_near<const N: usize>(found: [f64; N], known: [f64; N]) {
     let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs().max(1.0);
     assert!(found.iter().zip(&known).all(near), "{found:?} is not {known:?}");
 }
 
-/// The pixels of a scene, row by row from the top.
+/// Renders on the CPU. Returns the pixels from the top left.
 pub fn pixels(scene: &Scene) -> Vec<[f32; 3]> {
     let options = Options {
         device: Device::Cpu,
@@ -187,7 +183,7 @@ pub fn pixels(scene: &Scene) -> Vec<[f32; 3]> {
     wgray::render(scene, &options).expect("a picture").pixels().colors
 }
 
-/// Holds every pixel of a scene to one colour, to five digits.
+/// Asserts one color for all pixels, within 1e-5.
 #[track_caller]
 pub fn assert_all(scene: &Scene, known: [f64; 3]) {
     let pixels = pixels(scene);

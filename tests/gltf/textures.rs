@@ -1,4 +1,4 @@
-//! Images on surfaces: which texel is where, what each channel means, and normals.
+//! glTF textures: images, samplers, texture coordinates, channels, normal maps.
 
 use serde_json::{Value, json};
 use wgray::{Aov, Channel, Device, Options, Scene};
@@ -12,14 +12,14 @@ const GREEN: [u8; 4] = [0, 255, 0, 255];
 const BLUE: [u8; 4] = [0, 0, 255, 255];
 const WHITE: [u8; 4] = [255; 4];
 
-/// An unlit quad with a texture.
+/// Adds an unlit, textured quad.
 fn pictured(builder: &mut Builder, info: Value) {
     let material = builder.unlit(json!({ "baseColorTexture": info }));
     let mesh = builder.quad(Some(material));
     builder.root_node(json!({ "mesh": mesh }));
 }
 
-/// Holds the quarters of the picture, from the top left, to colours.
+/// Asserts the colors of the four quarters from the top left.
 #[track_caller]
 fn assert_quarters(scene: &Scene, known: [[u8; 4]; 4]) {
     let pixels = pixels(scene);
@@ -83,7 +83,7 @@ fn jpeg_and_webp_are_read() {
     let texture = builder.add("textures", texture);
     pictured(&mut builder, json!({ "index": texture }));
     assert_quarters(&scene(&builder, "webp"), [RED, GREEN, BLUE, WHITE]);
-    // Each color on 8 x 8 texels, so that a JPEG has it as it is, nearly.
+    // 8 x 8 texels of one color are almost exact in a JPEG.
     let large: Vec<u8> = (0..256).flat_map(|i| [[255, 0, 0], [255; 3]][(i / 8) % 2]).collect();
     let mut jpeg = Vec::new();
     let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 100);
@@ -107,7 +107,7 @@ fn ktx2_file(name: &str) -> Vec<u8> {
     std::fs::read(crate::sources::path(&format!("tests/textures/ktx2/{name}"))).expect("a file")
 }
 
-/// An unlit quad with an image, which `KHR_texture_basisu` references if it is a KTX2 file.
+/// Returns an unlit quad with an image; for KTX2 through `KHR_texture_basisu`.
 fn with_image(bytes: &[u8], kind: &str, more: &Value) -> Builder {
     let mut builder = Builder::new();
     let image = builder.image(bytes, kind);
@@ -134,7 +134,7 @@ fn ktx2_files_are_read() {
     // UASTC represents a block of one color exactly.
     let builder = with_image(&ktx2_file("zstandard-quarters.ktx2"), "image/ktx2", &json!({}));
     assert_quarters(&scene(&builder, "zstandard-quarters"), [RED, GREEN, BLUE, WHITE]);
-    // Colors and alpha are those of a PNG file of the same texels.
+    // A PNG file has the same texels.
     let blend = json!({ "alphaMode": "BLEND" });
     let mut pictures = Vec::new();
     for name in ["etc1s-48x20-alpha", "uastc-48x20-alpha", "etc1s-quarters"] {
@@ -166,7 +166,7 @@ fn base_color_is_srgb_and_multiplied_by_its_factor() {
 
 #[test]
 fn textures_go_on_as_their_sampler_says() {
-    // From -1 to 2 in each direction, so that each third of the picture is one image: the columns' colours are red and green.
+    // u from -1 to 2: each third of the row is one repetition.
     let (r, g) = (RED, GREEN);
     for (mode, row) in [
         (10497, [r, g, r, g, r, g]),
@@ -201,7 +201,7 @@ fn each_direction_may_go_on_in_its_own_way() {
     let pixels = pixels(&scene(&builder, "wrap-both"));
     let top = [RED, GREEN, RED, GREEN, RED, GREEN].map(|texel| [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0));
     let bottom = [BLUE, WHITE, BLUE, WHITE, BLUE, WHITE].map(|texel| [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0));
-    // Of three images the one in the middle is there, and its first and last rows go on.
+    // v is clamped: the first and last texel rows extend.
     for (i, row) in pixels.chunks(6).enumerate() {
         assert_eq!(row, if i < 3 { top } else { bottom }, "row {i}");
     }
@@ -240,7 +240,7 @@ fn what_lacks_its_coordinates_is_told_of() {
     assert!(notes.iter().any(|note| note.message.contains(told)), "{notes:?}");
 }
 
-/// The scene of a picture of four colors whose texture is transformed.
+/// Returns a quad with a transformed texture of four colors.
 fn transformed(name: &str, transform: Value) -> Scene {
     let mut builder = Builder::new();
     builder.uses("KHR_texture_transform");
@@ -272,28 +272,28 @@ fn texture_transforms_are_those_of_the_extension() {
     );
     let lower = json!({ "offset": [0.5, 0.5], "scale": [0.5, 0.5] });
     assert_quarters(&transformed("transform-lower", lower), [WHITE; 4]);
-    // The extension's own examples: the image turned clockwise, here all of it; and upside down.
+    // Examples of the extension: a clockwise rotation, of the whole image and of a part, and a flip.
     let turned = json!({ "offset": [0, 1], "rotation": quarter });
     assert_quarters(&transformed("transform-turn", turned), [BLUE, RED, WHITE, GREEN]);
     let turned = json!({ "offset": [0, 1], "rotation": quarter, "scale": [0.5, 0.5] });
     assert_quarters(&transformed("transform-turn-quarter", turned), [BLUE; 4]);
     let flipped = json!({ "offset": [0, 1], "scale": [1, -1] });
     assert_quarters(&transformed("transform-flip", flipped), [BLUE, WHITE, RED, GREEN]);
-    // Scaled before it is turned: an image of half the height, and of all of its width.
+    // The scale precedes the rotation.
     let both = json!({ "offset": [0, 1], "rotation": quarter, "scale": [0.5, 1] });
     assert_quarters(&transformed("transform-order", both), [BLUE, BLUE, WHITE, WHITE]);
-    // Its set goes before that of the texture.
+    // `texCoord` of the transform takes precedence.
     assert_quarters(
         &transformed("transform-set", json!({ "texCoord": 1 })),
         [GREEN, RED, WHITE, BLUE],
     );
 }
 
-/// What each texture is multiplied by, and the plain values that are the same.
+/// A material with a constant texture, and its untextured equivalent.
 struct Row {
     name: &'static str,
     texel: [u8; 4],
-    /// The material, where `TEXTURE` stands for a texture.
+    /// `TEXTURE` stands for the texture reference.
     textured: Value,
     plain: Value,
 }
@@ -308,9 +308,9 @@ fn rows() -> Vec<Row> {
         textured,
         plain,
     };
-    // The part of a direction that is a byte of 128.
+    // The component that 128 encodes.
     let half: f64 = 128.0 / 255.0 * 2.0 - 1.0;
-    // What shines is a mirror here: else how its light is sampled would differ, as it does not for what is known to be plain.
+    // Emissive materials are delta-specular, as NEE samples textured emission differently.
     vec![
         row(
             "base-color",
@@ -451,7 +451,7 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-/// A quad that leans back, under a light from the right and above.
+/// Returns a tilted quad under a directional light from the upper right.
 fn leaning(name: &str, texel: [u8; 4], material: &Value) -> Scene {
     let mut builder = Builder::new();
     builder.uses("KHR_lights_punctual");
@@ -488,10 +488,10 @@ fn a_texture_of_one_color_is_as_its_product_with_the_factor() {
                 .map(|(a, b)| (a - b).abs() / b.abs().max(0.05))
                 .fold(0.0, f32::max)
         };
-        // What facets lose is in a table that is coarser where anisotropy comes from a texture.
+        // Textured anisotropy uses a coarser multiple-scattering table.
         let bound = if row.name.starts_with("anisotropy") { 0.01 } else { 1e-5 };
         assert!(far(&textured, &plain) < bound, "{}: {textured:?} {plain:?}", row.name);
-        // And the texture matters.
+        // The control.
         assert!(far(&white, &plain) > 0.1, "{}: {white:?} {plain:?}", row.name);
     }
 }
@@ -516,11 +516,11 @@ fn occlusion_is_ignored_and_said() {
     );
 }
 
-/// The shading normal of a quad with a normal map of one texel, in the coordinates of the file.
+/// Returns the shading normal of a quad with a constant normal map, in file coordinates.
 fn bent(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -> [f64; 3] {
     let mut builder = Builder::new();
     builder.uses("KHR_texture_transform");
-    // About (0.6, 0.2, 0.77): to the right, and a little up.
+    // About (0.6, 0.2, 0.77).
     let texture = builder.plain_texture([204, 153, 226, 255]);
     let mut info = map;
     info["index"] = json!(texture);
@@ -558,7 +558,7 @@ fn normal_maps_lean_as_their_texels_say() {
     let (x, y, z) = (0.6, 0.2, 226.0 / 255.0 * 2.0 - 1.0);
     let upright = QUAD_UVS;
     let check = |name: &str, map: Value, uvs, tangent, normal| known(name, bent(name, map, uvs, tangent), normal);
-    // Red is along u, green against v, which goes down: glTF 2.0, 3.9.3.
+    // Red is along +u, green along -v (glTF 2.0, 3.9.3).
     check("normal", json!({}), upright, None, [x, y, z]);
     check(
         "normal-scale",
@@ -567,7 +567,7 @@ fn normal_maps_lean_as_their_texels_say() {
         None,
         [0.5 * x, 0.5 * y, z],
     );
-    // Mirrored and turned coordinates take the normal along.
+    // Mirrored and rotated texture coordinates.
     check(
         "normal-mirrored",
         json!({}),
@@ -582,7 +582,7 @@ fn normal_maps_lean_as_their_texels_say() {
         None,
         [y, -x, z],
     );
-    // The file's tangents go before those of its coordinates.
+    // Tangents of the file take precedence.
     check(
         "normal-tangent",
         json!({}),
@@ -601,7 +601,7 @@ fn normal_maps_lean_as_their_texels_say() {
 
 #[test]
 fn a_transformed_normal_map_keeps_its_tangents() {
-    // KHR_texture_transform moves what is looked up; tangents are those of the mesh.
+    // `KHR_texture_transform` changes the lookup, not the tangents.
     let turned = json!({ "extensions": { "KHR_texture_transform": { "rotation": std::f64::consts::FRAC_PI_2 } } });
     let found = bent("normal-transformed", turned, QUAD_UVS, Some([1.0, 0.0, 0.0, 1.0]));
     assert!(

@@ -1,4 +1,4 @@
-//! Small files that ask for much, each of which took minutes or gigabytes once: a message that says the limit, or a picture.
+//! Small files that once took minutes or gigabytes: now an error that names the limit, or an image.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 use super::seeds::{START, TEXTURE, container, ktx2, triangle};
 use super::{Ran, render, render_with, run};
 
-/// What is told of a glTF file; soon, and in a gigabyte.
 fn model(json: &Value, binary: &[u8]) -> Ran {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.glb"), container(json, binary)).unwrap();
@@ -39,7 +38,7 @@ fn instances_are_in_proportion_to_the_file() {
     refused(&json, &binary, " bytes must have at most 656");
     json["nodes"] = node(2);
     assert_eq!(model(&json, &binary).code, 0);
-    // By nodes alone: as many as the text has room for.
+    // The text bounds the number of nodes.
     json["nodes"] = json!(vec![json!({ "mesh": 0 }); 100_000]);
     assert_eq!(model(&json, &binary).code, 0);
 }
@@ -72,7 +71,6 @@ fn accessors_are_not_read_for_ever() {
     push(&mut json["accessors"], zeros(1 << 22, "VEC3"));
     push(&mut json["accessors"], zeros(1 << 20, "MAT4"));
     let rule = "counted as often as they are read";
-    // Meshes of points that nothing uses.
     let mut many = json.clone();
     many["meshes"] = json!(vec![
         json!({ "primitives": [{ "attributes": { "POSITION": 1 }, "mode": 6 }] });
@@ -80,19 +78,16 @@ fn accessors_are_not_read_for_ever() {
     ]);
     many["nodes"] = (0..400).map(|i| json!({ "mesh": i })).collect();
     refused(&many, &binary, "a file of ");
-    // Morph targets.
     let mut morphed = json.clone();
     morphed["meshes"] = json!([{
         "weights": vec![1; 1000],
         "primitives": [{ "attributes": { "POSITION": 1 }, "targets": vec![json!({ "POSITION": 1 }); 1000] }],
     }]);
     refused(&morphed, &binary, rule);
-    // Skins.
     let mut skinned = json.clone();
     skinned["skins"] = json!(vec![json!({ "joints": [0], "inverseBindMatrices": 2 }); 200]);
     skinned["nodes"] = (0..200).map(|i| json!({ "mesh": 0, "skin": i })).collect();
     refused(&skinned, &binary, rule);
-    // Channels.
     push(&mut json["accessors"], zeros(1 << 22, "SCALAR"));
     json["animations"] = json!([{
         "samplers": [{ "input": 3, "output": 1 }],
@@ -107,7 +102,7 @@ fn accessors_are_not_read_for_ever() {
 #[test]
 fn compressed_views_are_in_proportion() {
     let (mut json, mut binary) = triangle();
-    // A stream that says that it is 4 GB of zeros.
+    // The header of a stream that declares 4 GB of zeros.
     binary.push(0xa0);
     json["buffers"][0]["byteLength"] = json!(binary.len());
     json["extensionsUsed"] = json!(["EXT_meshopt_compression"]);
@@ -167,7 +162,7 @@ fn shapes_that_name_one_file_often_are_few() {
         "{}",
         ran.said
     );
-    // Their names are found soon.
+    // Name lookup is not quadratic.
     json["nodes"] = json!([{ "mesh": 0 }]);
     fs::write(folder.join("a.glb"), container(&json, &binary)).unwrap();
     fs::write(folder.join("a.toml"), START.to_owned() + &shape.repeat(3000)).unwrap();
@@ -175,7 +170,7 @@ fn shapes_that_name_one_file_often_are_few() {
     assert_eq!(ran.code, 0, "{}", ran.said);
 }
 
-/// A PNG of zeros, written row by row.
+/// Returns a PNG of zeros, encoded by row.
 fn blank(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth) -> Vec<u8> {
     use std::io::Write as _;
     let mut bytes = Vec::new();
@@ -212,7 +207,7 @@ fn images_that_grow_a_thousandfold_are_told() {
     let primitive = |i: usize| json!({ "attributes": { "POSITION": 0 }, "material": i });
     json["meshes"][0]["primitives"] = (0..50).map(primitive).collect();
     refused(&json, &binary, "texels together; of files of ");
-    // 2 MB that decode to 2 GB, in a model, where large images are halved.
+    // 2 MB that decode to 2 GB. Large images of models are halved.
     let deep = blank(16_384, 16_384, png::ColorType::Rgba, png::BitDepth::Sixteen);
     binary.truncate(start);
     binary.extend(&deep);
@@ -231,8 +226,7 @@ fn images_that_grow_a_thousandfold_are_told() {
     );
 }
 
-/// A Zstandard block of 24,000 bytes that is 1.5 GB long when it is decompressed, and a header that declares more texels than
-/// its file has.
+/// A Zstandard block of 24,000 bytes that decodes to 1.5 GB, and headers with more texels than the file.
 #[test]
 fn ktx2_files_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
@@ -247,8 +241,8 @@ fn ktx2_files_are_refused_by_their_headers() {
         assert!(ran.code == 3 && ran.said.contains(rule), "{}: {}", ran.code, ran.said);
         assert!(ran.seconds < 5.0, "{}", ran.seconds);
     };
-    // RFC 8878, section 3.1.1: a window of 1 KiB, a block of 8 bytes, and a block without literals and with 12,000 sequences,
-    // all of which copy 131,074 bytes (codes 0, 0 and 52).
+    // RFC 8878, section 3.1.1: a window of 1 KiB, 8 raw bytes, and a block of 12,000 sequences without literals that
+    // copy 131,074 bytes each (codes 0, 0 and 52).
     let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0, 0];
     frame.extend([8 << 3, 0, 0]);
     frame.extend(b"ABCDEFGH");
@@ -271,7 +265,7 @@ fn ktx2_files_are_refused_by_their_headers() {
     refused(&bytes, "must have at most 16384 texels along a side");
 }
 
-/// What an EXR file stores may be more than what it shows.
+/// The data window may exceed the display window.
 #[test]
 fn windows_of_exr_files_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
@@ -292,7 +286,7 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
         (data, 0..1, 0, 0, ""),
         (data, 0..1, -(1 << 28), 3, "must have at most 16384 texels along a side"),
         (data, 2..3, 1 << 28, 3, "must have at most 16384 texels along a side"),
-        // What it shows may also be more than what it stores.
+        // The display window may exceed the data window.
         (display, 2..4, 999, 0, ""),
         (
             display,
@@ -356,7 +350,7 @@ fn files_that_would_wait_or_never_end_are_none() {
         let ran = run(folder, &["check", "a.toml"]);
         assert!(ran.code == 3 && ran.said.contains("must be a file"), "{}", ran.said);
     }
-    // A pipe that a shell makes has a writer.
+    // Pipes of a shell have a writer.
     let ran = shell(
         folder,
         "\"$0\" check <(cat plain.toml) && \"$0\" check /dev/stdin < plain.toml && cat plain.toml | \"$0\" check /dev/stdin",
@@ -412,7 +406,7 @@ fn texts_that_go_deep_or_on_for_ever_are_told() {
 
 #[test]
 fn what_acts_on_a_terminal_is_shown() {
-    // `run` looks at what is said.
+    // `run` rejects control characters.
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     super::seeds::put(folder);
@@ -429,7 +423,7 @@ fn what_acts_on_a_terminal_is_shown() {
         assert_eq!((ran.code, ran.said.lines().count()), (3, 1), "{text:?}: {}", ran.said);
         assert!(!ran.said.contains('\u{202e}'), "{}", ran.said);
     }
-    // A file's own name.
+    // The name of the file.
     let name = "a\u{1b}[31m\nerror: b.toml";
     fs::copy(folder.join("plain.toml"), folder.join(name)).unwrap();
     let ran = run(folder, &["check", name]);

@@ -1,5 +1,5 @@
-//! Files from strangers, through the real program: files of every kind that are changed at random, and small ones that ask for much.
-//! `scripts/test-slow hostile` changes a thousand of each kind.
+//! Untrusted files: random mutations of every format, and small files that request excessive resources.
+//! `scripts/test-slow hostile` tries a thousand mutations of each.
 
 #[path = "../../crates/scene/src/gltf/changed.rs"]
 mod changed;
@@ -17,24 +17,24 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What a run of the program left.
+/// Result of a run.
 struct Ran {
     code: i32,
     said: String,
     seconds: f64,
 }
 
-/// The address space that a run may have, in KiB: the picture's own, the program's and the stacks of two threads are in it.
+/// Maximum address space in KiB, for the program, its image and two stacks.
 const MEMORY: u64 = 1 << 20;
-/// The seconds of both cores that a run may take, and after which it is ended whatever it does.
+/// Maximum CPU time in seconds, over all threads.
 const SECONDS: u64 = 10;
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Runs the program with its limits in a folder.
+/// Runs the program within these limits.
 ///
 /// # Panics
 ///
-/// If it ends by a signal or takes too long, or says what a panic says.
+/// If it is killed, hangs, panics, or prints control characters or more than 64 KiB.
 fn run(folder: &Path, arguments: &[&str]) -> Ran {
     let script = format!("ulimit -v {MEMORY} -t {SECONDS}; exec \"$0\" \"$@\"");
     let start = Instant::now();
@@ -85,7 +85,7 @@ fn run(folder: &Path, arguments: &[&str]) -> Ran {
     }
 }
 
-/// Renders a scene as a picture of a few pixels.
+/// Renders a scene at 8 x 6 pixels.
 fn render(folder: &Path, scene: &str) -> Ran {
     render_with(folder, scene, &[])
 }

@@ -1,4 +1,4 @@
-//! Files of every kind, changed at random: a picture or a message, soon and in little memory.
+//! Random mutations of every file format: an image or an error, within the limits.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,7 +8,7 @@ use super::seeds::{How, Kind, SCENES, START, all, put};
 use super::{Ran, render, run};
 use crate::random::Random;
 
-/// Words that stand at the ends of ranges.
+/// Integers at the ends of ranges, and special floats.
 const STRANGE: [u32; 8] = [
     0,
     1,
@@ -19,7 +19,7 @@ const STRANGE: [u32; 8] = [
     0x7f80_0000,
     0x0100_0000,
 ];
-/// Texts that stand for numbers, or break what is around them.
+/// Numbers and syntax errors.
 const TEXTS: [&[u8]; 16] = [
     b"-1",
     b"0",
@@ -39,7 +39,7 @@ const TEXTS: [&[u8]; 16] = [
     b"../../../../etc/passwd",
 ];
 
-/// Changes some bytes, drops or repeats some, or ends early.
+/// Overwrites, removes, inserts or truncates bytes.
 fn bytes_changed(bytes: &mut Vec<u8>, random: &Random) {
     let below = |count: usize| random.below(count.max(1) as u32) as usize;
     for _ in 0..1 + below(4) {
@@ -57,7 +57,7 @@ fn bytes_changed(bytes: &mut Vec<u8>, random: &Random) {
             }
             6 => drop(bytes.splice(at..at + length.min(3), random.pick(&TEXTS).iter().copied())),
             _ if random.once_in(8) => bytes.truncate(at),
-            // The number that stands here, if it is a text.
+            // The next number of a text.
             _ => {
                 let is_digit = |byte: &u8| byte.is_ascii_digit() || b".-".contains(byte);
                 if let Some(start) = bytes[at..].iter().position(is_digit).map(|start| at + start) {
@@ -72,7 +72,7 @@ fn bytes_changed(bytes: &mut Vec<u8>, random: &Random) {
     }
 }
 
-/// A file of the kind with something changed.
+/// Returns a mutated file, from its values if possible.
 fn mutated(kind: &Kind, random: &Random) -> Vec<u8> {
     if let Some((values, written)) = kind.values.as_ref().filter(|_| !random.once_in(3)) {
         let mut values = values.clone();
@@ -90,12 +90,12 @@ fn mutated(kind: &Kind, random: &Random) -> Vec<u8> {
 
 #[test]
 fn changed_files_are_read_or_told() {
-    // Few in the quick suite; the same in every run of it.
+    // Few by default, with fixed seeds.
     let count: usize = std::env::var("WGRAY_TEST_HOSTILE").map_or(8, |count| count.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (number, kind) in all(folder).into_iter().enumerate() {
-        // All scenes together are one kind.
+        // All scenes are one kind.
         let count = if kind.ending == "toml" {
             count.div_ceil(SCENES.len())
         } else {
@@ -144,7 +144,7 @@ fn changed_files_are_read_or_told() {
                 How::Part => vec![run(folder, &["merge", &file, "-o", "out.exr", "-o", "out.png", "-q"])],
             }
         };
-        // The control: as it is, it is read.
+        // The control.
         for ran in meet(&kind.bytes) {
             assert!(
                 [0, 1, 5].contains(&ran.code) && (ran.code == 0 || matches!(kind.how, How::Picture(_))),

@@ -1,4 +1,4 @@
-//! Nothing outside of the asset root is opened, whichever file names it and however it is named.
+//! No file outside of the asset root is opened, by any reference.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,10 +8,10 @@ use serde_json::json;
 use super::seeds::{START, triangle};
 use super::{Ran, render, render_with};
 
-/// What a file outside has in it, which no message may have.
+/// Contents that no message may contain.
 const SECRET: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n# secret\n";
 
-/// A folder with a scene's folder in it and files beside that.
+/// Creates a scene folder, with secret files next to it.
 fn place() -> (tempfile::TempDir, PathBuf) {
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("scene");
@@ -30,7 +30,7 @@ fn place() -> (tempfile::TempDir, PathBuf) {
     (outer, folder)
 }
 
-/// Names of a file outside, from inside.
+/// Returns references to a secret file.
 fn names(outer: &Path, ending: &str) -> Vec<String> {
     let secret = outer.join(format!("secret.{ending}"));
     let absolute = secret.display().to_string();
@@ -102,7 +102,7 @@ fn a_scene_names_nothing_outside() {
             is_refused(&render_with(&folder, "a.toml", &["--strict"]), &name);
         }
     }
-    // With another root it may, for whom shares files among scenes.
+    // `--asset-root` permits shared files.
     let shared = format!("{START}{material}[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = '../secret.obj'\n");
     fs::write(folder.join("a.toml"), shared).unwrap();
     assert_eq!(render(&folder, "a.toml").code, 3);
@@ -133,7 +133,7 @@ fn a_gltf_file_names_nothing_outside() {
             }
             fs::write(folder.join("a.gltf"), json.to_string()).unwrap();
             is_refused(&render_with(&folder, "a.gltf", &["--strict"]), &name);
-            // As a part of a scene too.
+            // The same in a scene.
             fs::write(
                 folder.join("a.toml"),
                 format!("{START}[[shapes]]\ntype = 'gltf'\nfile = 'a.gltf'\n"),
@@ -169,12 +169,12 @@ fn a_mesh_names_nothing_outside() {
             ran.said
         );
     }
-    // A material's texture.
+    // Textures of a material.
     for name in names(outer.path(), "png") {
         fs::write(folder.join("a.obj"), mesh("in.mtl")).unwrap();
         fs::write(folder.join("in.mtl"), format!("{material}map_Kd {name}\n")).unwrap();
         let ran = render(&folder, "a.toml");
-        // A texture that cannot be had is left out, and told.
+        // A warning without `--strict`.
         assert!(
             ran.said.contains("map_Kd") && !ran.said.contains("# secret"),
             "{name}: {}",

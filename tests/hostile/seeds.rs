@@ -1,4 +1,4 @@
-//! Sound files of every kind, to be changed.
+//! Valid files of every format, to be mutated.
 
 use std::fs;
 use std::io::Cursor;
@@ -11,35 +11,34 @@ use serde_json::{Value, json};
 use super::everything::everything;
 use crate::sources::path as project;
 
-/// How values are written, if they can be.
 pub type Written = fn(&Value) -> Option<Vec<u8>>;
 
-/// A kind of file, and how the program meets one.
+/// A file format.
 pub struct Kind {
-    /// What it is called, which the file's name ends with.
+    /// Extension of the file name.
     pub ending: &'static str,
-    /// A sound one.
+    /// A valid file.
     pub bytes: Vec<u8>,
-    /// The same as values, where it has some, and how they are written.
+    /// Its values with a serializer, if it has a syntax of values.
     pub values: Option<(Value, Written)>,
-    /// The exit codes beside 0 that a changed one may have.
+    /// Permitted exit codes of a mutated file except 0.
     pub codes: &'static [i32],
     pub how: How,
 }
 
-/// How the program meets a file.
+/// Command that reads a file.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum How {
     Scene,
-    /// Named by a scene with this text.
+    /// `wgray render`, of a scene with this text.
     Named(&'static str),
-    /// By `wgray diff` too.
+    /// `wgray diff` in addition.
     Picture(&'static str),
     Checkpoint,
     Part,
 }
 
-/// What a scene has that names a file.
+/// Start of a scene that references a file.
 pub const START: &str = "
 image = { width = 8, height = 6 }
 camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 50 }
@@ -116,7 +115,6 @@ fn ply() -> Vec<u8> {
     bytes
 }
 
-/// An image of 16 x 8 pixels that is no plain one.
 fn image(format: ImageFormat) -> Vec<u8> {
     let bytes = RgbaImage::from_fn(16, 8, |x, y| {
         Rgba([x as u8 * 16, y as u8 * 30, (x * y) as u8, 255 - x as u8])
@@ -138,7 +136,6 @@ fn model() -> (Value, Vec<u8>) {
     (json, file)
 }
 
-/// A container of a JSON and bytes.
 pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -155,7 +152,7 @@ pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     file
 }
 
-/// The same without a container, its bytes in a data URI.
+/// Serializes a .gltf file with a data URI.
 fn in_text(json: &Value) -> Option<Vec<u8>> {
     let (_, binary) = everything();
     let mut json = json.clone();
@@ -177,7 +174,7 @@ fn in_json(values: &Value) -> Option<Vec<u8>> {
     Some(values.to_string().into_bytes())
 }
 
-/// What files beside them name.
+/// Writes the files that others reference.
 pub fn put(folder: &Path) {
     fs::write(folder.join("named.obj"), OBJ).unwrap();
     fs::write(folder.join("a.mtl"), MTL).unwrap();
@@ -185,7 +182,7 @@ pub fn put(folder: &Path) {
     fs::write(folder.join("plain.toml"), SCENE).unwrap();
 }
 
-/// The scene of checkpoints and parts.
+/// Scene of checkpoints and parts.
 const SCENE: &str = "
 image = { width = 8, height = 6 }
 camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 50 }
@@ -202,10 +199,10 @@ center = [0, 0, 0]
 radius = 1
 ";
 
-/// The scenes that are changed, which name no other files.
+/// Scenes without other files.
 pub const SCENES: [&str; 5] = ["materials", "cornell", "lens", "lights", "turntable"];
 
-/// All kinds.
+/// Returns all formats.
 pub fn all(folder: &Path) -> Vec<Kind> {
     put(folder);
     let (json, glb) = model();
@@ -236,7 +233,7 @@ pub fn all(folder: &Path) -> Vec<Kind> {
         how,
     };
     let picture = |ending, format, text| Kind {
-        // Of `wgray diff`: what is no picture, and what is too large.
+        // `wgray diff`: unreadable (1), different (5), too large (7).
         codes: &[1, 3, 5, 7],
         ..kind(ending, image(format), How::Picture(text))
     };
@@ -288,7 +285,7 @@ pub fn ktx2(name: &str) -> Vec<u8> {
     fs::read(project(&format!("tests/textures/ktx2/{name}.ktx2"))).unwrap()
 }
 
-/// A mesh of one triangle, for files that are made to ask for much.
+/// Returns a mesh of one triangle.
 pub fn triangle() -> (Value, Vec<u8>) {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
     let numbers = corners.iter().flat_map(|corner| corner.to_array());

@@ -1,4 +1,4 @@
-//! The limits as docs/reliability.md has them: each is told in these words somewhere, and has a test.
+//! Each limit in `docs/reliability.md` has a message and a test.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ fn texts(folder: &Path, all: &mut String) {
         match path.is_dir() {
             true => texts(&path, all),
             false if path.extension().is_some_and(|ending| ending == "rs") => {
-                // Messages go over several lines by a backslash.
+                // Joins continued lines of strings.
                 let text = fs::read_to_string(&path).unwrap();
                 let lines = text.split("\\\n").map(str::trim_start);
                 all.push_str(&lines.collect::<String>());
@@ -37,7 +37,7 @@ fn every_limit_in_the_table_is_told_and_tested() {
         let cells: Vec<&str> = row.trim_matches('|').split(" | ").collect();
         let [what, _, told, test] = cells[..] else { continue };
         if !test.contains('`') {
-            continue; // the head
+            continue; // the header
         }
         count += 1;
         let told = told.trim();

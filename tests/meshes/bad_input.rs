@@ -1,4 +1,4 @@
-//! Bad mesh files: each is told with its place, the value and the rule; none ends in a panic.
+//! Invalid mesh files: errors with location, value and rule; no panics.
 
 use glam::DVec3;
 use wgray::mesh::{Mesh, MeshError, Normals};
@@ -8,7 +8,7 @@ use super::load;
 use super::readers::in_all_formats;
 use crate::random::Random;
 
-/// Files by name and content, and what is told.
+/// File name, contents, error.
 const BAD: &[(&str, &str, &str)] = &[
     ("a.fbx", "", "a.fbx: the name of a mesh must end in .obj, .ply or .stl"),
     ("a", "", "a: the name of a mesh must end in .obj, .ply or .stl"),
@@ -183,7 +183,7 @@ fn bad_files_are_told() {
     }
 }
 
-/// An ASCII PLY with these elements and lines.
+/// Returns an ASCII PLY file.
 fn ply(vertex: &str, face: &str, lines: &str) -> String {
     format!("ply\nformat ascii 1.0\n{vertex}{face}end_header\n{lines}")
 }
@@ -302,7 +302,7 @@ fn counts_without_bytes_are_refused_at_once() {
             assert!(error.contains(told), "{error}");
         }
     }
-    // A list that is longer than the file, and a triangle count that is.
+    // A list, and a triangle count, that exceed the file.
     let mut list = format!(
         "ply\nformat binary_little_endian 1.0\n{}{face}end_header\n",
         vertex("3", xyz)
@@ -340,7 +340,7 @@ fn what_is_no_file_is_told() {
     );
 }
 
-/// More files that can be read: with everything that there is.
+/// Returns valid files with all features.
 fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     let mut files = in_all_formats();
     let text = "mtllib none.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0 1\nvt 0 0.5\nvt 1\nvn 0 0 -1\nvn 0 1 0\nusemtl red\n\
@@ -349,7 +349,7 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     files
 }
 
-/// Checks a mesh, or that a message has the file, and a place if any. Returns whether there is neither an error nor damage.
+/// Checks the invariants of a mesh, or of an error message. Returns true if the file is undamaged.
 fn check(name: &str, result: Result<Mesh, String>) -> bool {
     match result {
         Ok(mesh) => {
@@ -391,11 +391,11 @@ fn files_that_are_cut_anywhere_are_meshes_or_errors() {
     }
 }
 
-/// An MTL file with all that is read, of the materials `a` and `b c`.
+/// An MTL file with every statement, for the materials `a` and `b c`.
 const MTL: &str = "# all\nnewmtl a\nKa 1 1 1\nKd 0.5 0.25 \\\n0.125\nKs 0.5\nNs 20\nd 0.5\nillum 2\nmap_Kd -s 2 2 a.png\n\
                    newmtl b c\r\nKe 1 0 0\r\nTr 1\r\nNi 1.5\r\nmap_Bump -bm 1 b.png\r\n";
 
-/// Checks that a mesh with this MTL file is a scene. Returns whether the file has both of its materials.
+/// Checks the scene of a mesh with an MTL file. Returns true if both materials are defined.
 fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
     std::fs::write(folder.join("a.mtl"), mtl).unwrap();
     let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b c\nf 3/1 2/1 1/1\n";
@@ -444,7 +444,7 @@ fn materials_that_are_cut_anywhere_are_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let scenes = (0..=MTL.len()).filter(|end| check_mtl(folder.path(), &MTL.as_bytes()[..*end]));
     let last = MTL.find("b c").unwrap() + 3;
-    // All of them from the second name on.
+    // From the end of the second name on.
     assert_eq!(scenes.collect::<Vec<_>>(), (last..=MTL.len()).collect::<Vec<_>>());
 }
 

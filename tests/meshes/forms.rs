@@ -1,4 +1,4 @@
-//! Meshes for tests, made by formula, and scenes of them.
+//! Procedural meshes for tests.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -12,7 +12,7 @@ use wgray_render::records::Packed;
 
 use crate::random::Random;
 
-/// Positions, and triangles that share them, counter-clockwise as seen from outside.
+/// An indexed triangle mesh, counterclockwise from outside.
 #[derive(Clone, Debug)]
 pub struct Form {
     pub points: Vec<DVec3>,
@@ -20,7 +20,7 @@ pub struct Form {
 }
 
 impl Form {
-    /// The cube from -1 to 1.
+    /// Returns the cube from -1 to 1.
     pub fn cube() -> Form {
         let point = |i: u32| {
             let side = |axis: u32| if i >> axis & 1 == 1 { 1.0 } else { -1.0 };
@@ -43,14 +43,14 @@ impl Form {
         }
     }
 
-    /// An icosahedron on the unit sphere, its triangles divided into four so many times.
+    /// Returns a unit icosphere after `times` subdivisions.
     pub fn icosphere(times: u32) -> Form {
         let golden = (1.0 + 5f64.sqrt()) / 2.0;
         let mut points = Vec::new();
         for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
             points.extend([DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)].map(DVec3::normalize));
         }
-        // The faces are the triples of points that are neighbours of one another.
+        // Faces are triples of adjacent points.
         let near = |i: usize, j: usize| points[i].distance(points[j]) < 1.1;
         let mut triangles = Vec::new();
         for i in 0..12 {
@@ -84,7 +84,7 @@ impl Form {
         Form { points, triangles }
     }
 
-    /// Two pyramids over one polygon of many sides, some of which are a thousandth of others.
+    /// Returns a bipyramid over a polygon with sides of very different lengths.
     pub fn slivers(sides: u32, random: &Random) -> Form {
         let mut angles: Vec<f64> = (0..sides).map(|_| TAU * random.unit()).collect();
         angles.sort_by(f64::total_cmp);
@@ -97,7 +97,7 @@ impl Form {
         Form { points, triangles }
     }
 
-    /// Triangles anywhere, of all sizes and shapes, some of which share corners.
+    /// Returns triangles of random size and shape, some of which share vertices.
     pub fn soup(triangles: u32, random: &Random) -> Form {
         let point = || DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
         let (mut points, mut faces) = (Vec::new(), Vec::new());
@@ -106,8 +106,8 @@ impl Form {
             let mut corners = [(); 3].map(|()| at + point() * size);
             match random.below(6) {
                 0 => corners[2] = corners[0].lerp(corners[1], random.unit()) + point() * size * 1e-4,
-                1 => corners.iter_mut().for_each(|corner| corner.z = at.z), // a flat box
-                2 => corners = corners.map(|corner| (corner * 8.0).round() / 8.0), // in one plane with others
+                1 => corners.iter_mut().for_each(|corner| corner.z = at.z), // flat bounding box
+                2 => corners = corners.map(|corner| (corner * 8.0).round() / 8.0), // on a lattice: coplanar with others
                 _ => {}
             }
             let first = points.len() as u32;
@@ -128,7 +128,7 @@ impl Form {
         }
     }
 
-    /// Its text as a Wavefront OBJ file, with a group for each third of the triangles. `vn` and `vt` are for each point.
+    /// Returns a Wavefront OBJ file with three groups and per-point `vn` and `vt`.
     pub fn obj(&self, normals: Option<&[DVec3]>, uvs: Option<&[[f64; 2]]>) -> String {
         let mut text = String::new();
         for p in &self.points {
@@ -158,14 +158,14 @@ impl Form {
     }
 }
 
-/// A scene from its text; files are beside `folder`.
+/// Packs a scene whose files are in `folder`.
 pub fn scene(text: &str, folder: &Path) -> Packed {
     let description = Description::parse(text, "test.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let scene = description.validate_with(&Assets::beside(folder));
     pack(&scene.unwrap_or_else(|problem| panic!("{problem}\n{text}")))
 }
 
-/// What scenes of these tests begin with: a camera that looks at the origin, and a material.
+/// Start of the scenes: an image, a camera towards the origin, materials.
 pub const HEAD: &str = "image = { width = 48, height = 36 }
 camera = { position = [0.3, -4, 1.6], look_at = [0, 0, 0], fov = 40 }
 [materials.m]
@@ -177,8 +177,7 @@ type = 'glass'
 ior = 1.5
 ";
 
-/// A piece of a curved surface with normals and texture coordinates: a grid of vertices over the (u, v) from 0 to 1. A closed
-/// surface has vertices twice where it closes.
+/// A grid of vertices on a parametric surface over u and v from 0 to 1. Vertices of a seam are duplicated.
 #[derive(Clone, Debug)]
 pub struct Sheet {
     pub form: Form,
@@ -187,7 +186,7 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// By its position and its outward normal, and as many squares along u and along v.
+    /// Returns `columns` by `rows` quads; `at` gives position and outward normal.
     pub fn of(columns: u32, rows: u32, at: impl Fn(f64, f64) -> [DVec3; 2]) -> Sheet {
         let (mut points, mut normals, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for j in 0..=rows {
@@ -211,17 +210,17 @@ impl Sheet {
         }
     }
 
-    /// The unit sphere; u goes east and v north.
+    /// Returns the unit sphere; u points east, v north.
     pub fn sphere(columns: u32, rows: u32) -> Sheet {
         Sheet::of(columns, rows, |u, v| {
             let ((sin, cos), angle) = ((TAU * u.fract()).sin_cos(), TAU / 2.0 * (v - 0.5));
-            // The poles are one point each.
+            // All vertices of a pole coincide.
             let radius = if v == v.fract() && v > 0.0 { angle.cos() } else { 0.0 };
             [DVec3::new(radius * cos, radius * sin, angle.sin()); 2]
         })
     }
 
-    /// A torus around the z axis.
+    /// Returns a torus around the z axis.
     pub fn torus(columns: u32, rows: u32) -> Sheet {
         Sheet::of(columns, rows, |u, v| {
             let ((sin, cos), (up, out)) = ((TAU * u.fract()).sin_cos(), (TAU * v.fract()).sin_cos());

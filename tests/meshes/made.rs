@@ -1,4 +1,4 @@
-//! The meshes that `examples/make_mesh.rs` makes.
+//! The meshes of `examples/make_mesh.rs`.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use super::load;
 #[allow(dead_code, reason = "a test calls what the program does, but not its `main`")]
 mod make_mesh;
 
-/// How often triangles pass an edge in one direction and in the other, by the positions of its ends.
+/// Returns true if edges, by position, are used equally often in both directions.
 fn is_closed(mesh: &Mesh) -> bool {
     let mut edges = std::collections::HashMap::new();
     for triangle in &mesh.triangles {
@@ -23,7 +23,7 @@ fn is_closed(mesh: &Mesh) -> bool {
     edges.values().all(|sum| *sum == 0)
 }
 
-/// Six times the volume that a mesh encloses, positive where its triangles are counter-clockwise from outside.
+/// Returns six times the volume; positive if counterclockwise.
 fn volume(mesh: &Mesh) -> f64 {
     let position = |vertex: u32| mesh.positions[vertex as usize].as_dvec3();
     let volume = |triangle: &[u32; 3]| {
@@ -61,7 +61,7 @@ fn the_knot_is_closed_and_rests_on_the_floor() {
         .map(|p| p.x.abs().max(p.y.abs()))
         .fold(0.0, f32::max);
     assert_eq!((lowest, widest), (0.0, 0.4));
-    // The normals of the formula are about those of the triangles.
+    // Analytic and averaged normals agree.
     let smooth = load("knot.obj", &text, Some(Normals::Smooth)).unwrap();
     let position = |mesh: &Mesh, i: usize, k: usize| mesh.positions[mesh.triangles[i][k] as usize];
     let normal = |mesh: &Mesh, i: usize, k: usize| mesh.normals[mesh.triangles[i][k] as usize];

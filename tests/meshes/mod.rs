@@ -1,5 +1,4 @@
-//! Meshes: what is read of files, how mistakes in them are told, those that are made by formula; and that rays meet them as they
-//! should, by whatever trees, without holes, on a sphere as on a sphere.
+//! Mesh files and their errors, procedural meshes, tangents, and watertight intersection through any BVH.
 
 mod bad_input;
 mod bounds;
@@ -19,7 +18,7 @@ mod watertight;
 
 use wgray::mesh::{Mesh, Normals};
 
-/// Loads a file with this name and content. A message begins with the file's name.
+/// Loads a file of this content. Errors begin with its name.
 pub fn load(name: &str, bytes: impl AsRef<[u8]>, normals: Option<Normals>) -> Result<Mesh, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -34,7 +33,7 @@ pub fn load(name: &str, bytes: impl AsRef<[u8]>, normals: Option<Normals>) -> Re
     })
 }
 
-/// The corners of a mesh's triangles, in the file's coordinates.
+/// Returns triangle corners in file coordinates.
 pub fn corners(mesh: &Mesh) -> Vec<[[f64; 3]; 3]> {
     let position = |vertex: u32| (mesh.positions[vertex as usize].as_dvec3() + mesh.center).to_array();
     mesh.triangles.iter().map(|triangle| triangle.map(position)).collect()

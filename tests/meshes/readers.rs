@@ -1,4 +1,4 @@
-//! What is read of each format.
+//! Readers of OBJ, PLY and STL files.
 
 use wgray::mesh::{Mesh, Normals};
 
@@ -10,7 +10,7 @@ const TWO_TRIANGLES: [[[f64; 3]; 3]; 2] = [
 ];
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
-/// A solid with corners of all kinds, some of them not exact in binary.
+/// Returns positions, one of them unused, and polygons of a solid.
 fn crystal() -> (Vec<[f32; 3]>, Vec<Vec<u32>>) {
     let positions = vec![
         [0.1, 0.2, 0.3],
@@ -30,7 +30,7 @@ fn crystal() -> (Vec<[f32; 3]>, Vec<Vec<u32>>) {
     (positions, faces)
 }
 
-/// A mesh in each format, by the name of its file. STL files have triangles.
+/// Returns one mesh in each format.
 pub fn in_all_formats() -> Vec<(&'static str, Vec<u8>)> {
     let (positions, faces) = crystal();
     let fans: Vec<[u32; 3]> = faces
@@ -115,7 +115,7 @@ fn all_formats_have_the_same_triangles() {
                 .collect();
             assert_eq!(mesh.center.to_array(), [0.0; 3], "{name}");
             assert_eq!(triangles, expected, "{name}");
-            // The point within is no triangle's.
+            // The unused position is dropped.
             assert_eq!(mesh.positions.len(), 5, "{name}");
             assert_eq!(mesh.groups.len(), 1, "{name}");
             assert_eq!(mesh.notes, Vec::<String>::new(), "{name}");
@@ -130,7 +130,7 @@ fn obj_corners_may_have_all_forms() {
                 vn 0 0 2\nf 1 2 \\\n 3\nf -4/1 -2/3/1 \\\r\n  4//1\ncurv 0 1 \\\n 2 3\ns off\nl 1 2\n";
     let mesh = load("a.obj", text, None).unwrap();
     assert_eq!(corners(&mesh), TWO_TRIANGLES);
-    // Three vertices by their positions alone, and three others.
+    // Corners without texture coordinates have vertices of their own.
     assert_eq!(mesh.positions.len(), 6);
     let uvs: Vec<[f32; 2]> = mesh.uvs.iter().map(|uv| uv.to_array()).collect();
     assert_eq!(uvs[3..], [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]);
@@ -144,7 +144,7 @@ fn obj_vertices_are_shared_where_all_is_equal() {
         format!("{SQUARE}vt 0 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/2/1 4/1/1\nf 4/1/1 3/2/1 1/1/1\n");
     let mesh = load("a.obj", &text, None).unwrap();
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 3, 4], [4, 3, 0]]);
-    // Normals that are made anew tell no vertices apart.
+    // Unused normals do not separate vertices.
     let text = format!("{SQUARE}vn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n");
     let count = |normals| load("a.obj", &text, normals).unwrap().positions.len();
     assert_eq!(count(None), 6);
@@ -160,7 +160,7 @@ fn lines_may_end_as_on_old_macs() {
     let mesh = load("a.obj", text.replace('\n', "\r"), None).unwrap();
     assert_eq!(corners(&mesh), TWO_TRIANGLES);
     assert_eq!(mesh.groups, expected.groups);
-    // A line is told as it is counted.
+    // Line numbers count lone carriage returns.
     let error = load("a.obj", "v 0 0 0\r\rv 0 1\r", None).unwrap_err();
     assert_eq!(error, "a.obj:3: z is missing");
     let mesh = load("a.stl", SOLIDS.replace('\n', "\r"), None).unwrap();
@@ -192,7 +192,7 @@ fn polygons_are_fans() {
 
 #[test]
 fn degenerate_triangles_are_dropped_and_counted() {
-    // Equal numbers, equal positions, points on a line; and a triangle that is nearly one.
+    // Equal indices or positions, collinear points; one almost so.
     let text = "v 0 0 0\nv 1 1 1\nv 0.1 0.1 0.1\nv 0 0 0\nv 0.1 0.1 0.10000001\nv -0 0 0\n\
                 g a\nf 1 1 2\nf 1 4 2\nf 1 2 3\nf 6 2 1\ng b\nf 1 2 5\n";
     let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
@@ -205,7 +205,7 @@ fn degenerate_triangles_are_dropped_and_counted() {
     assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-6));
     let error = load("a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", None).unwrap_err();
     assert_eq!(error, "a.obj: has no triangles but 1 without an area");
-    // 0.1, 0.2 and 0.3 are on a line, but not as 32-bit floats.
+    // The last point is collinear only in decimal.
     let mesh = load(
         "a.obj",
         "v 0 0 0\nv 0.1 0.3 0\nv 0.2 0.6 0\nv 0.3 0.9 0\nf 1 2 3\nf 1 2 4\n",
@@ -224,7 +224,7 @@ fn duplicate_triangles_are_dropped_and_counted() {
         (mesh.positions.len(), &mesh.notes[..]),
         (4, &["1 of 3 triangles is a duplicate and was removed".into()][..])
     );
-    // Not those of another group, nor those that look the other way.
+    // Other groups and winding orders are kept.
     let mesh = load("a.obj", text.replace("f 2 3 5", "g b\nf 2 3 5"), None).unwrap();
     assert_eq!((mesh.triangles.len(), mesh.notes.len()), (3, 2), "{:?}", mesh.notes);
     let mesh = load("a.obj", text.replace("f 2 3 5", "f 3 2 5"), None).unwrap();
@@ -311,7 +311,7 @@ fn materials_may_be_named_by_paths_of_other_machines() {
         assert_eq!(mesh.notes, Vec::<String>::new(), "{named}");
         assert_eq!(mesh.libraries[0].materials[0].name, expected, "{named}");
     }
-    // A name without a folder is no path.
+    // A plain name is not searched for.
     std::fs::write(&path, format!("mtllib c.mtl\n{SQUARE}f 1 2 3\n")).unwrap();
     let mesh = Mesh::load(&path, None).unwrap();
     assert!(
@@ -341,7 +341,7 @@ fn ply_may_have_all_types_in_any_order() {
     );
 }
 
-/// A binary file whose faces come before their vertices, of 64-bit floats, with normals.
+/// Returns a binary PLY file with faces first, 64-bit floats and normals.
 fn faces_first(is_big: bool, normal: [f64; 3]) -> Vec<u8> {
     let name = if is_big { "big" } else { "little" };
     let mut bytes = format!(
@@ -374,7 +374,7 @@ fn binary_ply_has_normals_and_texture_coordinates() {
         assert_eq!(corners(&mesh), TWO_TRIANGLES[..1]);
         assert_eq!(mesh.normals[2].to_array(), [0.0, -0.6, 0.8]);
         assert_eq!(mesh.uvs[2].to_array(), [0.25, 0.75]);
-        // A normal that is none gives way to that of the triangle.
+        // Invalid normals are replaced.
         for none in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 1.0]] {
             let mesh = load("a.ply", faces_first(is_big, none), Some(Normals::File)).unwrap();
             assert_eq!(mesh.normals[2].to_array(), [0.0, 0.0, 1.0]);
@@ -396,7 +396,7 @@ fn stl_solids_are_groups() {
     assert!(mesh.normals.is_empty());
     let names: Vec<&str> = mesh.groups.iter().map(|group| group.name.as_str()).collect();
     assert_eq!((names, mesh.group_of), (vec!["a b", "", "a b"], vec![0, 1]));
-    // Normals of facets tell vertices apart.
+    // Facet normals separate vertices.
     let mesh = load("a.stl", SOLIDS, Some(Normals::File)).unwrap();
     let normals: Vec<f32> = mesh.normals.iter().map(|normal| normal.z).collect();
     assert_eq!(normals, [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]);
@@ -407,7 +407,7 @@ fn binary_stl_is_told_by_its_size() {
     let (_, bytes) = in_all_formats().pop().unwrap();
     assert!(bytes.starts_with(b"solid"));
     let mut longer = bytes.clone();
-    longer[0] = b'S'; // still a text's first word
+    longer[0] = b'S'; // still the keyword of an ASCII file
     longer.push(0);
     let error = load("a.stl", &longer, None).unwrap_err();
     assert!(error.starts_with("a.stl:1: "), "{error}");
@@ -422,8 +422,7 @@ fn binary_stl_is_told_by_its_size() {
 
 #[test]
 fn smooth_normals_are_weighted_by_angles() {
-    // The corner of a cube, whose sides are one, two and three triangles there; vertices of a side are its own by their
-    // texture coordinates.
+    // A corner of a cube with two, three and two triangles on its sides, separated by texture coordinates.
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 0\nv 1 0 1\nv 1 0 0.5\nv 0 1 1\nvt 0 0\nvt 0 1\nvt 1 0\n\
                 f 1/1 3/1 5/1\nf 1/1 5/1 2/1\nf 1/2 2/2 7/2\nf 1/2 7/2 6/2\nf 1/2 6/2 4/2\nf 1/3 4/3 8/3\nf 1/3 8/3 3/3\n";
     let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
@@ -461,7 +460,7 @@ fn normals_of_a_file_without_any_are_an_error() {
     for (name, bytes) in in_all_formats() {
         let result = load(name, bytes, Some(Normals::File));
         if name.to_lowercase().ends_with("stl") {
-            // STL files always have a place for them; here all are zero.
+            // STL files always have normals; these are zero.
             assert!(result.unwrap().notes[0].message.contains("no normal"));
         } else {
             let rest = "has no normals; \"smooth\" and \"flat\" ones are made from the triangles";
@@ -478,7 +477,7 @@ fn a_mesh_far_away_keeps_its_digits() {
         assert!((corner[0] - x).abs() < 1e-9, "{corner:?}");
     }
     assert_eq!(mesh.center.y, -3.0);
-    // Around the origin coordinates stay, even where it is at the edge.
+    // Bounds that contain the origin are not recentered.
     let mesh = load("a.obj", "v 0 0 1e-20\nv 0.7 0 1\nv 1 0.1 0\nf 1 2 3\n", None).unwrap();
     assert_eq!(mesh.center.to_array(), [0.0; 3]);
     assert_eq!(mesh.positions[0].to_array(), [0.0, 0.0, 1e-20]);

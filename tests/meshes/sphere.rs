@@ -1,5 +1,4 @@
-//! A sphere of 80,000 triangles against the formulas of a sphere: a mesh whose corners lie on a sphere lies between that and the
-//! smaller one that touches its triangles. So must what rays and shadow rays meet.
+//! A sphere of 80,000 triangles: hits and shadows lie between its circumscribed and inscribed spheres.
 
 use glam::DVec3;
 use wgray_render::cpu::camera::camera_ray;
@@ -12,7 +11,7 @@ const CENTER: DVec3 = DVec3::new(0.0, 0.0, 1.3);
 const LIGHT: DVec3 = DVec3::new(0.3, 0.2, -1.0);
 const OUTSIDE: &str = "[0.5, -6, 3.5]";
 
-/// The sphere above a floor, lit from far away.
+/// Returns the sphere above a floor, under a directional light.
 fn above_floor(form: &Form, normals: &str, camera: &str) -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("sphere.obj"), form.obj(Some(&form.points), None)).expect("a mesh");
@@ -47,7 +46,7 @@ fn above_floor(form: &Form, normals: &str, camera: &str) -> Packed {
     scene(&text, folder.path())
 }
 
-/// Where a ray enters a sphere, as a distance along it.
+/// Returns the distance at which a ray enters a sphere.
 fn entry(origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
     let to = origin - CENTER;
     let b = to.dot(direction);
@@ -57,7 +56,7 @@ fn entry(origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
         .filter(|t| *t > 0.0)
 }
 
-/// What was found of a mesh: pixels where it cannot be so, and how many pixels there are of each kind.
+/// Pixel counts, with contradictions of the bounds.
 #[derive(Debug, Default, PartialEq)]
 struct Found {
     wrong_hits: usize,
@@ -65,17 +64,17 @@ struct Found {
     wrong_light: usize,
     hits: usize,
     shadows: usize,
-    /// Neither surely in shadow nor surely lit.
+    /// Neither certainly in shadow nor certainly lit.
     open: usize,
 }
 
-/// Looks at all pixels. `inner` is the radius of the smaller sphere.
+/// Classifies all pixels; `inner` is the inscribed radius.
 fn found(form: &Form, inner: f64, normals: &str) -> Found {
     let packed = above_floor(form, normals, OUTSIDE);
     let hits = first_hits(&packed, Way::Cpu);
     let radiances: Vec<[f32; 3]> = reference(&packed).means().collect();
     let to_light = -LIGHT.normalize();
-    // A triangle's normal leans so far at most.
+    // Maximum angle between geometric and analytic normals.
     let lean = inner.acos();
     let mut found = Found::default();
     for (i, (hit, radiance)) in hits.iter().zip(radiances).enumerate() {
@@ -90,13 +89,13 @@ fn found(form: &Form, inner: f64, normals: &str) -> Found {
             let radial = (point - CENTER).normalize();
             let radius = point.distance(CENTER);
             let between = radius > inner - 1e-5 && radius < 1.0 + 1e-5 && outer.is_some();
-            // Where a ray grazes the sphere, what is rounded moves its point far along the ray.
+            // At grazing incidence rounding moves the hit along the ray.
             let grazing = -radial.dot(direction);
             let normals = (hit.shading_normal.as_dvec3() - radial).length() * grazing < 2e-5
                 && hit.normal.as_dvec3().angle_between(radial) < 1.01 * lean + 1e-4;
             found.wrong_hits += usize::from(!(between && normals));
             let cosine = radial.dot(to_light);
-            // Light ends where it ends on a sphere, however large the triangles are.
+            // The terminator is that of the sphere.
             found.wrong_light += usize::from(cosine > 1e-3 && !is_lit || cosine < -1e-5 && is_lit);
         } else {
             found.wrong_hits += usize::from(inner_t.is_some());
@@ -111,7 +110,7 @@ fn found(form: &Form, inner: f64, normals: &str) -> Found {
     found
 }
 
-/// The radius of the sphere that a mesh's triangles touch, the nearest of them.
+/// Returns the radius of the inscribed sphere.
 fn inner(form: &Form) -> f64 {
     let height = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| form.points[i as usize]);
@@ -136,7 +135,7 @@ fn a_sphere_of_triangles_is_nearly_a_sphere() {
         (0, 0, 0),
         "{result:?}"
     );
-    // The control: a coarser mesh by the same bounds, and without normals; and by its own ones it is right.
+    // The control: a coarse mesh fails these bounds without normals, and satisfies its own with normals.
     let coarse = Form::icosphere(2);
     let wrong = found(&coarse, fine_inner, "flat");
     assert!(
@@ -151,7 +150,7 @@ fn a_sphere_of_triangles_is_nearly_a_sphere() {
     );
 }
 
-/// Light that grazes a triangle from behind comes past its edges, never through it.
+/// No light passes a triangle from behind, at any angle.
 #[test]
 fn no_light_comes_into_a_closed_mesh() {
     for detail in [1, 2, 4] {

@@ -1,5 +1,4 @@
-//! The tangents of smooth meshes, for their normal maps: those of the surfaces that meshes stand for, without jumps from a
-//! triangle to the next.
+//! Tangents of smooth meshes for normal maps: those of the surface, continuous across edges.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -18,17 +17,16 @@ use super::forms::{HEAD, Sheet, scene};
 use crate::pictures::reference;
 use crate::textures::write_exr;
 
-/// What a normal map says everywhere.
+/// The tangent-space normal of the map.
 const LEAN: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 
-/// A mesh with a normal map that leans everywhere, with more lines for the texture and for the shape.
+/// Returns a mesh with a constant, tilted normal map, and additional lines for texture and shape.
 fn leaning(obj: &str, texture: &str, shape: &str) -> Packed {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("mesh.obj"), obj).unwrap();
     write_exr(&folder.path().join("lean.exr"), 2, 2, |_, _| {
         (LEAN * 0.5 + 0.5).to_array()
     });
-    // A small part of the unit sphere, seen close.
     let head = HEAD.replace("width = 48, height = 36", "width = 192, height = 144");
     let head = head.replace("fov = 40", "fov = 8");
     let text = format!(
@@ -52,7 +50,6 @@ fn leaning(obj: &str, texture: &str, shape: &str) -> Packed {
     scene(&text, folder.path())
 }
 
-/// A point of the triangle in a slot.
 fn hit(packed: &Packed, slot: usize, barycentric: Vec2) -> Hit {
     Hit {
         t: 1.0,
@@ -63,7 +60,7 @@ fn hit(packed: &Packed, slot: usize, barycentric: Vec2) -> Hit {
     }
 }
 
-/// Points of a triangle: near its corners, on its edges, in it.
+/// Barycentric coordinates at corners, on edges and inside.
 const PLACES: [Vec2; 7] = [
     Vec2::new(0.0, 0.0),
     Vec2::new(1.0, 0.0),
@@ -74,7 +71,7 @@ const PLACES: [Vec2; 7] = [
     Vec2::new(0.0, 0.4),
 ];
 
-/// The largest angle, in degrees, between the tangents of a mesh and those of its surface: as they are, and the triangles'.
+/// Returns the maximum errors in degrees of interpolated and of per-triangle tangents.
 fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> [f64; 2] {
     let i = &packed.bvh.instances[0];
     let to_world = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
@@ -97,7 +94,7 @@ fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> 
     worst
 }
 
-/// The derivatives by u and v of a surface, by differences.
+/// Returns the partial derivatives by central differences.
 fn derivatives(at: impl Fn(f64, f64) -> DVec3, u: f64, v: f64) -> [DVec3; 2] {
     let h = 1e-5;
     [
@@ -116,14 +113,14 @@ fn tangents_are_those_of_the_surface() {
         let ((sin, cos), (up, out)) = ((TAU * u).sin_cos(), (TAU * v).sin_cos());
         DVec3::new((1.0 + 0.4 * out) * cos, (1.0 + 0.4 * out) * sin, 0.4 * up)
     };
-    // An instance that stretches, turns and mirrors has the derivatives of what it makes of the surface.
+    // Tangents of an instance are derivatives of the transformed surface.
     for (shape, most) in [
         ("", 1.5),
         ("matrix = [[1, 0.3, 0, 5], [-0.2, 2, 0.4, 0], [0, 0.5, -0.7, 3]]", 3.0),
         ("scale = 1e-5", 1.5),
     ] {
         let packed = leaning(&Sheet::sphere(32, 16).obj(), "", shape);
-        // At the poles there is no direction to the east.
+        // The derivative by u vanishes at the poles.
         let found = errors(&packed, |u, v| {
             (0.12..0.88).contains(&v).then(|| derivatives(sphere, u, v))
         });
@@ -136,7 +133,7 @@ fn tangents_are_those_of_the_surface() {
     }
 }
 
-/// The normal that the map gives at a point of a triangle: as it is, and by the triangle's own tangents.
+/// Returns the mapped normals with interpolated and with per-triangle tangents.
 fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     let hit = hit(packed, slot, b);
     let spot = fetch_hit_primitive(packed, hit);
@@ -158,8 +155,8 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     [found, mapped_normal(by_triangle, texture, LEAN)]
 }
 
-/// The largest angle, in degrees, between the normals on the two sides of an edge, seams among them; and by the triangles'
-/// own tangents.
+/// Returns the maximum differences in degrees between normals across edges and seams, with interpolated and with
+/// per-triangle tangents, and the number of edges.
 fn jumps(packed: &Packed, is_looked_at: impl Fn(Vec3) -> bool) -> ([f32; 2], usize) {
     let mesh = &packed.bvh.meshes[0];
     let mut sides: HashMap<_, Vec<[Vec3; 2]>> = HashMap::new();
@@ -195,7 +192,7 @@ fn jumps(packed: &Packed, is_looked_at: impl Fn(Vec3) -> bool) -> ([f32; 2], usi
 #[test]
 fn normals_do_not_jump_at_edges_and_seams() {
     let sphere = Sheet::sphere(16, 8);
-    // However the texture lies.
+    // For any texture transform.
     for texture in ["", "rotate = 45", "rotate = 90\nscale = [3, 0.5]", "scale = [-1, 1]"] {
         let packed = leaning(&sphere.obj(), texture, "");
         let (found, edges) = jumps(&packed, |p| p.z.abs() < 0.99);
@@ -211,7 +208,6 @@ fn normals_do_not_jump_at_edges_and_seams() {
     }
 }
 
-/// The largest difference between neighbouring pixels.
 fn largest_step(packed: &Packed) -> f32 {
     let pixels: Vec<[f32; 3]> = reference(packed).means().collect();
     let (width, height) = (192, 144);
@@ -228,11 +224,11 @@ fn largest_step(packed: &Packed) -> f32 {
 #[test]
 fn a_picture_shows_no_triangles() {
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0.2, 1, -0.7]\ncolor = [1, 1, 1]";
-    // The seam is where the camera looks.
+    // The camera faces the seam.
     let shape = format!("rotate = [0, 0, -80]\n{light}");
     let mut packed = leaning(&Sheet::sphere(16, 8).obj(), "", &shape);
     let found = largest_step(&packed);
-    // The control: the triangles' own tangents.
+    // The control: tangents per triangle.
     packed.bvh.instances[0].tangents = NO_INDEX;
     let by_triangle = largest_step(&packed);
     println!("steps of {found}, {by_triangle} without tangents");
@@ -241,7 +237,7 @@ fn a_picture_shows_no_triangles() {
 
 #[test]
 fn mirrored_texture_coordinates_are_not_averaged_with_others() {
-    // A bent sheet whose u counts from its middle in both directions, with vertices that both halves share.
+    // A bent sheet whose u increases from the middle in both directions.
     let mut sheet = Sheet::of(8, 4, |u, v| {
         let (sin, cos) = (u - 0.5).sin_cos();
         let normal = DVec3::new(sin, 0.0, cos);
@@ -254,7 +250,7 @@ fn mirrored_texture_coordinates_are_not_averaged_with_others() {
     }
     let packed = leaning(&sheet.obj(), "", "");
     let mesh = &packed.bvh.meshes[0];
-    // The middle's vertices are there twice.
+    // The shared vertices of the middle are split.
     assert_eq!(mesh.vertices.len(), 9 * 5 + 5);
     assert_eq!(mesh.attributes.len(), mesh.vertices.len());
     assert_eq!(mesh.tangents.len(), mesh.vertices.len());
@@ -263,7 +259,7 @@ fn mirrored_texture_coordinates_are_not_averaged_with_others() {
             let spot = fetch_hit_primitive(&packed, hit(&packed, slot, b));
             let at = spot.primitive.anchor + spot.edge_1 * b.x + spot.edge_2 * b.y;
             let middle = spot.primitive.anchor + (spot.edge_1 + spot.edge_2) / 3.0;
-            // To the right u grows along x, to the left against it; v grows along y.
+            // u is along x on the right, against x on the left; v is along y.
             let right = Vec3::new(at.z, 0.0, -at.x).normalize() * middle.x.signum();
             let found = face_frame(&spot, b);
             assert!(found.u.angle_between(right) < 0.01, "{at}: {} {right}", found.u);
@@ -276,10 +272,10 @@ fn mirrored_texture_coordinates_are_not_averaged_with_others() {
     }
 }
 
-/// A texture that repeats goes on over a seam; where pieces meet that lie in it elsewhere, each has its own tangents.
+/// Tangents are averaged across a seam only if the repeating texture continues there.
 #[test]
 fn pieces_of_a_texture_keep_their_directions() {
-    // Two sheets that meet at x = 1, the right one with its texture turned around the middle of the seam, and moved.
+    // Two sheets that meet at x = 1; the right one has a rotated and translated texture.
     let directions = |turn: f64, shift: f64| {
         let sheet = |left: f64| Sheet::of(2, 2, |u, v| [DVec3::new(left + u, v, 0.0), DVec3::Z]);
         let (mut whole, right) = (sheet(0.0), sheet(1.0));
@@ -316,7 +312,7 @@ fn pieces_of_a_texture_keep_their_directions() {
 fn only_smooth_meshes_with_normal_maps_have_tangents() {
     let sphere = Sheet::sphere(16, 8);
     let (with, count) = (leaning(&sphere.obj(), "", ""), 17 * 9);
-    assert_eq!(with.bvh.meshes[0].tangents.len(), count - 2); // a pole's vertices are of a triangle each, but for one
+    assert_eq!(with.bvh.meshes[0].tangents.len(), count - 2); // one vertex of each pole is unused
     assert!(with.bvh.instances[0].tangents != NO_INDEX);
     let flat = leaning(&sphere.obj(), "", "normals = 'flat'");
     let folder = tempfile::tempdir().unwrap();
@@ -331,7 +327,7 @@ fn only_smooth_meshes_with_normal_maps_have_tangents() {
     }
 }
 
-/// Texture coordinates without an area, that cancel, or of all sizes, give normals that are numbers, in the surface's plane.
+/// Degenerate, canceling and extreme texture coordinates give unit normals.
 #[test]
 fn odd_texture_coordinates_give_usable_tangents() {
     let size = |factor: f64| move |[u, v]: [f64; 2]| [u * factor, v * factor];

@@ -1,5 +1,5 @@
-//! What a ray meets does not depend on the trees: the rule of `docs/decisions/trees.md`, by a loop over all triangles of all
-//! instances, gives the same bits as the trees that are built, and as any other ones.
+//! Hits and occlusion do not depend on the BVH: brute force as in `docs/decisions/trees.md`, the built BVHs and
+//! arbitrary ones give the same bits.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ use crate::random::Random;
 use crate::random_scenes::any_scene;
 use crate::scenes;
 
-/// The corners of a mesh's triangle in a slot, in the mesh's space.
+/// Returns the corners of a triangle in object space.
 fn corners(scene: &Packed, i: &Instance, slot: usize) -> [Vec3; 3] {
     let mesh = &scene.bvh.meshes[i.mesh as usize];
     let triangle = mesh.triangles[slot];
@@ -37,7 +37,7 @@ fn room(scene: &Packed, origin: Vec3) -> f32 {
     scene.counts.room.x * (largest(origin) + scene.counts.room.y)
 }
 
-/// The nearest hit of all, by the rule. Distances are looked at last.
+/// Returns the closest hit by brute force, without culling by distance.
 fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
     let mut hit = closest_primitive(scene, ray, by_itself(left), by_itself(wall));
     let world = slabs(ray.origin, ray.direction, room(scene, ray.origin));
@@ -84,7 +84,7 @@ fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
     hit
 }
 
-/// Which samples of a light anything hides, by the rule.
+/// Returns the mask of occluded samples by brute force.
 fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
     let mut bits = occluded_by_primitives(scene, surface, light, block);
     let origin = surface.ray_origin;
@@ -125,8 +125,7 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) 
     bits
 }
 
-/// Where a scene's rays start, and what they are aimed at: points on edges and in the inside of triangles, corners, corners of
-/// items' boxes.
+/// Random rays from and to points on triangles, edges, vertices and corners of boxes.
 struct Aims<'a> {
     scene: &'a Packed,
     random: &'a Random,
@@ -158,7 +157,7 @@ impl<'a> Aims<'a> {
         middle + part * (self.high - middle) * self.random.pick(&[1.0, 2.0, 20.0])
     }
 
-    /// A point of a mesh, and the triangle that it is on.
+    /// Returns a point and the triangle that it lies on, if any.
     fn target(&self) -> (Vec3, UVec2) {
         let (scene, random) = (self.scene, self.random);
         let item: &Item = &scene.bvh.items[random.below(scene.bvh.items.len() as u32) as usize];
@@ -270,14 +269,13 @@ fn nothing() -> Surface {
     }
 }
 
-/// The bits of a hit, but for the slot, which belongs to the tree.
+/// Returns the bits of a hit except the slot, which depends on the BVH.
 fn bits(hit: Hit) -> [u32; 5] {
     let [u, v] = hit.barycentric.to_array().map(f32::to_bits);
     [hit.t.to_bits(), hit.instance, hit.primitive, u, v]
 }
 
-/// How many of so many rays, and of as many blocks of shadow rays, have another answer by a scene's trees than by the rule;
-/// and of how many of them the rule says that they meet something.
+/// Returns how many rays and shadow blocks differ from brute force, and how many hit or are occluded.
 fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
     let random = Random::new(seed);
     let aims = Aims::new(scene, &random);
@@ -290,7 +288,7 @@ fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
         met += u32::from(rule.primitive != NO_INDEX);
         let (surface, light, block) = aims.shadow();
         let rule = hidden(scene, &surface, &light, block);
-        // Of samples that light nothing trees are not asked.
+        // Unlit samples are not traced.
         let unlit = random.pick(&[0, random.pick(&[0x5555_5555, 0xffff_0000, 1])]) & u32::MAX >> (32 - block.count);
         shadows += u32::from(rule | unlit != occluded_samples(scene, &surface, &light, block, unlit));
         dark += u32::from(rule != 0);
@@ -298,10 +296,10 @@ fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
     [hits, shadows, met, dark]
 }
 
-/// The nodes of a tree over these boxes, and the boxes' order.
+/// A BVH build: from boxes to nodes and the order of the boxes.
 type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<bvh::Node>, Vec<u32>);
 
-/// A scene with other trees.
+/// Returns the scene with other BVHs.
 fn with_trees(scene: &Packed, tree: Builder) -> Packed {
     let mut scene = scene.clone();
     let boxes: Vec<Aabb> = scene
@@ -342,7 +340,7 @@ fn built(boxes: &[Aabb], most_in_leaf: u32) -> (Vec<bvh::Node>, Vec<u32>) {
     (tree.nodes, tree.order)
 }
 
-/// A tree that has nothing to do with where the boxes are: any of them together, in any slots.
+/// Returns a BVH of random subsets in random slots.
 fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
     let empty: bvh::Node = bytemuck::Zeroable::zeroed();
     let (mut nodes, mut order) = (vec![empty], Vec::new());
@@ -378,7 +376,7 @@ fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
     (nodes, order)
 }
 
-/// A node without children whose grid reaches over a box.
+/// Returns a node without children whose grid covers the bounds.
 fn grid(bounds: &Aabb) -> bvh::Node {
     let mut node: bvh::Node = bytemuck::Zeroable::zeroed();
     node.base = bounds.low.to_array();
@@ -400,7 +398,7 @@ fn set_bounds(node: &mut bvh::Node, slot: usize, bounds: &Aabb) {
     }
 }
 
-/// The same tree with its boxes one step too small on their upper sides.
+/// Returns a BVH whose upper bounds are one grid step too small.
 fn too_small(boxes: &[Aabb]) -> (Vec<bvh::Node>, Vec<u32>) {
     let (mut nodes, order) = built(boxes, 2);
     for node in &mut nodes {
@@ -413,7 +411,7 @@ fn too_small(boxes: &[Aabb]) -> (Vec<bvh::Node>, Vec<u32>) {
     (nodes, order)
 }
 
-/// Soups in the world: mirrored, sheared, tiny, in groups, some of glass that casts no shadow, and shapes beside them.
+/// Returns spheres and instances of random triangles: mirrored, sheared, tiny, grouped, or of glass without shadows.
 fn soups() -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     let random = Random::new(11);
@@ -476,7 +474,7 @@ fn trees_leave_out_no_hit_and_no_shadow() {
     }
 }
 
-/// Rays for which the two scenes do not find the same.
+/// Returns how many rays and shadow blocks differ between two scenes.
 fn differing_between(a: &Packed, b: &Packed, rays: u32) -> [u32; 2] {
     let random = Random::new(3);
     let aims = Aims::new(a, &random);
@@ -521,7 +519,6 @@ fn a_tree_whose_boxes_are_too_small_is_found() {
     assert!(hits > 10 && shadows > 10, "{hits} {shadows}");
 }
 
-/// Random scenes have meshes and shapes of all kinds, of all sizes and anywhere.
 #[test]
 fn trees_of_random_scenes_leave_out_nothing() {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));

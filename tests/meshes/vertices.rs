@@ -1,5 +1,5 @@
-//! What vertices of meshes have beside positions, normals and texture coordinates: colours, further sets of coordinates, tangents; by closed
-//! forms, and the same bits on both paths. And textures' factors, and what the camera sees of backs.
+//! Vertex colors, texture coordinate sets, tangents, texture factors and single-sided materials: closed forms, and
+//! equal bits on CPU and GPU.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,16 +14,16 @@ use super::load;
 use crate::pictures::{Way, both, differing, exact_ways, first_hits, means, reference, render};
 use crate::textures::{write_exr, write_png};
 
-/// A square of side 2, one vertex twice, from (-1, -1) to (1, 1), with texture coordinates from 0 to 1.
+/// A square from (-1, -1) to (1, 1), with texture coordinates from 0 to 1.
 const QUAD: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n\
                     f 1/1/1 2/2/1 3/3/1 4/4/1\n";
-/// Straight down on that, to its edges.
+/// A camera above, whose image is the square.
 const DOWN: &str =
     "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
-/// From one side.
+/// An oblique camera.
 const ASIDE: &str = "camera = { position = [0.4, -2.2, 1.9], look_at = [0, 0, 0], fov = 60 }\n";
 const SHAPE: &str = "[[shapes]]\ntype = 'mesh'\nfile = 'quad.obj'\nmaterial = 'm'\n";
-/// The colours of the corners of the square, in the order of its vertices.
+/// Colors of the vertices.
 const COLORS: [[f32; 4]; 4] = [
     [1.0, 0.0, 0.25, 1.0],
     [0.5, 0.5, 0.25, 0.0],
@@ -31,7 +31,7 @@ const COLORS: [[f32; 4]; 4] = [
     [0.5, 0.5, 0.25, 1.0],
 ];
 
-/// A scene of 20 x 20 pixels whose meshes are changed before they are packed.
+/// Returns a scene of 20 x 20 pixels after editing its meshes.
 fn scene(folder: &Path, samples: u32, text: &str, edit: impl Fn(&mut Mesh)) -> Packed {
     std::fs::write(folder.join("quad.obj"), QUAD).unwrap();
     let text = format!(
@@ -67,7 +67,7 @@ fn colored(mesh: &mut Mesh) {
         .collect();
 }
 
-/// The colour at a point of the square: the triangles are (0, 1, 2) and (0, 2, 3).
+/// Returns the color at a point; the triangles are (0, 1, 2) and (0, 2, 3).
 fn color_at(x: f64, y: f64) -> [f64; 4] {
     let [s, t] = [x, y].map(|x| (x + 1.0) / 2.0);
     let weights = match s > t {
@@ -77,7 +77,7 @@ fn color_at(x: f64, y: f64) -> [f64; 4] {
     std::array::from_fn(|k| (0..4).map(|i| weights[i] * f64::from(COLORS[i][k])).sum())
 }
 
-/// Where the middle of a pixel is, seen from above.
+/// Returns the center of a pixel of the camera above.
 fn place(i: usize) -> (f64, f64) {
     ((i % 20) as f64 / 10.0 - 0.95, 0.95 - (i / 20) as f64 / 10.0)
 }
@@ -85,8 +85,7 @@ fn place(i: usize) -> (f64, f64) {
 #[test]
 fn colors_of_vertices_are_interpolated() {
     let folder = tempfile::tempdir().unwrap();
-    // Emission is seen as it is. A quarter of what a point of the pixel's square sees is the middle's colour; the sum of all is exact in the mean,
-    // as it is linear but for the diagonal.
+    // Emission is directly visible. A linear color has its mean at the center of a pixel, except on the diagonal.
     let emission = "materials.m = { type = 'principled', base_color = [0, 0, 0], specular = 0, emission = [2, 2, 2], vertex_colors = 'emission' }\n";
     let base = "environment = { color = [1, 1, 1] }\n\
                 materials.m = { type = 'principled', metallic = 0, specular = 0, vertex_colors = 'base_color' }\n";
@@ -106,7 +105,7 @@ fn colors_of_vertices_are_interpolated() {
                 }
                 assert!((found[2] - 0.25 * factor).abs() < 1e-5, "{way:?}: {found:?}");
             }
-            // A mesh without colours is white.
+            // White without colors.
             for found in means(&render(&plain, way)) {
                 assert!(found.iter().all(|x| (x - factor).abs() < 1e-5), "{way:?}: {found:?}");
             }
@@ -182,7 +181,7 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
                 }
             }
             let mean = found.iter().map(|pixel| pixel[0]).sum::<f64>() / 400.0;
-            // The mean of the corners' alpha on two triangles: the ends of the diagonal are corners of both.
+            // The mean alpha of two triangles; both contain the ends of the diagonal.
             let alpha = 0.8 * (2.0 * (1.0 + 0.5) + 0.0 + 1.0) / 6.0;
             assert!((mean - (1.0 - alpha)).abs() < 0.01, "{way:?}: {mean} {alpha}");
             assert!(means(&render(&opaque, way)).iter().all(|pixel| pixel[0] == 0.0));
@@ -192,7 +191,7 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
 
 #[test]
 fn what_shines_by_its_vertices_lights_so() {
-    // Seen by a floor under it, of which the camera sees a part: lamps of the colour itself, and lamps by their vertices; the same samples.
+    // A floor lit by constant emission, or by equal emission from vertex colors; with equal samples.
     let folder = tempfile::tempdir().unwrap();
     let text = |keys: &str| {
         format!(
@@ -235,7 +234,7 @@ fn what_shines_by_its_vertices_lights_so() {
     }
 }
 
-/// Sets of texture coordinates: the first of the file, and three others.
+/// Adds three texture coordinate sets.
 fn with_sets(mesh: &mut Mesh) {
     let set = |map: fn(Vec2) -> Vec2| mesh.uvs.iter().copied().map(map).collect::<Vec<_>>();
     mesh.more_uvs = vec![
@@ -278,7 +277,7 @@ fn textures_lie_by_their_set_of_coordinates() {
             .map(|set| scene(folder.path(), 4, &text(set, filter, keys), with_sets))
             .collect();
         for set in 0..4 {
-            // The same coordinates as the first set, of a mesh that has no others: only roughness has others then, so that it is left out.
+            // A mesh with only these coordinates. Roughness is removed, as its coordinates would differ.
             let without = |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
             let first = |mesh: &mut Mesh| {
                 with_sets(mesh);
@@ -289,7 +288,7 @@ fn textures_lie_by_their_set_of_coordinates() {
             };
             let expected = reference(&scene(folder.path(), 4, &without(text(0, filter, keys)), first));
             let found = scene(folder.path(), 4, &without(text(set as u32, filter, keys)), with_sets);
-            // The frame of facets is that of the first set.
+            // Not bit-identical: the microfacet frame is that of the first set.
             let found = reference(&found);
             let near = means(&found)
                 .iter()
@@ -297,7 +296,7 @@ fn textures_lie_by_their_set_of_coordinates() {
                 .all(|(a, b)| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-4));
             assert!(near, "{keys} {filter} {set}");
         }
-        // Kernels with trees take seconds to compile.
+        // Kernels with a BVH take seconds to compile.
         if filter != "nearest" && exact_ways().len() > 1 {
             let packed = &by_set[3];
             assert_eq!(
@@ -359,7 +358,7 @@ fn factors_are_multiplied_onto_what_images_give() {
             [20.0, 200.0, 0.0],
             1e-3,
         ),
-        // What is there is black: 0.2 of the image, half of that.
+        // Black with an opacity of 0.2 * 0.5.
         (
             "base_color = [0, 0, 0]\nalpha_mode = 'blend'\nalpha = { texture = 'a', channel = 'a' }",
             [0.9; 3],
@@ -458,7 +457,7 @@ fn factors_and_sets_that_cannot_be_are_told() {
 #[test]
 fn the_camera_goes_through_backs_alone() {
     let folder = tempfile::tempdir().unwrap();
-    // A wall before a floor that a lamp lights from behind the camera, whose light the wall holds off from either side.
+    // A wall that occludes a floor from an area light behind the camera, whichever side faces it.
     let text = |height: f64, side: &str, transform: &str| {
         format!(
             "camera = {{ type = 'orthographic', position = [0, 0, {height}], look_at = [0, 0, 0], up = [0, 1, 0], height = 1.5 }}\n\
@@ -482,7 +481,7 @@ fn the_camera_goes_through_backs_alone() {
         let packed = find("double_sided = false");
         let expected = find(if seen { "double_sided = true" } else { "visible = false" });
         let other = find(if seen { "visible = false" } else { "double_sided = true" });
-        // Kernels with trees take seconds to compile.
+        // Kernels with a BVH take seconds to compile.
         let ways = match transform == turned {
             true => exact_ways().into_iter().filter(|way| *way != Way::Buffers).collect(),
             false => vec![Way::Cpu],
@@ -494,7 +493,7 @@ fn the_camera_goes_through_backs_alone() {
                 0,
                 "{height} {transform} {way:?}"
             );
-            // Under the wall both see the floor.
+            // Below the wall the floor is always visible.
             assert!(
                 height < 1.0 || differing(&picture, &reference(&other)) > 300,
                 "{height} {transform} {way:?}"
@@ -508,7 +507,7 @@ fn the_camera_goes_through_backs_alone() {
 
 #[test]
 fn a_mesh_keeps_its_own_tangents() {
-    // A normal map that leans along u, on a square whose tangents say that u goes where its coordinates do not.
+    // A normal map tilted along u, and tangents that contradict the coordinates.
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| [0.8, 0.6, 0.9]);
     let text = format!(
@@ -524,11 +523,11 @@ fn a_mesh_keeps_its_own_tangents() {
         (Vec4::new(0.0, 1.0, 0.0, 1.0), -n.y), // n x t = -x
         (Vec4::new(0.0, 1.0, 0.0, -1.0), n.y),
         (Vec4::new(0.0, 0.5, 0.0, -1.0), n.y), // any length
-        (Vec4::ZERO, n.x),                     // as the coordinates have it
+        (Vec4::ZERO, n.x),                     // from the texture coordinates
         (Vec4::NAN, n.x),
     ] {
         let packed = scene(folder.path(), 1, &text, with(tangent));
-        // A diffuse surface of albedo 1 under a sun of irradiance 3.
+        // Lambertian with an albedo of 1, at an irradiance of 3.
         let expected = 3.0 / std::f64::consts::PI * (0.6 * x + 0.8 * n.z).max(0.0);
         for way in both() {
             for pixel in means(&render(&packed, way)) {
@@ -571,14 +570,14 @@ fn colors_of_ply_files_are_read() {
             "{found:?} {expected:?}"
         );
     };
-    // IEC 61966-2-1 by hand: 188 is 0.5029, 10 is 10 / 255 / 12.92.
+    // IEC 61966-2-1: 188 decodes to 0.5029, 10 to 10 / 255 / 12.92.
     near(
         read(["uchar"; 4], ["255 188 10 51", "0 0 0 0", "300 -7 255 255"]),
         [[1.0, 0.502_886_5, 0.003_035_27, 0.2], [0.0; 4], [1.0, 0.0, 1.0, 1.0]],
     );
     near(
         read(["float", "float", "double", ""], ["0.5 2 0", "nan -1 1e9", "inf 1 1"]),
-        [[0.5, 2.0, 0.0, 1.0], [1.0; 4], [1.0; 4]], // white where a value is not finite
+        [[0.5, 2.0, 0.0, 1.0], [1.0; 4], [1.0; 4]], // white if a component is not finite
     );
     near(
         read(
@@ -587,7 +586,7 @@ fn colors_of_ply_files_are_read() {
         ),
         [[1.0, 0.0, 0.0, 0.25], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]],
     );
-    // Not without all of the three.
+    // All three components are required.
     assert_eq!(read(["uchar", "uchar", "", "uchar"], ["1 2 3"; 3]), vec![]);
 }
 
@@ -617,7 +616,7 @@ fn directions_of_facets_are_those_of_an_image() {
         write_exr(&folder.path().join("d.exr"), 2, 2, |_, _| {
             [direction.x as f32, direction.y as f32, 1.0]
         });
-        // The strength is the blue of the same image.
+        // Strength and direction share a lookup.
         let keys = format!(
             "anisotropy = {{ texture = 'd', channel = 'b' }}\nanisotropy_rotation = {more}\nanisotropy_direction = {{ texture = 'd' }}"
         );

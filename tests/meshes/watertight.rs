@@ -1,5 +1,4 @@
-//! Closed meshes have no holes: rays at their edges and corners do not pass, from outside or inside, wherever a mesh is and
-//! however large.
+//! Closed meshes are watertight: no ray at an edge or a vertex passes, at any place and scale.
 
 use glam::{DMat3, DVec3, UVec2, Vec3, Vec4Swizzles as _};
 use rayon::prelude::*;
@@ -13,7 +12,7 @@ use super::forms::{Form, HEAD, scene};
 use crate::random::Random;
 use crate::sources;
 
-/// Where meshes are put, and how far from their own size that is from the origin at most.
+/// Transforms, with distances from the origin up to 2e6 times the size.
 const PLACES: &[&str] = &[
     "",
     "rotate = [30, 40, 50]",
@@ -27,7 +26,6 @@ const PLACES: &[&str] = &[
     "matrix = [[1, 0.6, 0, 0], [0, 1, 0.4, 0], [0.2, 0, 1, 3]]",
 ];
 
-/// A scene of one mesh.
 fn placed(obj: &str, place: &str) -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("a.obj"), obj).expect("a mesh");
@@ -37,13 +35,13 @@ fn placed(obj: &str, place: &str) -> Packed {
     )
 }
 
-/// A mesh in the world as its records have it, in f64.
+/// A packed mesh in world space in double precision.
 struct Solid {
     corners: Vec<[DVec3; 3]>,
     center: DVec3,
-    /// Of a ball around the center that is all inside; of a mesh that is not convex it says nothing.
+    /// Radius of an inscribed ball, if the mesh is convex.
     radius: f64,
-    /// How far its coordinates are rounded at most.
+    /// Maximum rounding error of a coordinate.
     rounding: f64,
 }
 
@@ -71,7 +69,7 @@ impl Solid {
         }
     }
 
-    /// A corner, or a point on an edge, of any triangle.
+    /// Returns a vertex or a point on an edge.
     fn target(&self, random: &Random) -> DVec3 {
         let [a, b, _] = self.triangle(random);
         match random.below(4) {
@@ -82,7 +80,7 @@ impl Solid {
         }
     }
 
-    /// Its corners, from any of them on.
+    /// Returns a random triangle from a random corner on.
     fn triangle(&self, random: &Random) -> [DVec3; 3] {
         let mut corners = self.corners[random.below(self.corners.len() as u32) as usize];
         corners.rotate_left(random.below(3) as usize);
@@ -90,8 +88,8 @@ impl Solid {
     }
 }
 
-/// How many rays at a convex mesh pass it. They go through the ball in its middle, and so must meet its surface before they are
-/// there; from inside where they were aimed at, but for what a sliver's width leaves of the digits of its length.
+/// Returns the number of rays that pass a convex mesh. From outside, one through the inscribed ball must hit before it
+/// is nearest to the center; from inside, at its target, within the precision of slivers.
 fn passing(scene: &Packed, rays: u32, inside: bool) -> u32 {
     let solid = Solid::new(scene);
     let chunks = (0..64u64).into_par_iter().map(|seed| {
@@ -122,7 +120,7 @@ fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -
         },
     };
     let d = ray.direction.as_dvec3();
-    // How far along the ray it is nearest to the center; it may be past the target by rounding alone.
+    // Ray parameters nearest to the center and to the target. Rounding may move the hit behind the target.
     let to_center = (solid.center - origin.as_dvec3()).dot(d) / d.length_squared();
     let to_target = (target - origin.as_dvec3()).dot(d) / d.length_squared();
     let slack = 30.0 * solid.rounding / d.length();
@@ -133,7 +131,7 @@ fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -
     !(f64::from(hit.t) <= limit) || casts && !is_occluded(scene, origin, direction, times)
 }
 
-/// Whether a point light is hidden from the origin, so many times as far as the direction reaches.
+/// Returns true if a point light at `times` the direction is occluded.
 fn is_occluded(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool {
     let zero = Vec3::ZERO;
     let surface = Surface {
@@ -220,7 +218,7 @@ fn a_mesh_with_a_hole_is_found() {
     }
 }
 
-/// The ordinary test, of triangles that are shapes by themselves, lets rays through between two of them.
+/// The test of standalone triangles is not watertight.
 #[test]
 fn triangles_that_do_not_share_their_edges_are_found() {
     let form = Form::icosphere(2);
@@ -231,15 +229,14 @@ fn triangles_that_do_not_share_their_edges_are_found() {
         text += &format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [{a:?}, {b:?}, {c:?}]\n");
     }
     let mut apart = scene(&text, sources::path("scenes").as_path());
-    (apart.bvh.instances, apart.bvh.meshes) = (mesh.bvh.instances.clone(), mesh.bvh.meshes.clone()); // for what they are aimed at
+    (apart.bvh.instances, apart.bvh.meshes) = (mesh.bvh.instances.clone(), mesh.bvh.meshes.clone()); // the source of targets
     let count = [false, true].map(|inside| passing(&apart, 64_000, inside));
     println!("{count:?} of 64000 rays from outside and inside pass triangles by themselves");
     assert!(count[0] + count[1] > 0, "{count:?}");
     assert_eq!([false, true].map(|inside| passing(&mesh, 64_000, inside)), [0, 0]);
 }
 
-/// The knot is not convex. Rays at an edge whose triangles all face them meet it there or before; rays from inside of the tube
-/// never leave it.
+/// Not convex: rays at an edge whose triangles face them must hit there or before, rays from inside anywhere.
 #[test]
 fn no_ray_passes_the_knot() {
     let knot = std::fs::read_to_string(sources::path("scenes/meshes/knot.obj")).expect("the knot");
@@ -254,7 +251,7 @@ fn no_ray_passes_the_knot() {
         );
         assert_eq!((outside.1, inside.1), (0, 0), "{place:?}");
     }
-    // The control: with some of its triangles gone.
+    // The control: every 50th triangle is removed.
     let mut gone = 0;
     let few = knot.lines().filter(|line| {
         gone += u32::from(line.starts_with("f "));
@@ -266,7 +263,7 @@ fn no_ray_passes_the_knot() {
     assert!(outside.1 > 10 && inside.1 > 10, "{outside:?} {inside:?}");
 }
 
-/// How many rays were aimed from outside and from inside, and how many of them pass.
+/// Returns the numbers of rays and of those that pass, from outside and from inside.
 fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
     let side = f64::from(scene.bvh.instances[0].side);
     let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize() * side;
@@ -304,7 +301,7 @@ fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
             outside.0 += 1;
             outside.1 += u32::from(!(f64::from(hit.t) <= limit));
         }
-        // A quarter of the way through the tube: inside.
+        // Inside: a quarter of the distance across.
         let middle = (a + b + c) / 3.0;
         let inwards = -normal(corners);
         let start = (middle + inwards * 1e-4 * size).as_vec3();

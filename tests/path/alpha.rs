@@ -1,4 +1,4 @@
-//! Surfaces that are there for some rays: closed forms, shadows of the shape of a mask, and the same bits on both paths.
+//! Alpha-tested and alpha-blended surfaces: closed forms, mask shadows, identical bits on both backends.
 
 use wgray::scene::{Assets, Description};
 use wgray_render::pack::pack;
@@ -7,11 +7,10 @@ use wgray_render::records::Packed;
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_ways, first_hits, means, reference, render};
 
-/// Straight down on a square of side 2 around the origin, from above all.
+/// Camera above the square of side 2 around the origin.
 const DOWN: &str =
     "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
 
-/// Something black that reflects nothing.
 fn black(rest: &str) -> String {
     format!("{{ type = 'principled', base_color = [0, 0, 0], metallic = 0, specular = 0, {rest} }}")
 }
@@ -32,7 +31,7 @@ fn what_blends_lets_its_share_through() {
         );
         let text: String = (0..layers).map(|i| square(f64::from(i), 4.0, "veil")).collect();
         let packed = scene(256, 4, &format!("{head}{text}"));
-        // Each layer lets 1 - alpha pass, apart from all others.
+        // Each layer independently transmits 1 - alpha.
         let expected = (1.0f64 - alpha).powi(layers);
         for way in both() {
             let found = mean(&render(&packed, way))[0];
@@ -47,7 +46,7 @@ fn what_blends_lets_its_share_through() {
 
 #[test]
 fn a_ball_that_blends_is_passed_twice() {
-    // Both walls decide by themselves.
+    // Entry and exit decide independently.
     let text = format!(
         "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.veil = {}\n[[shapes]]\ntype = 'sphere'\nmaterial = 'veil'\n\
          center = [0, 0, 0]\nradius = 3\n",
@@ -64,7 +63,7 @@ fn a_ball_that_blends_is_passed_twice() {
 fn shadows_are_as_dark_as_what_casts_them_is_there() {
     let lit = |alpha: f64, light: &str| {
         let veil = black(&format!("alpha = {alpha}, alpha_mode = 'blend'"));
-        // Of the shadow the camera sees the floor below the veil, from under it.
+        // The camera is below the blended surface and sees its shadow on the floor.
         let text = format!(
             "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
              materials.veil = {veil}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{}{light}",
@@ -89,7 +88,7 @@ fn shadows_are_as_dark_as_what_casts_them_is_there() {
 
 #[test]
 fn what_is_seen_past_a_surface_is_weighed_as_if_there_were_none() {
-    // A light that both ways of sampling find, with and without something before it that is never there.
+    // A light that NEE and BSDF sampling find, with and without a fully transparent surface before it.
     let with = |veil: bool| {
         let veil = if veil { square(0.5, 4.0, "veil") } else { String::new() };
         let text = format!(
@@ -107,7 +106,7 @@ fn what_is_seen_past_a_surface_is_weighed_as_if_there_were_none() {
     }
 }
 
-/// A leaf on a mesh's quad, a disk in a square by its image's alpha, above a floor.
+/// Returns a leaf above a floor: a quad with a disk in its alpha channel.
 fn leaf(folder: &std::path::Path, mode: &str, way_in: &str) -> Packed {
     let size = 64u32;
     let texel = |x: u32, y: u32| {
@@ -148,7 +147,7 @@ fn a_leaf_casts_the_shadow_of_a_leaf() {
                 let [x, y] = [i % 40, i / 40].map(|i| (i as f64 + 0.5) / 20.0 - 1.0);
                 let r = x.hypot(y);
                 if (r - 0.5).abs() > 0.08 {
-                    // Light that bounces between leaf and floor is left.
+                    // Below is interreflection of leaf and floor.
                     let is_dark = pixel[0] < 0.05;
                     assert_eq!(
                         is_dark,
@@ -167,7 +166,6 @@ fn a_leaf_casts_the_shadow_of_a_leaf() {
             assert_eq!(differing(&render(&packed, way), &expected), 0, "{mode} {way:?}");
         }
     }
-    // What a pixel's centre meets.
     let packed = leaf(place.path(), "mask", DOWN);
     for way in both() {
         let hits = first_hits(&packed, way);

@@ -1,4 +1,4 @@
-//! The ends of ranges: no shapes, no light, no bounces, many bounces; huge and tiny scenes; nothing that is not a number.
+//! Limits of the path integrator: empty, dark, huge and tiny scenes; no bounces and many; all results are finite.
 
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_ways, reference, render};
@@ -46,7 +46,7 @@ fn without_bounces_only_what_shines_is_seen() {
 
 #[test]
 fn scenes_of_every_size_look_alike() {
-    // The same room, a millionth and a million times as large: the light is the same but for the rounding of coordinates.
+    // Scaled by 1e-6 and 1e6, radiance differs only by rounded coordinates.
     let room = |s: f64| {
         format!(
             "camera = {{ position = [0, {}, {s}], look_at = [0, 0, {s}], fov = 40 }}\n\
@@ -105,7 +105,7 @@ fn lights_that_touch_surfaces_and_graze_them_give_numbers() {
 
 #[test]
 fn long_paths_end() {
-    // A closed mirror that absorbs nothing: nothing is found, and every path is as long as it may be.
+    // A closed mirror without absorption: each path reaches the maximum depth.
     let text = |color: &str| {
         format!(
             "camera = {{ position = [0.3, 0, 0], look_at = [1, 0.1, 0], fov = 40 }}\nmaterials.m = {{ type = 'mirror', tint = {color} }}\n\
@@ -144,7 +144,7 @@ fn textures_that_are_too_bright_make_no_light() {
              materials.m = {{ type = 'diffuse', {color}{key} = {{ texture = 'c' }} }}\n\
              [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n"
         );
-        // What is above 1 counts as 1.
+        // Values above 1 are clamped.
         let plain = match key {
             "color" => text.replace("{ texture = 'c' }", "[1, 1, 1]"),
             _ => text.replace("{ texture = 'c' }", "1"),
@@ -164,7 +164,7 @@ fn textures_that_are_too_bright_make_no_light() {
 
 #[test]
 fn glass_makes_no_light_whatever_its_normals_are() {
-    // A cube and a coarse ball of glass with smooth normals, and balls with normal maps, in a white furnace: white at most.
+    // White-furnace tests: a cube and a coarse sphere of glass with smooth normals, and spheres with normal maps.
     let folder = tempfile::tempdir().expect("a folder");
     let cube = crate::meshes::forms::Form::cube();
     let ball = crate::meshes::forms::Form::icosphere(1);
@@ -188,7 +188,7 @@ fn glass_makes_no_light_whatever_its_normals_are() {
             for way in both() {
                 let film = render(&packed, way);
                 let found = mean(&film)[0];
-                // The furnace is white wherever a path comes from; some are caught inside, as those normals have no outside.
+                // Some paths remain trapped by inconsistent shading normals.
                 assert!(found < 1.0 + 1e-3 && found > 0.85, "{name}, {ior}, {way:?}: {found}");
             }
         }

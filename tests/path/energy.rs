@@ -1,5 +1,5 @@
-//! What facets lose, and what is given back: white surfaces in white light, rougher along one axis or not, of metal, glass and `principled`. By
-//! quadratures over the slopes of facets, whose density mathematics knows.
+//! Energy compensation of microfacet BSDFs: white-furnace tests of metal, glass and `principled`, isotropic and
+//! anisotropic, by quadrature over microfacet slopes.
 
 use std::f64::consts::TAU;
 
@@ -22,7 +22,6 @@ use crate::pictures::{both, render};
 /// All lobes.
 const ALL: u32 = 31;
 
-/// A scene with one material.
 fn scene_of(keys: &str) -> Packed {
     super::scene(
         1,
@@ -40,7 +39,7 @@ fn direction(cosine: f64, longitude: f64) -> Vec3 {
     DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
 }
 
-/// Directions to a viewer, from straight above to grazing, along the streaks, across them, and between.
+/// Returns wo from normal to grazing; along the tangent, across, and in between.
 fn viewers() -> Vec<Vec3> {
     let mut all = vec![Vec3::Z];
     for cosine in [0.8, 0.4, 0.04] {
@@ -51,7 +50,7 @@ fn viewers() -> Vec<Vec3> {
     all
 }
 
-/// A material with facets as it is seen from one side.
+/// Returns a material as evaluated from one side.
 fn seen(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Material {
     let surface = Surface {
         position: Vec3::ZERO,
@@ -76,16 +75,17 @@ fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Princip
     principled_mixture(material, wo, side > 0.0, Vec3::Z, ALL, energy)
 }
 
-/// The integral of `f` over all directions, mirrored and refracted, where `ior` is what is behind; facets' slopes are evenly many by their
-/// distribution (Walter et al. 2007, section 5.2). What passes counts as in the same medium.
+/// Integrates `f` over reflected and, with an `ior` of the far side, refracted directions: midpoint rule over
+/// microfacet normals by the inverse CDF of their distribution (Walter et al. 2007, section 5.2). Transmitted radiance
+/// is not scaled by the squared index.
 fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3) -> f32) -> f64 {
-    // Longitudes go round: few are enough there.
+    // Periodic in the longitude, so few steps suffice.
     let (steps, turns) = (360, 120);
     let a = alpha.as_dvec2();
     let o = wo.as_dvec3();
     let mut sum = 0.0;
     for i in 0..steps {
-        // Finer where slopes are large, which grazing views see.
+        // Finer at steep slopes, which grazing views see.
         let t = (f64::from(i) + 0.5) / f64::from(steps);
         let (u, du) = (1.0 - (1.0 - t) * (1.0 - t), 2.0 * (1.0 - t));
         let r = (u / (1.0 - u)).sqrt();
@@ -123,7 +123,7 @@ fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3)
     sum / f64::from(steps * turns)
 }
 
-/// What a white material gives in white light.
+/// Returns the total albedo: reflection and transmission.
 fn given(packed: &Packed, material: &Material, wo: Vec3, side: f32, compensated: bool) -> f64 {
     let alpha = facet_alpha(material);
     let mut known = seen(packed, material, wo, side);
@@ -167,7 +167,7 @@ fn streaks_stay_white() {
         }
     }
     assert!(off.is_empty(), "{} are off: {off:#?}", off.len());
-    // The control: nothing given back; and in the file too.
+    // Control: no compensation, as an argument and in the file.
     let packed = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7");
     let lost = 1.0 - given(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
     assert!(lost > 0.1, "{lost}");
@@ -265,7 +265,7 @@ fn principled_that_passes_all_light_is_the_material_dielectric() {
             }
         }
     }
-    // The control: without its table.
+    // Control: without the albedo table.
     let keys = "type = 'principled', metallic = 0, transmission = 1, thickness = 1, roughness = 1";
     let material = scene_of(keys).materials[0];
     let wo = direction(0.3, 0.0);
@@ -313,7 +313,7 @@ fn nothing_mirrors_where_the_index_is_that_of_air() {
             };
             let none = mirrored(1.0);
             assert!(none.abs() < 1e-3, "{}, {wo}: {none}", keys(1.0));
-            // The control: the default, which does.
+            // Control: the default index reflects.
             assert!(mirrored(1.5) > 0.03, "{wo}");
         }
     }
@@ -321,8 +321,8 @@ fn nothing_mirrors_where_the_index_is_that_of_air() {
 
 #[test]
 fn glass_around_the_camera_absorbs_all_the_way() {
-    // From inside through something that is not there, or that the camera does not see, to the wall of the glass and a lamp behind it: exp(-a d) of
-    // what Fresnel's equations let pass at a right angle, and n^2 of that.
+    // From inside, through a transparent or camera-invisible surface, to the glass boundary and an emitter behind it:
+    // exp(-a d) times the Fresnel transmittance at normal incidence times n^2.
     let (a, d) = (0.4_f64, 2.0);
     let wall = |z: f64, material: &str| {
         format!(
@@ -355,12 +355,12 @@ fn glass_around_the_camera_absorbs_all_the_way() {
         let packed = scene(&between);
         for way in both() {
             let found = super::mean(&render(&packed, way))[1];
-            // One way in 25 is mirrored: that many samples tell it to this.
+            // 1 of 25 paths is reflected.
             assert!(
                 (found / expected - 1.0).abs() < 2e-3,
                 "{way:?}, {between}: {found} for {expected}"
             );
-            // The control: what lies behind the first of them alone.
+            // Control: only absorption behind the first surface.
             let part = (1.0 - 0.04) * (-a * 0.7).exp() * 1.5 * 1.5;
             assert!((found / part - 1.0).abs() > 0.1, "the control");
         }

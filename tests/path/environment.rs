@@ -1,5 +1,4 @@
-//! An image around the scene: that its light is that of sums over its texels, that samples of it are as frequent as their density says, and
-//! that it lies as the page says.
+//! Environment maps: radiance against sums over texels, sampled directions against the PDF, documented orientation.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -16,7 +15,7 @@ use crate::pictures::{Way, both, differing, exact_ways, render, render_with};
 use crate::random::Random;
 use crate::{adapter, sources};
 
-/// A wide and low camera that sees a part of the ground, whose colour is 1.
+/// A narrow view of a white ground.
 const GROUND: &str = "camera = { position = [0, 0, 1], look_at = [0, 0.01, 0], fov = 10 }\n\
                       materials.m = { type = 'diffuse', color = [1, 1, 1] }\n\
                       [[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
@@ -30,7 +29,7 @@ fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> [f32; 3]) -> Image
     }
 }
 
-/// A scene of 16 x 16 pixels with an image around it, and more keys of its environment.
+/// Returns a scene with an environment map, and further environment keys.
 fn around(image: &Image, more: &str, (samples, depth): (u32, u32), rest: &str) -> Packed {
     described(&format!("file = 'around'{more}"), Some(image), (samples, depth), rest)
 }
@@ -52,8 +51,7 @@ fn described(environment: &str, image: Option<&Image>, (samples, depth): (u32, u
     )
 }
 
-/// The radiance of an image at (u, v) of the unit square, v from the upper edge on: between texels' centres, and between the outermost rows and
-/// their means at the poles.
+/// Returns the bilinear radiance at (u, v), v from the upper edge. The poles are the means of the outermost rows.
 fn radiance(image: &Image, u: f64, v: f64) -> DVec3 {
     let Texels::Floats(texels) = &image.texels else {
         panic!("an image of bytes")
@@ -68,7 +66,7 @@ fn radiance(image: &Image, u: f64, v: f64) -> DVec3 {
     };
     let (s, t) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
     let (x, y) = (s.floor(), t.floor());
-    // At a pole a row of centres is half a row away.
+    // The pole is half a row from the texel centers.
     let down = match t {
         t if t < 0.0 => 1.0 + 2.0 * t,
         t if t > height as f64 - 1.0 => 2.0 * (t - y),
@@ -78,7 +76,7 @@ fn radiance(image: &Image, u: f64, v: f64) -> DVec3 {
     along(y as i64).lerp(along(y as i64 + 1), down)
 }
 
-/// A sum over directions, of so many points a side of each texel.
+/// Integrates over all directions, `points` x `points` per texel.
 fn sum_over(image: &Image, points: u32, mut value: impl FnMut(DVec3, DVec3) -> DVec3) -> DVec3 {
     let (columns, rows) = (image.width * points, image.height * points);
     let mut sum = DVec3::ZERO;
@@ -132,13 +130,13 @@ fn the_ground_gets_what_a_sum_over_all_directions_says() {
         (one_bright(16, 8, (15, 0)), 32),
         (sunny(), 8),
     ];
-    // The normal of the ground as the image has it.
+    // Ground normal in the space of the image.
     let sines = |degrees: f64| degrees.to_radians().sin_cos();
     let tilted = DVec3::new(sines(50.0).0, 0.0, sines(50.0).1);
     for (image, points) in &images {
         for (turn, normal) in [
             ("", DVec3::Z),
-            // What is done to the image is undone to the normal.
+            // Rotates the normal by the inverse.
             ("\nrotate = { axis = [0, 1, 0], degrees = -50 }", tilted),
             ("\nrotate = [0, 90, 0]", DVec3::NEG_X),
         ] {
@@ -158,14 +156,14 @@ fn the_ground_gets_what_a_sum_over_all_directions_says() {
             }
         }
     }
-    // The control: the ground's normal, as if the image was not turned.
+    // Control: the unrotated normal.
     let wrong = irradiance(&sunny(), 8, DVec3::Z) / irradiance(&sunny(), 8, tilted);
     assert!((wrong - DVec3::ONE).abs().min_element() > 0.05, "{wrong}");
 }
 
 #[test]
 fn six_colours_are_seen_where_they_lie() {
-    // In the middle of the picture what is towards +x, to its left +y, at its edges -x, to its right -y; above +z.
+    // From left to right: -x, +y, +x, -y, -x. Top: +z.
     let picture = image(64, 32, |x, y| match (x, y) {
         (_, 0..8) => [0.0, 0.0, 1.0],
         (_, 24..) => [1.0, 1.0, 0.0],
@@ -194,7 +192,7 @@ fn six_colours_are_seen_where_they_lie() {
     for way in both() {
         for (i, (direction, color)) in colors.into_iter().enumerate() {
             assert_eq!(seen(direction, "", way), color, "{direction}, {way:?}");
-            // Counter-clockwise from above: what was towards +x is towards +y then.
+            // Counterclockwise from above: +x moves to +y.
             if i < 4 {
                 let before = colors[(i + 3) % 4].1;
                 assert_eq!(seen(direction, "\nrotate = 90", way), before, "{direction}, {way:?}");
@@ -223,7 +221,7 @@ fn a_white_image_is_the_constant_colour() {
     }
 }
 
-/// An image, and lamps and materials of several kinds in it.
+/// An environment map with emitters and materials of several kinds.
 const LAMPS: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5], fov = 40 }\n\
     materials.shine = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
     materials.gloss = { type = 'phong', diffuse = [0.4, 0.4, 0.4], specular = [0.5, 0.5, 0.5], shininess = 12, ambient = [0, 0, 0] }\n\
@@ -253,7 +251,7 @@ fn samples_of_the_image_alone_and_of_materials_alone_find_the_same() {
     let light_alone = with([(PATH, OF_LIGHT, "1.0"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
     let material_alone = with([(PATH, OF_LIGHT, "0.0"), (AFAR, OF_RAY, "1.0")]);
     let wrong = with([(PATH, OF_LIGHT, "1.1"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
-    // Without the lamp, whose light has its own weights.
+    // Without the area light, which has its own MIS weights.
     let text = LAMPS.replace(", emission = [5, 3, 1]", "");
     for image in [
         noise(16, 8),
@@ -283,7 +281,7 @@ fn light_of_an_image_and_of_lamps_adds_up() {
     let dark = LAMPS.replace(", emission = [5, 3, 1]", "");
     for way in both() {
         let sum = |packed: Packed| mean(&render(&packed, way));
-        // What hides is there in all of them.
+        // The rectangle light occludes in all three images.
         let hidden = lamps.split("[[lights]]").last().unwrap_or_default();
         let plate = format!("[[lights]]{}", hidden.replace("color = [3, 3, 3]", "color = [0, 0, 0]"));
         let of_image = sum(around(&image, "", (1024, 3), &format!("{dark}{plate}")));
@@ -301,7 +299,8 @@ fn light_of_an_image_and_of_lamps_adds_up() {
 
 #[test]
 fn light_from_below_does_not_pass_the_floor() {
-    // Nothing is beneath the floor, so that it would cast no shadow of a lamp. The ball's lower half gets light from there alone.
+    // The floor has nothing below it, so it would cast no shadow of area lights. The lower half of the ball is lit from
+    // below only.
     let below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
     let floors = [
         "type = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
@@ -410,7 +409,7 @@ fn every_way_gives_the_same_bits() {
     }
 }
 
-/// Samples of a scene's image at a surface of this normal.
+/// Samples the environment map at a surface.
 fn samples(packed: &Packed, normal: Vec3, count: u32) -> impl Iterator<Item = Vec3> {
     let light = packed
         .lighting
@@ -447,13 +446,13 @@ fn directions_are_as_frequent_as_their_density_says() {
         one_bright(16, 8, (3, 0)),
         sunny(),
     ];
-    // Light from all sides counts for the normal 0.
+    // Normal 0 selects all directions.
     let normals = [Vec3::ZERO, Vec3::Z, Vec3::new(0.6, -0.48, -0.64)];
     for (image, normal) in (images.iter()).flat_map(|image| normals.map(|normal| (image, normal))) {
         let packed = around(image, "", (1, 1), GROUND);
         let mut counts = vec![0.0; COLUMNS * ROWS];
         samples(&packed, normal, COUNT).for_each(|direction| counts[bin(direction)] += 1.0);
-        // Of the density by fine sums; far finer than the cells, whose borders are not the bins'.
+        // Expected counts, on a grid much finer than the texels, whose borders are not those of the bins.
         let mut expected = [0.0, 0.08].map(|_| vec![0.0; COLUMNS * ROWS]);
         let fine = image.width.max(image.height).max(24) * 24;
         for row in 0..fine {
@@ -485,7 +484,7 @@ fn directions_are_as_frequent_as_their_density_says() {
             (sum, freedom)
         };
         let (sum, freedom) = statistic(&expected[0]);
-        // Six standard deviations, and what the fine sums lose.
+        // Six standard deviations, plus the error of the grid.
         let most = freedom + 6.0 * (2.0 * freedom).sqrt() + 20.0;
         assert!(freedom > 2.0 && sum < most, "{size:?}: {sum} of {freedom}");
         let (wrong, _) = statistic(&expected[1]);
@@ -498,7 +497,7 @@ fn directions_are_as_frequent_as_their_density_says() {
 
 #[test]
 fn an_unoccluded_wall_has_little_noise() {
-    // Every pixel has the same expected value, so the deviations are all noise.
+    // All pixels have the same expected value.
     let noise = |normal: [f64; 3], (samples, pattern): (u32, &str)| {
         let [x, y, z] = normal;
         let text = format!(
@@ -529,7 +528,7 @@ fn an_unoccluded_wall_has_little_noise() {
         let found = noise(normal, (64, "sobol"));
         assert!(found < 0.035, "{normal:?}: {found}");
     }
-    // The control: samples that are not stratified, and few ones.
+    // Control: unstratified or few samples.
     assert!(noise([0.0, -1.0, 0.0], (64, "random")) > 0.035);
     assert!(noise([0.0, -1.0, 0.0], (4, "sobol")) > 0.035);
 }

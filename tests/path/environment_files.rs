@@ -1,4 +1,4 @@
-//! What a scene file may say of an image around the scene: files of every kind, and what is told of bad ones.
+//! Environment maps in scene files: image formats and error messages.
 
 use std::path::Path;
 
@@ -48,7 +48,7 @@ fn images_of_every_kind_are_read() {
         let packed = wgray_render::pack::pack(&scene);
         let at = packed.environment.texels as usize;
         let value = f32::from_bits(packed.textures.texels[at]);
-        // 188 of 255 by the sRGB curve is 0.5029.
+        // 188/255 in sRGB is 0.5029 linear.
         assert!((value - 0.5).abs() < 6e-3, "{name}: {value}");
     }
     write_exr(&path("square.exr"), 3, 3, |_, _| [0.5; 3]);

@@ -1,14 +1,14 @@
-//! Scenes whose light has a closed form, on both paths, each with a wrong answer that must fail.
+//! Closed-form radiance on both backends. Each control is a wrong value that must fail.
 
 use std::f64::consts::PI;
 
 use super::{mean, scene};
 use crate::pictures::{both, means, render};
 
-/// A camera in the middle of nothing that sees along x.
+/// A camera that looks roughly along +x.
 const INSIDE: &str = "camera = { position = [0.1, 0, 0.05], look_at = [1, 0, 0.2], fov = 60 }\n";
 
-/// A camera of parallel rays straight down, on a picture of this height.
+/// Returns an orthographic camera that looks straight down.
 fn above(x: f64, y: f64, z: f64, height: f64) -> String {
     format!(
         "camera = {{ type = 'orthographic', position = [{x}, {y}, {z}], look_at = [{x}, {y}, 0], up = [0, 1, 0], height = {height} }}\n"
@@ -24,7 +24,7 @@ fn near(found: f64, expected: f64, relative: f64) -> bool {
 
 #[test]
 fn a_convex_body_in_a_furnace_has_its_albedo() {
-    // Each sample is the albedo itself: no variance.
+    // Each sample is the albedo: zero variance.
     for (material, albedo, tolerance) in [
         ("type = 'diffuse', color = [0.8, 0.5, 1]", [0.8, 0.5, 1.0], 1e-5),
         ("type = 'diffuse', color = [1, 1, 1], roughness = 1", [1.0; 3], 3e-2),
@@ -68,7 +68,7 @@ fn a_convex_body_in_a_furnace_has_its_albedo() {
 
 #[test]
 fn inside_of_what_shines_bounces_are_a_series() {
-    // A closed body of albedo a that shines with radiance 1: after n bounces the sum of a^k, whatever its form.
+    // In a closed emitter of albedo a and radiance 1, n bounces give the sum of a^k up to k = n.
     let (albedo, shine) = (0.6, 0.5);
     let body = [
         "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 2\n".to_owned(),
@@ -110,8 +110,8 @@ fn inside_of_what_shines_bounces_are_a_series() {
     }
 }
 
-/// The form factor from a point of a plane to a parallel rectangle that has a corner straight above it, at height h: Howell, "A Catalog
-/// of Radiation Heat Transfer Configuration Factors", B-3.
+/// Returns the form factor of a parallel rectangle with a corner straight above, at height h: Howell, "A Catalog of
+/// Radiation Heat Transfer Configuration Factors", B-3.
 fn corner_factor(a: f64, b: f64, h: f64) -> f64 {
     let (x, y) = (a / h, b / h);
     let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
@@ -136,7 +136,7 @@ fn a_rectangle_lights_the_floor_by_its_form_factor() {
         "materials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [3, 2, 1] }}\n[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\ncenter = [0, 0, {h}]\nsize = [{width}, {height}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n"
     );
     for shining in [light, shape] {
-        // Seen from below the light, beside it and far from it.
+        // Below the light, beside it, and far from it.
         for (x, y) in [(0.0, 0.0), (0.6, 0.1), (2.0, 1.5)] {
             let camera = above(x, y, 0.4, 0.02);
             let packed = scene(
@@ -161,7 +161,7 @@ fn a_rectangle_lights_the_floor_by_its_form_factor() {
 
 #[test]
 fn spheres_and_disks_light_the_floor_by_their_form_factors() {
-    // A sphere of radius r at height h, straight above: (r / d)^2 cos; a disk: r^2 / (r^2 + h^2). So too for tiny and huge ones.
+    // Straight above: sphere (r / d)^2 cos, disk r^2 / (r^2 + h^2).
     for scale in [1e-3, 1.0, 1e3] {
         for r in [1e-3, 0.3, 0.999] {
             let h = 1.0;
@@ -201,8 +201,7 @@ fn spheres_and_disks_light_the_floor_by_their_form_factors() {
     }
 }
 
-/// The irradiance, divided by pi times the radiance, that a horizontal emissive cylinder sends straight down, by the integral of the cosines over its
-/// surface: a midpoint rule in f64.
+/// Returns the form factor of a horizontal cylinder straight above: midpoint rule over its surface.
 fn cylinder_factor(height: f64, radius: f64, length: f64) -> f64 {
     let (arcs, slices) = (400, 400);
     let mut sum = 0.0;
@@ -225,7 +224,7 @@ fn cylinder_factor(height: f64, radius: f64, length: f64) -> f64 {
 
 #[test]
 fn cylinders_light_the_floor_by_their_form_factors() {
-    // At a great length it is radius / height (Siegel and Howell, "Thermal Radiation Heat Transfer").
+    // A long one has radius / height (Siegel and Howell, "Thermal Radiation Heat Transfer").
     assert!(near(cylinder_factor(1.0, 0.3, 60.0), 0.3, 2e-3));
     for scale in [1e-3, 1.0, 1e3] {
         let shapes = [
@@ -239,7 +238,7 @@ fn cylinders_light_the_floor_by_their_form_factors() {
                 0.01,
                 cylinder_factor(1.0, 0.01, 18.0),
             ),
-            // All around.
+            // Inside the cylinder.
             ([0.0, 0.0, -1.0], [0.0, 0.0, 2.0], 0.8, 1.0),
         ];
         for (start, end, radius, factor) in shapes {
@@ -296,7 +295,7 @@ fn points_fall_off_with_the_square_of_the_distance_and_suns_do_not() {
 
 #[test]
 fn a_slab_of_glass_passes_what_fresnel_and_beer_leave() {
-    // At a right angle: r = ((n - 1) / (n + 1))^2 at each face; inside light goes to and fro, and loses exp(-a d) each time.
+    // Normal incidence: r = ((n - 1) / (n + 1))^2 at each face; each pass attenuates by exp(-a d).
     let n = 1.5_f64;
     let r = ((n - 1.0) / (n + 1.0)).powi(2);
     for (absorption, thickness) in [(0.0, 0.5), (0.7, 0.5), (3.0, 1.0)] {
@@ -322,7 +321,7 @@ fn a_slab_of_glass_passes_what_fresnel_and_beer_leave() {
 
 #[test]
 fn radiance_in_glass_is_the_square_of_its_index() {
-    // From inside of glass in a furnace every direction that leaves has n^2 times its radiance, less what is mirrored back, which is the same light.
+    // With uniform radiance 1 outside, radiance in glass is n^2; internal reflections add the same radiance.
     let text = format!(
         "{INSIDE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = 1.5 }}\n\
          [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 3\n"

@@ -1,4 +1,4 @@
-//! Lamps that the camera does not see: it sees what is behind them, and all else sees them.
+//! Camera-invisible emitters: only camera rays pass through them.
 
 use glam::UVec2;
 use wgray_render::cpu::geometry::pixel_first_hit;
@@ -7,7 +7,7 @@ use wgray_render::records::{NO_INDEX, Packed};
 use crate::pictures::{both, differing, exact_ways, means, reference, render};
 use crate::scenes;
 
-/// A lamp before a wall, and a mirror behind the camera's side of it.
+/// Returns an emitter before a wall, and a mirror that shows it.
 fn room(integrator: &str, lamp: &str) -> Packed {
     let (wall, depth) = match integrator {
         "path" => ("type = 'diffuse', color = [0.5, 0.5, 0.5]", 4),
@@ -49,7 +49,7 @@ fn the_camera_sees_what_is_behind_and_mirrors_see_the_lamp() {
         }
         for way in both() {
             let (seen, hidden) = (means(&render(&seen, way)), means(&render(&hidden, way)));
-            // Where the camera does not look at the lamp, nothing changes; there are pixels in the mirror that show it.
+            // Pixels beside the emitter are unchanged; some show it in the mirror.
             let covered = |i: usize| (i % 24).abs_diff(12) < 4 && (i / 24).abs_diff(12) < 4;
             let others = || (0..24 * 24).filter(|i| !covered(*i));
             assert!(others().all(|i| seen[i] == hidden[i]), "{way:?}, {integrator}");
@@ -58,7 +58,7 @@ fn the_camera_sees_what_is_behind_and_mirrors_see_the_lamp() {
                 bright > 3,
                 "{way:?}, {integrator}: {bright} pixels of the mirror show the lamp"
             );
-            // In the middle is the wall.
+            // The wall.
             let middle = 12 * 24 + 12;
             assert!(
                 hidden[middle][0] < 3.9 && hidden[middle][0] > 0.0,

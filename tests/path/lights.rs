@@ -1,4 +1,4 @@
-//! Lights among lights: each is chosen as often as its power says and chance, whatever shines, and what is hidden lights nothing.
+//! Light selection probabilities, equal results for all kinds of emitters, occlusion by lights.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ const FLOOR: &str =
 
 #[test]
 fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
-    // Points of power 1 to 16, and one that is dark: more of them are in a tree.
+    // Powers 1 to 16 and a black one: too few for a light tree.
     let mut text = format!("{CAMERA}{FLOOR}");
     for i in 0..=16 {
         let _ = write!(
@@ -48,7 +48,8 @@ fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
     assert!(chi_square < 15.0 + 6.0 * (2.0_f64 * 15.0).sqrt(), "{chi_square}");
 }
 
-/// A lamp in a landscape with a weak sun, and beside a spot a million times as strong that shines away: neither hides it.
+/// A weak directional light, or a spot light a million times as strong that faces away, does not keep a point light
+/// from being sampled.
 #[test]
 fn what_lights_nothing_here_hides_no_lamp() {
     let lamp = "[[lights]]\ntype = 'point'\nposition = [0, 0, 1]\ncolor = [1, 1, 1]\n";
@@ -65,7 +66,7 @@ fn what_lights_nothing_here_hides_no_lamp() {
 
 #[test]
 fn what_shines_lights_alike_whatever_it_is_made_of() {
-    // A square light as a light, as a rectangle, as two triangles, as a box of no height nearly, by a texture of one colour; alone and
+    // The same square as a light, a rectangle, two triangles, a nearly flat box, and with a constant texture; alone and
     // among others.
     let square = "center = [0, 0, 1]\nsize = [1, 1]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n";
     let shine = "materials.s = { type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4] }\n";
@@ -102,7 +103,7 @@ fn a_rectangle_light_hides_what_is_behind_it_and_shines_to_one_side() {
     let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [2, 2, 2]\n";
     let camera = "camera = { type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
                   materials.m = { type = 'diffuse', color = [0.5, 0.5, 0.5] }\n";
-    // Turned away, it is but a shade in the sun.
+    // Facing away, it only casts a shadow.
     let packed = scene(1024, 1, &format!("{camera}{}{sun}{FLOOR}", light.replace("NZ", "1")));
     for way in both() {
         let found = means(&render(&packed, way));
@@ -114,7 +115,7 @@ fn a_rectangle_light_hides_what_is_behind_it_and_shines_to_one_side() {
             "{way:?}: {lit} in the sun"
         );
     }
-    // From above it is black behind, and bright before.
+    // From above: black back, bright front.
     for (nz, expected) in [(1.0, 4.0), (-1.0, 0.0)] {
         let camera = "camera = { type = 'orthographic', position = [0, 0, 2], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.5 }\n";
         let packed = scene(4, 3, &format!("{camera}{}", light.replace("NZ", &nz.to_string())));

@@ -1,4 +1,4 @@
-//! Many lamps, which a tree chooses among: each as likely as the tree says, together as bright as one by one, at the ends of all ranges.
+//! The light tree: selection probabilities, sums over many lights, limits of the ranges.
 
 use std::fmt::Write as _;
 
@@ -19,7 +19,7 @@ const CAMERA: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.3], f
 const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
-/// Lamp number i of a scene of all kinds.
+/// Returns light `i` of a scene with all kinds.
 fn lamp(i: u32, random: &Random) -> String {
     let coordinate = |scale: f64, from: f64| from + scale * random.unit();
     let (x, y, z) = (coordinate(2.0, -1.0), coordinate(2.0, -1.0), coordinate(0.8, 0.2));
@@ -47,7 +47,7 @@ fn lamps(count: u32) -> Vec<String> {
     (0..count).map(|i| lamp(i, &random)).collect()
 }
 
-/// One thing that shines, in the tree.
+/// An emitter in the light tree.
 struct Leaf {
     density: f32,
     instance: u32,
@@ -102,7 +102,7 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
                 if counts[i] == 0 {
                     continue;
                 }
-                // With a sun beside it, the tree is chosen by its share, which all leaves' densities have.
+                // A directional light outside of the tree scales the PDFs of all leaves.
                 let primitive = packed.lighting.lights[leaf.index as usize].primitive;
                 if primitive != NO_INDEX {
                     let hit = Hit {
@@ -122,7 +122,7 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
                     kinds += 1.0;
                 }
             }
-            // Sets of 64 samples are spread more evenly than chance, so that this is well below what chance gives.
+            // 64 stratified samples each: well below independent samples.
             assert!(
                 kinds > 5.0 && chi_square < kinds + 6.0 * (2.0_f64 * kinds).sqrt(),
                 "{chi_square} of {kinds}"
@@ -142,7 +142,7 @@ fn many_lamps_are_as_bright_as_one_by_one() {
             .collect();
         let camera = "camera = { type = 'orthographic', position = [0, 0, 0.05], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
                       materials.m = { type = 'diffuse', color = [0.7, 0.7, 0.7] }\n";
-        // Rectangles hide light, so that alone each is as it is among all only without them.
+        // Rectangle lights occlude, so single-light images would not add up.
         let all: Vec<String> = all.into_iter().filter(|lamp| !lamp.contains("rectangle")).collect();
         let of = |samples: u32, lamps: &[String]| scene(samples, 1, &format!("{camera}{FLOOR}{}", lamps.concat()));
         let mut expected = [0.0; 3];
@@ -182,7 +182,7 @@ fn the_ends_of_ranges_give_numbers() {
     let mut text =
         format!("{CAMERA}materials.dark = {{ type = 'diffuse', color = [0, 0, 0], emission = [0, 0, 0] }}\n{FLOOR}");
     for i in 0..12 {
-        // Twice each: coincident ones; tiny and huge ones, of the least and the most that colours can be; dark ones.
+        // Two coincident lights each: tiny and huge, minimum, maximum and zero color.
         let radius = if i % 2 == 0 { 1e-6 } else { 1e6 };
         let color = [1e-30, 1e6, 0.0, 1.0][i % 4];
         for _ in 0..2 {
@@ -267,7 +267,6 @@ fn meshes_that_shine_are_in_the_tree() {
         let beside = wgray::scene::Assets::beside(folder.path());
         wgray_render::pack::pack(&description.validate_with(&beside).expect("a sound scene"))
     };
-    // Two of three shine; the ball is nearly the sphere of a radius that gives the same area.
     let mesh = |material: &str, x: f64| {
         format!(
             "[[shapes]]\ntype = 'mesh'\nmaterial = '{material}'\nfile = 'ball.obj'\nscale = 0.3\ntranslate = [{x}, 0, 0.6]\n"
@@ -282,7 +281,7 @@ fn meshes_that_shine_are_in_the_tree() {
     for way in exact_ways() {
         assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
     }
-    // As bright as found by materials alone: far more samples, without any of light.
+    // BSDF sampling alone gives the same mean.
     let packed = load(&text(&[mesh("s", -0.7), mesh("m", 9.0), mesh("s", 0.7)].concat(), 1024));
     let mut without = packed.clone();
     without.specialization.emitters = 0;

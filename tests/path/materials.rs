@@ -1,5 +1,5 @@
-//! Materials by themselves: what they reflect of light from everywhere, that light's way can be turned round, and that directions
-//! come as often as their density says. In f64 by quadratures of their own.
+//! BSDFs alone: white furnace, reciprocity, normalized PDFs, sampled directions against the PDF. Integrals are f64
+//! quadratures.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,15 +14,14 @@ use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_sample};
 use wgray_render::records::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
 
-/// What a material is: its functions.
 struct Lobes {
     name: String,
     material: Material,
-    /// Whether it reflects, or lets pass, all light that its colour, 1, lets it.
+    /// True if a white one loses no energy.
     whole: bool,
 }
 
-/// Light that passes a surface is as bright as before, but for the square of the index.
+/// Returns the factor that undoes the scaling of transmitted radiance by the squared index.
 fn per_index(material: &Material, wi: Vec3) -> f64 {
     if wi.z < 0.0 && material.kind == ROUGH_GLASS {
         f64::from(material.ior).powi(2)
@@ -55,7 +54,7 @@ impl Lobes {
         }
     }
 
-    /// Its facets as the viewer sees them.
+    /// Returns the material with its energy loss for wo.
     fn seen(&self, wo: Vec3) -> Material {
         let loss = if self.whole {
             facet_loss(facet_alpha(&self.material), wo)
@@ -65,7 +64,7 @@ impl Lobes {
         Material { loss, ..self.material }
     }
 
-    /// What facets' own samples say of their worth.
+    /// Samples a microfacet BSDF with weight and PDF.
     fn facet_sample(&self, wo: Vec3, u: Vec2, random: f32) -> Option<LobeSample> {
         match self.material.kind {
             METAL => Some(metal_sample(&self.seen(wo), wo, u)),
@@ -75,7 +74,7 @@ impl Lobes {
         }
     }
 
-    /// A direction, if there is one: facets may mirror light onto each other.
+    /// Samples wi; `None` below the surface.
     fn sample(&self, wo: Vec3, u: Vec2, random: f32) -> Option<Vec3> {
         if let Some(found) = self.facet_sample(wo, u, random) {
             return (found.pdf > 0.0).then_some(found.wi);
@@ -90,7 +89,7 @@ impl Lobes {
         [METAL, ROUGH_GLASS, THIN].contains(&self.material.kind)
     }
 
-    /// The share of light from everywhere that comes to the viewer.
+    /// Returns the directional albedo.
     fn albedo(&self, wo: Vec3) -> f64 {
         integral(wo, |wi| {
             if wi.z > 0.0 || self.has_facets() {
@@ -189,13 +188,12 @@ fn direction(cosine: f64, longitude: f64) -> Vec3 {
     DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
 }
 
-/// Directions to a viewer: from straight above to grazing.
+/// Returns wo from normal to grazing.
 fn viewers() -> Vec<Vec3> {
     [1.0, 0.9, 0.5, 0.1, 0.01].map(|cosine| direction(cosine, 0.7)).to_vec()
 }
 
-/// The integral over all directions around the mirrored one or, for a function of wide lobes, around the normal: cells fine where a lobe
-/// is narrow.
+/// Integrates over all directions, with finer cells around the mirrored one or, for wide lobes, the normal.
 fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
     let (rings, spokes) = (1500, 600);
     let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
@@ -203,7 +201,7 @@ fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
     let v = axis.cross(u);
     let mut sum = 0.0;
     for i in 0..rings {
-        // Rings of equal steps of the angle's square root near the axis.
+        // Finer near the axis.
         let edge = |i: i32| PI * (f64::from(i) / f64::from(rings)).powi(2);
         let (inner, outer) = (edge(i), edge(i + 1));
         let angle = (inner + outer) / 2.0;
@@ -224,7 +222,7 @@ fn a_white_surface_in_white_light_is_white_or_darker() {
             let reflected = lobes.albedo(wo);
             let name = &lobes.name;
             if lobes.whole {
-                // What facets lose is a fit.
+                // The energy loss is a fit.
                 let off = if lobes.has_facets() { 0.01 } else { 2e-3 };
                 assert!((reflected - 1.0).abs() < off, "{name}, {wo}: {reflected}");
             } else {
@@ -232,7 +230,7 @@ fn a_white_surface_in_white_light_is_white_or_darker() {
             }
         }
     }
-    // The control: without what is given back, a rough surface is darker.
+    // Control: no compensation.
     let once = Material {
         diffuse: Vec3::splat(1e-3),
         roughness: 1.0,
@@ -248,13 +246,13 @@ fn a_white_surface_in_white_light_is_white_or_darker() {
 
 #[test]
 fn light_has_the_same_way_back() {
-    // Turquin's factor is of the viewer's direction alone.
+    // Turquin's factor depends only on wo and is not reciprocal.
     for lobes in all().into_iter().filter(|lobes| !(lobes.whole && lobes.has_facets())) {
         for wo in viewers() {
             for wi in [direction(0.8, 0.1), direction(0.3, 3.9), direction(0.02, 2.0)] {
                 let there = lobes.eval(wo, wi) / wi.z;
                 let back = lobes.eval(wi, wo) / wo.z;
-                // Near the angle of total reflection what glass mirrors is steeper than any rounding.
+                // Fresnel reflectance is steep near the critical angle.
                 let off = if lobes.material.kind == ROUGH_GLASS { 4e-3 } else { 2e-5 };
                 assert!(
                     there.abs_diff_eq(back, off * there.x.max(1.0)),
@@ -266,7 +264,7 @@ fn light_has_the_same_way_back() {
     }
 }
 
-/// Radiance is larger by the square of the index: Veach's thesis, equation 5.14.
+/// Refracted radiance scales with the squared index: Veach's thesis, equation 5.14.
 #[test]
 fn refracted_light_has_the_same_way_back() {
     for lobes in all().iter().filter(|lobes| lobes.material.kind == ROUGH_GLASS) {
@@ -299,7 +297,7 @@ fn densities_integrate_to_one() {
     for lobes in all() {
         for wo in viewers() {
             let total = integral(wo, |wi| f64::from(lobes.pdf(wo, wi)));
-            // Of facets to the share of ways that go on.
+            // For microfacets, the fraction of valid samples.
             let count = 65_536;
             let on = (0..count).filter(|i| {
                 let u = sobol_sample(*i, glam::UVec2::new(1, 2));
@@ -316,13 +314,13 @@ fn densities_integrate_to_one() {
     }
 }
 
-/// Pearson's chi-square over cells of the sphere, and its degrees of freedom: of directions that are sampled, against the density. Cells that
-/// are expected to have few are taken together.
+/// Returns Pearson's chi-square of sampled directions and its degrees of freedom. Cells with small expected counts are
+/// merged.
 fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 200_000;
     const HEIGHTS: usize = 40;
     const LONGITUDES: usize = 40;
-    // Cells in the frame of the mirrored direction, where lobes are narrow.
+    // In the frame of the mirrored direction, where lobes are narrow.
     let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
     let u = axis.any_orthonormal_vector();
     let v = axis.cross(u);
@@ -334,7 +332,7 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
     };
     let mut counts = vec![0.0; HEIGHTS * LONGITUDES];
     for i in 0..SAMPLES {
-        // Independent numbers: a sequence's are too even for this test.
+        // Independent: low-discrepancy sequences are too even for this test.
         let bits = wgray_render::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
         let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray_render::cpu::rng::unit_float);
         let Some(wi) = lobes.sample(wo, Vec2::new(a, b), c) else {
@@ -378,7 +376,7 @@ fn directions_are_as_frequent_as_their_density_says() {
     for lobes in all() {
         for wo in [direction(0.95, 0.4), direction(0.3, 2.5)] {
             let (sum, freedom) = chi_square(&lobes, wo, |wi| f64::from(lobes.pdf(wo, wi)));
-            // Six standard deviations of the distribution.
+            // Six standard deviations.
             let most = freedom + 6.0 * (2.0 * freedom).sqrt();
             assert!(freedom > 5.0 && sum < most, "{}, {wo}: {sum} of {freedom}", lobes.name);
             let (wrong, _) = chi_square(&lobes, wo, |wi| {
@@ -412,7 +410,7 @@ fn a_sample_is_worth_what_it_reflects() {
                     let worth = f64::from(lobes.eval(wo, wi).x) / f64::from(pdf);
                     sum += worth * per_index(&lobes.material, wi);
                     if let Some(found) = lobes.facet_sample(wo, u, random) {
-                        // What the sample says of itself is the same, but for rounding where facets are seen from their edge.
+                        // The sample's own weight and PDF agree, except for rounding at grazing angles.
                         let off = (f64::from(found.weight.x) - worth).abs() / worth.max(1e-3);
                         let density = f64::from((found.pdf - pdf).abs() / pdf);
                         let grazing = wi.z.abs() < 0.02 || wo.z < 0.02;
@@ -476,7 +474,7 @@ fn the_ends_of_all_ranges_are_numbers() {
                                 let numbers = found.weight.is_finite() && found.pdf.is_finite() && found.pdf >= 0.0;
                                 assert!(numbers && found.wi.is_finite(), "{} {wo} {u}: {found:?}", lobes.name);
                                 assert!(found.weight.min_element() >= 0.0, "{} {wo} {u}: {found:?}", lobes.name);
-                                // The weight of one way is bounded by what all are worth, where light may be given back.
+                                // With compensation, a sample may exceed 1.
                                 assert!(found.weight.max_element() < 1e5, "{} {wo} {u}: {found:?}", lobes.name);
                             }
                         }

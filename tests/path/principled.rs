@@ -1,5 +1,5 @@
-//! The material `principled` by itself: over a grid of parameters what it gives of light from everywhere, that its samples are worth what it
-//! reflects and come as often as their density says, and that each layer by itself is the material it should be.
+//! The `principled` BSDF over a grid of parameters: white furnace, sample weights, sampled directions against the PDF,
+//! and each layer against its standalone BSDF.
 
 use std::f64::consts::{PI, TAU};
 
@@ -39,9 +39,9 @@ fn viewers() -> [Vec3; 5] {
     [1.0, 0.9, 0.5, 0.15, 0.02].map(|cosine| direction(cosine, 0.7))
 }
 
-/// As it is seen from outside, where tables of its facets know what `tests/path/energy.rs` tests.
+/// Returns the lobes as seen from outside, without albedo tables, which `tests/path/energy.rs` tests.
 fn mixture(material: &Material, wo: Vec3) -> PrincipledLobes {
-    // As if nothing were lost of a lobe that is rougher along one axis, so that nothing is given back.
+    // Anisotropic lobes take their albedo from the last argument: 0.95 + 0.05 = 1, so nothing is compensated.
     let aniso_table = u32::from(material.anisotropy > 0.0);
     let material = Material {
         aniso_table,
@@ -50,7 +50,6 @@ fn mixture(material: &Material, wo: Vec3) -> PrincipledLobes {
     principled_mixture(&material, wo, true, Vec3::Z, ALL, Vec3::new(0.95, 0.05, 1.0))
 }
 
-/// A grid of materials with their names.
 fn grid() -> Vec<(String, Material)> {
     let mut all = Vec::new();
     let mut add = |name: &str, roughness: f32, change: &dyn Fn(&mut Material)| {
@@ -97,7 +96,7 @@ fn grid() -> Vec<(String, Material)> {
     all
 }
 
-/// The integral over the sphere of directions, by cells that are fine around the mirrored one and the refracted one.
+/// Integrates over the sphere, with finer cells around the mirrored and refracted directions.
 fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
     let (rings, spokes) = (900, 240);
     let mut sum = 0.0;
@@ -128,7 +127,7 @@ fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
 #[test]
 fn white_furnaces_stay_white_or_get_darker() {
     for (name, material) in grid() {
-        // Radiance from behind counts without the factor of the indices.
+        // Transmitted radiance is not scaled by the squared index.
         for wo in viewers() {
             let m = mixture(&material, wo);
             let scale = |wi: Vec3| {
@@ -148,7 +147,7 @@ fn white_furnaces_stay_white_or_get_darker() {
             }
         }
     }
-    // The control: without what is given back, rough metal is darker.
+    // Control: no compensation.
     let metal = Material {
         metallic: 1.0,
         roughness: 1.0,
@@ -175,7 +174,7 @@ fn densities_integrate_to_what_is_sampled() {
                 sample.pdf > 0.0 && (sample.wi.length() - 1.0).abs() < 1e-4
             });
             let useful = useful.count() as f64 / f64::from(count);
-            // A coat's directions below the surface have a density, and are worth nothing.
+            // Coat samples below the surface have a PDF but no weight.
             assert!((total - useful).abs() < 0.012, "{name}, {wo}: {total} {useful}");
         }
     }
@@ -210,7 +209,7 @@ fn samples_are_worth_what_is_reflected() {
     }
 }
 
-/// Pearson's chi-square of sampled directions against the density, by cells of equal parts of height and longitude.
+/// Returns Pearson's chi-square of sampled directions, over cells of equal solid angle.
 fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 100_000;
     const HEIGHTS: usize = 24;
@@ -251,7 +250,7 @@ fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64,
 
 #[test]
 fn directions_are_as_frequent_as_their_density_says() {
-    // Lobes that the cells resolve.
+    // Only lobes that the cells resolve.
     for (name, material) in grid().into_iter().filter(|(_, material)| material.roughness >= 0.4) {
         for wo in [direction(0.9, 0.4), direction(0.4, 2.5)] {
             let m = mixture(&material, wo);
@@ -273,7 +272,7 @@ fn directions_are_as_frequent_as_their_density_says() {
 fn a_layer_by_itself_is_the_material_it_should_be() {
     for wo in viewers() {
         for wi in [direction(0.9, 1.0), direction(0.4, 3.0), direction(0.05, 5.0)] {
-            // Neither metal nor anything that is mirrored: the material `diffuse`, to the bit.
+            // Without metal and specular reflection: bit-identical to `diffuse`.
             let color = Vec3::new(0.8, 0.4, 0.1);
             let matt = Material {
                 diffuse: color,
@@ -287,7 +286,8 @@ fn a_layer_by_itself_is_the_material_it_should_be() {
             };
             let found = principled_eval(&mixture(&matt, wo), wo, wi, ALL);
             assert_eq!(found, diffuse_eval(&diffuse, angles_at(Vec3::Z, wo, wi)));
-            // Metal: GGX with Schlick's reflectance, in f64 by other formulas (Walter et al. 2007, with tangents), but for what is given back.
+            // Metal: uncompensated GGX with Schlick's approximation, in f64 by other formulas (Walter et al. 2007, with
+            // tangents).
             for roughness in [0.3, 0.6, 1.0] {
                 let metal = Material {
                     metallic: 1.0,
@@ -346,7 +346,7 @@ fn flat_lobes_are_deltas_and_nothing_is_ever_no_number() {
             passed += sample.weight / count as f32;
         }
     }
-    // All that Fresnel's equations leave, as radiance in glass: by the angles' sines and tangents.
+    // Fresnel transmittance by sines and tangents, as radiance in glass.
     let (i, t) = (0.6f32.acos(), (0.8f32 / 1.5).asin());
     let share = |part: f32| 0.5 * part * part;
     let mirrored = share((i - t).sin() / (i + t).sin()) + share((i - t).tan() / (i + t).tan());
@@ -402,7 +402,7 @@ fn flat_lobes_are_deltas_and_nothing_is_ever_no_number() {
     }
 }
 
-/// A sphere of a principled material with these keys, under light from above.
+/// Returns a sphere lit from above.
 fn picture_of(keys: &str, textures: &str) -> wgray_render::records::Packed {
     super::scene(
         16,
@@ -431,7 +431,7 @@ fn numbers_come_from_the_channels_of_a_texture() {
     let expected = crate::pictures::reference(&plain);
     for kind in ["constant", "checker"] {
         let packed = picture_of(textured, texture(kind));
-        // Looked up once for all four, or not at all.
+        // One lookup for all four values; none if constant.
         assert_eq!(packed.textures.lookups.len(), usize::from(kind == "checker"));
         for way in crate::pictures::exact_ways() {
             assert_eq!(
@@ -441,7 +441,7 @@ fn numbers_come_from_the_channels_of_a_texture() {
             );
         }
     }
-    // The control: another channel.
+    // Control: another channel.
     let other = picture_of(&textured.replace("'b'", "'g'"), texture("checker"));
     assert!(crate::pictures::differing(&crate::pictures::reference(&other), &expected) > 20);
 }

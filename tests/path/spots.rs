@@ -6,7 +6,7 @@ use super::mean;
 use crate::pictures::{both, means, render};
 use crate::scenes;
 
-/// A white floor of 3 x 3 units, seen from above without perspective: 16 x 16 pixels.
+/// Returns a white floor of 3 x 3 units, seen from above in 16 x 16 pixels.
 fn floor(integrator: &str, light: &str) -> Packed {
     let material = match integrator {
         "path" => "type = 'diffuse', color = [1, 1, 1]",
@@ -20,7 +20,7 @@ fn floor(integrator: &str, light: &str) -> Packed {
     ))
 }
 
-/// What a spot of colour 1 above (0.2, 0.1, 0), which shines straight down, sends to a point of the floor: by the page's formula.
+/// Returns the documented formula at a floor point, for a spot light of color 1 above (0.2, 0.1, 0) that points down.
 fn expected(at: [f64; 2], height: f64, cone: f64, inner: f64, is_path: bool) -> f64 {
     let (x, y) = (at[0] - 0.2, at[1] - 0.1);
     let distance = (x * x + y * y + height * height).sqrt();
@@ -53,7 +53,7 @@ fn a_spot_lights_a_floor_as_the_formula_says() {
             let found = means(&render(&packed, way));
             let (mut worst, mut of_wider) = (0.0_f64, 0.0_f64);
             for (i, pixel) in found.iter().enumerate() {
-                // The mean over the pixel, by 32 x 32 points.
+                // Mean over 32 x 32 points of the pixel.
                 let mean = |cone: f64| {
                     let place = |k: usize, sub: usize| (k as f64 + (sub as f64 + 0.5) / 32.0) * 3.0 / 16.0 - 1.5;
                     let points = (0..1024).map(|k| [place(i % 16, k % 32), -place(i / 16, k / 32)]);
@@ -92,7 +92,7 @@ fn the_widest_spot_is_a_point_and_the_narrowest_a_dot() {
             for (a, b) in means(&render(&wide, way)).iter().zip(&expected) {
                 assert!((a[0] - b[0]).abs() < 1e-6 && a[0] > 0.0, "{way:?}: {a:?} for {b:?}");
             }
-            // A radius of 0.00016: a 30 millionth of the floor.
+            // A disk of radius 0.00016: about 1e-8 of the floor.
             assert!(mean(&render(&narrow, way))[0] < 1e-4, "{way:?}");
             assert_eq!(mean(&render(&away, way)), [0.0; 3], "{way:?}: it looks away");
         }

@@ -1,5 +1,4 @@
-//! Samples of light alone, samples of materials alone and both together converge to one mean: so densities and weights fit each
-//! other.
+//! Light sampling, BSDF sampling and MIS converge to the same mean, so PDFs and weights are consistent.
 
 use wgray_render::gpu::compose::Shaders;
 
@@ -18,7 +17,7 @@ fn path_with(changes: &[(&str, &str)]) -> Shaders {
     sources::shaders_with(FILE, &text)
 }
 
-/// Lamps of every kind around a place, so many that a tree chooses among them.
+/// Returns lights of every kind, enough for a light tree.
 fn many_lamps() -> String {
     let lamp = |i: u32| {
         let [x, y, z] = [
@@ -75,14 +74,14 @@ fn light_alone_and_materials_alone_find_the_same() {
         "[[shapes]]\ntype = 'cylinder'\nmaterial = 'shine'\nstart = [-0.6, 0.3, 0.5]\nend = [0.5, -0.1, 0.8]\nradius = 0.3\n",
         "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'shine'\nvertices = [[-0.5, 0, 0.3], [0.5, 0, 0.3], [0, 0.6, 0.3], [0, 0.2, 0.9]]\n",
         "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.1]\nsize = [1, 0.5]\nnormal = [0.1, -0.3, -1]\ntangent = [10, 0, 1]\ncolor = [5, 3, 1]\n",
-        // several, of several powers, one behind the other
+        // several of different powers, one behind another
         "[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [-0.6, 0, 0.7]\nradius = 0.3\n\
          [[shapes]]\ntype = 'disk'\nmaterial = 'dim'\ncenter = [0.6, 0.4, 0.7]\nradius = 0.3\nnormal = [-1, -1, 0]\ntangent = [1, -1, 0]\n\
          [[shapes]]\ntype = 'triangle'\nmaterial = 'dim'\nvertices = [[-1, 1, 0.1], [1, 1, 0.1], [0, 1, 1.5]]\n\
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
     ];
     let many = many_lamps();
-    // The last of the list, and many lights, are combined with all materials; each of the others with one.
+    // The last shape and the many lights meet all materials, each other shape one.
     let (with_one, number_of_many) = (shapes.len() - 1, shapes.len());
     let shapes = shapes.into_iter().chain([many.as_str()]);
     for (i, shape) in shapes.enumerate() {
@@ -105,7 +104,7 @@ fn light_alone_and_materials_alone_find_the_same() {
                 i == number_of_many,
                 "a light tree is built over many lights"
             );
-            // What is seen to shine is left out.
+            // Direct emission is subtracted.
             let seen = mean(&render_with(&scene(4096, 0, &text), Way::Baked, sources::shaders()));
             let reflected = |shaders: &Shaders| {
                 let found = mean(&render_with(&packed, Way::Baked, shaders));

@@ -1,4 +1,4 @@
-//! Small valid scenes of everything that a scene file can say, as strategies of proptest.
+//! Proptest strategies for small valid scenes of the whole scene format.
 
 mod files;
 mod materials;
@@ -23,13 +23,12 @@ use self::shapes::*;
 use self::values::*;
 use crate::patterns;
 
-/// A random scene as the backends read it.
 pub fn packed(d: &Description) -> Packed {
     let beside = Assets::beside(folder());
     pack(&d.validate_with(&beside).unwrap_or_else(|problem| panic!("{problem}")))
 }
 
-/// What a scene has for the integrator `path`.
+/// Settings of the integrator `path`.
 #[derive(Clone, Debug)]
 struct OfPaths {
     materials: [MaterialDescription; 3],
@@ -117,11 +116,11 @@ fn light() -> impl Strategy<Value = LightDescription> {
     prop_oneof![4 => rectangle, 2 => delta, 2 => directional, 1 => spot]
 }
 
-/// Anywhere: on the surface of something, in the middle of it, or away from all.
+/// Generates cameras on surfaces, inside shapes, or outside.
 fn camera() -> impl Strategy<Value = CameraDescription> {
     let position = prop_oneof![2 => point().prop_map(|p| p * 3.0 + DVec3::new(0.01, -0.02, 0.03)), 1 => point()];
     let look_at = point().prop_map(|p| p * 0.5);
-    // Pinholes, lenses and, where one draws a number of blades beyond the most, panoramas.
+    // Pinhole, thin lens or, above the maximum number of blades, panorama.
     let lens = (
         prop_oneof![2 => Just(None), 1 => (0.0..1.0).prop_map(Some)],
         prop::option::of(0.1..8.0),
@@ -212,17 +211,16 @@ fn render() -> impl Strategy<Value = RenderDescription> {
     )
 }
 
-/// Scenes of everything.
+/// Generates scenes of both integrators.
 pub fn description() -> impl Strategy<Value = Description> {
     described((shapes(), meshes()), prop::option::of(of_paths()))
 }
 
-/// Scenes of the integrator `phong`.
 pub fn of_direct_light() -> impl Strategy<Value = Description> {
     described((shapes(), meshes()), Just(None))
 }
 
-/// Scenes of a few primitives, none of which is in a tree.
+/// Generates scenes with too few primitives for a BVH.
 pub fn without_trees() -> impl Strategy<Value = Description> {
     described(
         (prop::collection::vec(shape(), 0..7), Just(Default::default())),
@@ -239,7 +237,7 @@ fn described(
     shapes: impl Strategy<Value = Shapes>,
     paths: impl Strategy<Value = Option<OfPaths>> + 'static,
 ) -> impl Strategy<Value = Description> {
-    // Sometimes so many that a tree chooses among them.
+    // Sometimes enough for a light tree.
     let few = prop::collection::vec(light(), 0..4);
     let lights = prop_oneof![9 => few, 1 => prop::collection::vec(light(), 17..40)];
     let materials = [material(), material(), material()];

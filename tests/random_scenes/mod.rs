@@ -1,4 +1,4 @@
-//! Random small scenes, both paths: the same bits. A scene that fails is made as small as it gets and written to a file.
+//! Random small scenes are bit-identical on both backends. A failing scene is minimized and saved.
 
 pub mod any_scene;
 
@@ -16,10 +16,10 @@ use crate::nearly::Nearly;
 use crate::pictures::{Way, differing, first_hits, reference, render_with};
 use crate::{patterns, rounding, sources};
 
-/// How many scenes; with this variable each run has others, else they are the same in every run.
+/// Number of scenes. If set, each run has different ones.
 const CASES: &str = "WGRAY_TEST_CASES";
 
-/// Renders a scene both ways.
+/// Compares both backends.
 fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
     let packed = any_scene::packed(d);
     let cpu = reference(&packed);
@@ -32,7 +32,7 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
             return Err(format!("{differ} of {} pixels differ, {way:?}", cpu.sums.len()));
         }
     }
-    // another kernel, so only now and then
+    // Only some scenes, as this needs another kernel.
     if d.render.seed.is_multiple_of(4) {
         let (gpu, cpu) = (first_hits(&packed, Way::Buffers), first_hits(&packed, Way::Cpu));
         if bytemuck::cast_slice::<_, u8>(&gpu) != bytemuck::cast_slice::<_, u8>(&cpu) {
@@ -42,7 +42,7 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
     Ok(())
 }
 
-/// Runs a number of cases; returns a scene that fails, as small as it gets, and why it does.
+/// Returns a minimized failing scene and the reason.
 fn failing(cases: u32, shrinks: u32, always_the_same: bool, shaders: &Shaders) -> Option<(Description, String)> {
     let config = Config {
         cases,
@@ -65,7 +65,7 @@ fn failing(cases: u32, shrinks: u32, always_the_same: bool, shaders: &Shaders) -
     }
 }
 
-/// Writes a scene to a file that `wgray render` takes.
+/// Saves a scene for `wgray render`.
 fn save(d: &Description, name: &str) -> PathBuf {
     let path = any_scene::folder().join(name);
     std::fs::write(&path, toml::to_string(d).expect("a scene as TOML")).expect("a place for the scene");
@@ -88,7 +88,7 @@ fn random_scenes_are_the_same_on_gpu_and_cpu() {
     println!("{number} random scenes, each from buffers and as constants: every pixel has the same bits");
 }
 
-/// Small pictures with so many samples that some drivers would end the loops of a call early.
+/// Enough samples per pixel that some drivers would terminate the loops of a dispatch.
 #[test]
 fn random_scenes_of_many_samples_are_the_same() {
     if !adapter::device().is_some_and(bit_exact) {
@@ -114,9 +114,8 @@ fn random_scenes_of_many_samples_are_the_same() {
     }
 }
 
-/// Where bits are not promised, the pixels of random scenes are near, together: by plain WGSL, on devices that are not
-/// software Vulkan, and on one with poor quotients and square roots. Of direct light: where light bounces, one unit in the last
-/// place may send a path elsewhere.
+/// Without guaranteed bits, all scenes together are within the tolerances: plain WGSL, devices other than software
+/// Vulkan, imprecise quotients and square roots. Direct light only: after a bounce, one ulp may change the path.
 #[test]
 fn random_scenes_are_nearly_the_same_where_bits_are_not_promised() {
     let Some(device) = adapter::device() else { return };
@@ -150,7 +149,7 @@ fn random_scenes_are_nearly_the_same_where_bits_are_not_promised() {
     assert!(shifted.judge().is_err(), "the comparison cannot fail");
 }
 
-/// One unit in the last place of one constant is found, and the scene that shows it is a scene.
+/// One ulp in a constant is detected, and the reported scene is valid.
 #[test]
 fn shaders_that_differ_by_one_ulp_are_found_by_random_scenes() {
     if !adapter::device().is_some_and(bit_exact) {
@@ -164,7 +163,7 @@ fn shaders_that_differ_by_one_ulp_are_found_by_random_scenes() {
     assert_eq!(wgray_render::pack::pack(&scene), any_scene::packed(&d));
 }
 
-/// Random scenes have everything that scene files can: every type that the parser knows, but for these.
+/// Random scenes cover every type of the parser, except these.
 #[test]
 fn random_scenes_have_everything() {
     const NEVER: &[(&str, &str)] = &[

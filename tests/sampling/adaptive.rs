@@ -1,5 +1,4 @@
-//! Adaptive sampling: the same on both paths and under every cut; who gets how many samples, and what is known of a
-//! pixel's variance. `unbiased.rs` has what comes of it.
+//! Adaptive sampling: equal bits on CPU and GPU for any partition of the work, sample counts, variance estimates.
 
 use glam::{DVec3, UVec2, Vec4};
 use wgray::scene::{AdaptiveDescription, Overrides, Pattern, PixelFilterDescription, PixelFilterKind, Scene};
@@ -65,7 +64,7 @@ fn pictures_are_the_same_on_both_paths_and_under_every_cut() {
             }
         }
     }
-    // negative control: another error, another seed
+    // The controls: another error, another seed.
     let [a, b] = [0.02, 0.021].map(|error| reference(&adaptive(Pattern::Sobol, error, 90)));
     assert!(differing(&a, &b) > 0);
     let mut packed = adaptive(Pattern::Sobol, 0.02, 90);
@@ -98,8 +97,7 @@ fn a_crop_is_a_part_of_the_whole() {
     }
 }
 
-/// The number of samples by the samples of the neighbours, each pixel's own way from the formulas; `None` where roundings
-/// decide.
+/// Returns the sample count from pilot samples of the neighbors in double precision; `None` if rounding decides.
 fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> Option<u32> {
     let (mut squares, mut neighbors, mut deviations, mut fourth) = (0.0, 0.0, 0.0, 0.0);
     for (dx, dy) in [(0, -1), (-1, 0), (1, 0), (0, 1)] {
@@ -175,7 +173,7 @@ fn samples_double_as_far_as_the_neighbours_tell() {
 fn extreme_errors_give_the_first_look_or_the_most_samples() {
     let uniform = |count| {
         cornell(Pattern::Sobol, count, |description| {
-            // the light's samples go on from group to group, whatever the pixel's count is
+            // Light samples continue across pixel samples.
             description.render.adaptive = None;
         })
     };
@@ -203,19 +201,19 @@ fn the_smallest_pictures_and_rounds() {
         }
         expected.sample_counts().collect::<Vec<u32>>()
     };
-    // without neighbours nothing is known
+    // Without neighbors the variance is unknown.
     assert_eq!(counts(1, 1, 4, 50), [50]);
     assert!(counts(7, 1, 4, 50).iter().all(|n| [16, 32, 50].contains(n)));
-    // no more than there may be
+    // The maximum limits the pilot pass.
     assert_eq!(counts(3, 3, 1, 2), [2; 9]);
     assert!(counts(5, 5, 1, 17).iter().all(|n| [16, 17].contains(n)));
 }
 
-/// Sums of first looks: the mean square error of one pixel, sums of deviations and of their squares, pixels.
+/// The arguments sum the variance, squared deviations, their squares, and pixels.
 #[test]
 fn a_look_allows_what_it_has_evidence_for() {
     let wanted = |looks: [f32; 4], error: f32, most| samples_wanted(Vec4::from(looks), 16, error * error, most);
-    // 4 pixels, each with a standard error of 0.04: 4 times the samples halve it
+    // 4 pixels with a standard error of 0.04: 4 times the samples halve it.
     let certain = [4.0 * 0.04 * 0.04, 1000.0, 1.0, 4.0];
     for (error, count) in [
         (0.041, 16),
@@ -227,7 +225,7 @@ fn a_look_allows_what_it_has_evidence_for() {
     ] {
         assert_eq!(wanted(certain, error, 1000), count, "{error}");
     }
-    // a single sample that differs allows none, two of them as many again, six the fourfold
+    // Effective samples limit the doublings: 2 permit one, 6 permit two.
     for (samples, count) in [(1.0, 16), (1.9, 16), (2.0, 32), (5.9, 32), (6.0, 64), (30.0, 256)] {
         assert_eq!(wanted([1.0, samples, samples, 4.0], 0.001, 1000), count, "{samples}");
     }
@@ -259,7 +257,7 @@ fn moments_are_the_variance_of_the_samples() {
     }
 }
 
-/// The error that is aimed at is that of the displayed value, v^(1 / 2.2).
+/// The target error is that of the displayed value v^(1 / 2.2).
 #[test]
 fn errors_are_scaled_by_the_slope_of_the_displayed_value() {
     let displayed = |v: f64| v.powf(1.0 / 2.2);
@@ -270,10 +268,10 @@ fn errors_are_scaled_by_the_slope_of_the_displayed_value() {
         let found = f64::from(display_slope_squared(v as f32));
         assert!((found / expected - 1.0).abs() < 1e-5, "{v}: {found}, not {expected}");
     }
-    // black and what is brighter than white: as at the nearest value that is told apart
+    // Below 0.01 and above 1 the slope is clamped.
     assert_eq!(display_slope_squared(-0.5), display_slope_squared(0.01));
     assert_eq!(display_slope_squared(7.0), display_slope_squared(1.0));
-    // the mean over the channels, each with its own slope
+    // The mean over channels, each with its slope.
     let (sum, moments) = (Vec4::new(1.0, 2.0, 4.0, 8.0), Vec4::new(0.1, 0.4, 0.2, 8.0));
     let [x, y, z] = [(0.125, 0.1), (0.25, 0.4), (0.5, 0.2)].map(|(mean, moment): (f64, f64)| {
         let slope = displayed(mean) / (2.2 * mean);
@@ -295,7 +293,7 @@ fn weighted_moments_of_a_constant_are_nothing() {
         moments.truncate().abs().max_element() < 1e-12 && moments.w == 7.0,
         "{moments}"
     );
-    // negative control
+    // The control.
     let other = moments_with(moments, sum, Vec4::new(0.3, 0.2, 0.6, 1.0));
     assert!(other.z > 1e-3);
 }

@@ -1,4 +1,4 @@
-//! Reconstruction filters: integrals and moments of their tables, the positions and weights that come of them, and pictures.
+//! Reconstruction filters: integrals and moments, sample positions and weights, images.
 
 use glam::Vec4;
 use wgray::scene::{Pattern, PixelFilterDescription, PixelFilterKind};
@@ -27,7 +27,7 @@ fn filtered_scene(kind: PixelFilterKind, radius: f64) -> Packed {
     })
 }
 
-/// A filter with the checks of a scene.
+/// Returns a validated filter.
 fn checked(kind: PixelFilterKind, radius: f64) -> wgray::scene::PixelFilter {
     let mut description = scenes::scene("cornell.toml");
     let radius = Some(radius);
@@ -35,7 +35,7 @@ fn checked(kind: PixelFilterKind, radius: f64) -> wgray::scene::PixelFilter {
     description.validate().expect("a sound scene").render.filter
 }
 
-/// The integral of a filter times x^power from -radius to radius, by the midpoint rule, over a filter of radius 1.
+/// Returns the integral of |x|^power times a filter of radius 1, by the midpoint rule.
 fn moment(kind: PixelFilterKind, power: i32) -> f64 {
     let steps = 200_000;
     let filter = checked(kind, 1.0);
@@ -48,15 +48,15 @@ fn moment(kind: PixelFilterKind, power: i32) -> f64 {
 
 #[test]
 fn filters_have_their_integrals() {
-    // Mitchell's are those of a partition of unity over 4 radii / 2; cosines of the window integrate to nothing.
-    let gaussian = 0.833_287 - 2.0 * (-4.5f64).exp(); // sqrt(2 pi) / 3 erf(3 / sqrt 2), and what is taken off
+    // Mitchell's filter has unit integral at radius 2; the window's cosines integrate to 0.
+    let gaussian = 0.833_287 - 2.0 * (-4.5f64).exp(); // sqrt(2 pi) / 3 erf(3 / sqrt 2), less the offset
     let expected = [2.0, 1.0, gaussian, 0.5, 2.0 * 0.35875];
     for (kind, expected) in KINDS.into_iter().zip(expected) {
         let found = moment(kind, 0);
         let error = (found - expected).abs();
         assert!(error < 1e-5, "{kind:?}: {found}, not {expected}");
     }
-    // Mitchell's filter gives 1 at whole distances, wherever the sum starts: B = C = 1/3 are its definition's.
+    // With B = C = 1/3 it sums to 1 over integer offsets.
     let mitchell = checked(PixelFilterKind::Mitchell, 2.0);
     for i in 0..10 {
         let sum: f64 = (-3..=3)
@@ -67,7 +67,7 @@ fn filters_have_their_integrals() {
     assert!((height(mitchell, 0.0) - 8.0 / 9.0).abs() < 1e-12 && height(mitchell, 1.5) < 0.0);
 }
 
-/// The weighted mean of x^power over a table's bins, each uniform and met equally often.
+/// Returns the weighted mean of |x|^power over equally probable, uniform bins.
 fn table_moment(table: &[Vec4], power: i32) -> f64 {
     let (mut sum, mut weights) = (0.0, 0.0);
     for bin in table {
@@ -101,7 +101,7 @@ fn tables_have_the_moments_of_their_filters() {
                     (found - expected).abs() < 3e-3 * radius.powi(power),
                     "{kind:?} of radius {radius}, moment {power}: {found}, not {expected}"
                 );
-                // negative control: no two filters are the same
+                // The control.
                 for other in KINDS.into_iter().filter(|other| *other != kind) {
                     let expected = moment(other, power) / moment(other, 0) * radius.powi(power);
                     assert!(
@@ -183,7 +183,7 @@ fn pictures_by_every_filter_are_the_same_on_both_paths() {
         }
         films.push(expected);
     }
-    // negative control
+    // The control.
     for (i, film) in films.iter().enumerate() {
         assert!(films[..i].iter().all(|other| differing(film, other) > 100));
     }

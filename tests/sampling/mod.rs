@@ -1,4 +1,4 @@
-//! Where samples lie, how they are weighted, and where more of them are taken.
+//! Sequences, reconstruction filters and adaptive sampling.
 
 mod adaptive;
 mod filters;
@@ -10,7 +10,7 @@ use wgray_render::records::Packed;
 
 use crate::{patterns, scenes};
 
-/// The assignment scene, small, with a pattern for the pixel's and the light's samples; `change` sets what else.
+/// Returns a small `cornell.toml` with a pattern for pixel and light samples, after `change`.
 fn cornell(pattern: Pattern, count: u32, change: impl FnOnce(&mut Description)) -> Packed {
     let mut description = scenes::scene("cornell.toml");
     (description.image.width, description.image.height) = (41, 33);

@@ -1,12 +1,12 @@
-//! The sequences are the published ones; scrambling keeps what makes them even; how even the patterns are.
+//! Sample sequences: published values, stratification, discrepancy, independence.
 
 use glam::{UVec2, Vec2};
 use wgray_render::cpu::sampling::{sample_key, sample_square};
 use wgray_render::cpu::sequence::{halton_sample, radical_inverse_3, shuffled_index, sobol_reversed, sobol_sample};
 use wgray_render::records::{GRID, HALTON, JITTERED, RANDOM, ROTATED_GRID, SOBOL};
 
-/// The first points of Sobol's sequence in two dimensions, times 32: scipy 1.17.1, `qmc.Sobol(2, scramble=False)`, which
-/// has the direction numbers of Joe and Kuo, 2008.
+/// The first two-dimensional Sobol' points times 32: scipy 1.17.1, `qmc.Sobol(2, scramble=False)`, with the direction
+/// numbers of Joe and Kuo (2008).
 const SOBOL_POINTS: [[u32; 2]; 32] = [
     [0, 0],
     [16, 16],
@@ -41,17 +41,17 @@ const SOBOL_POINTS: [[u32; 2]; 32] = [
     [17, 1],
     [1, 17],
 ];
-/// Where scipy's sequence, which is in the order of Gray's code, has the point `i` of the sequence in Sobol's order.
+/// Returns the Sobol' index of point `i` of scipy, which is in Gray code order.
 fn gray(i: u32) -> u32 {
     i ^ (i >> 1)
 }
 
-/// The first numbers of Halton's sequence in base 3, times 3^15: scipy 1.17.1, `qmc.Halton(2, scramble=False)`.
+/// Radical inverses in base 3 times 3^15: scipy 1.17.1, `qmc.Halton(2, scramble=False)`.
 const HALTON_3: [u32; 12] = [
     0, 4782969, 9565938, 1594323, 6377292, 11160261, 3188646, 7971615, 12754584, 531441, 5314410, 10097379,
 ];
 
-/// Keys of many pixels.
+/// Returns keys of many pixels.
 fn keys(count: u32) -> impl Iterator<Item = UVec2> {
     (0..count).map(|i| sample_key(UVec2::new(i % 13, i / 13), 3, i % 5))
 }
@@ -78,7 +78,7 @@ fn sequences_are_the_published_ones() {
 
 #[test]
 fn the_second_coordinate_of_sobols_points_is_the_product_with_pascals_matrix() {
-    // Direction numbers by their recurrence: v_1 = 1/2, v_k = v_(k-1) XOR v_(k-1) / 2 (polynomial x + 1).
+    // Direction numbers of the polynomial x + 1: v_1 = 1/2, v_k = v_(k-1) XOR v_(k-1) / 2.
     for i in (0..1 << 16).map(|i: u32| i.wrapping_mul(0x9e37_79b9)) {
         let mut direction = 1u32 << 31;
         let mut y = 0;
@@ -90,7 +90,7 @@ fn the_second_coordinate_of_sobols_points_is_the_product_with_pascals_matrix() {
     }
 }
 
-/// Whether 2^m points are a (0, m, 2)-net in base 2: one in each elementary interval.
+/// Returns true if 2^m points are a (0, m, 2)-net in base 2: one in each elementary interval.
 fn is_net(points: &[Vec2]) -> bool {
     let m = points.len().ilog2();
     (0..=m).all(|across| {
@@ -113,7 +113,7 @@ fn scrambled_sobol_points_are_nets() {
             }
         }
     }
-    // negative controls: other patterns are not, nor are runs that are not aligned, nor points one of which is moved
+    // The controls: other patterns, an unaligned run, a moved point.
     for key in keys(5) {
         for pattern in [RANDOM, HALTON] {
             let points: Vec<Vec2> = (0..64).map(|i| sample_square(pattern, 64, i, 0, key)).collect();
@@ -164,7 +164,7 @@ fn halton_points_have_one_in_each_third_of_a_third() {
     for key in keys(20) {
         for digits in 1..=5u32 {
             let count = 3u32.pow(digits);
-            // 256 consecutive numbers become 256 others: take as many of them, in order, as there are parts.
+            // An aligned run of 256 indices is shuffled to another one; takes 3^digits consecutive ones.
             let mut run: Vec<u32> = (512..768).map(|i| shuffled_index(i, key.x ^ key.y)).collect();
             run.sort_unstable();
             let mut parts: Vec<u32> = (run[..count as usize].iter())
@@ -178,13 +178,13 @@ fn halton_points_have_one_in_each_third_of_a_third() {
             assert!((0.0..1.0).contains(&p.x) & (0.0..1.0).contains(&p.y));
         }
     }
-    // The largest number of base 3 stays below 1.
+    // The largest 15-digit value stays below 1.
     let largest = std::hint::black_box(14_348_906f32);
     assert!(largest * 6.969_171_6e-8 < 1.0);
 }
 
-/// The star discrepancy: how far the share of the points in [0, a) x [0, b) is from a b, at most. Boxes that end at
-/// points' coordinates, counted with and without their far sides, suffice.
+/// Returns the star discrepancy, max |fraction of points in [0, a) x [0, b) - a b|. Boxes that end at points, open and
+/// closed, suffice.
 fn star_discrepancy(points: &[Vec2]) -> f64 {
     let n = points.len() as f64;
     let mut by_x: Vec<Vec2> = points.to_vec();
@@ -232,21 +232,21 @@ fn star_discrepancies_keep_their_bounds() {
     let most = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
     let n = 32.0;
-    // A grid of cell centres: 1/n - 1/(4 n^2), the box without its last column and row.
+    // Cell centers: 1/n - 1/(4 n^2), by the box without the last column and row.
     let grid = star_discrepancy(
         &(0..1024)
             .map(|i| sample_square(GRID, 32, i, 0, UVec2::ZERO))
             .collect::<Vec<_>>(),
     );
     assert!((grid - (1.0 / n - 0.25 / (n * n))).abs() < 1e-6, "{grid}");
-    // One point in a cell: only the 2n - 1 cells that a box cuts can be wrong, by one point each.
+    // One point per cell: each of the 2n - 1 cells that a box cuts contributes one point at most.
     assert!(most(discrepancies(JITTERED, 32, 1024)) <= (2.0 * n - 1.0) / (n * n));
     // A (0, m, 2)-net in base 2: (m + 1) / 2^m (Niederreiter, "Random Number Generation and Quasi-Monte Carlo Methods",
     // 1992, theorem 4.6).
     let bound = 11.0 / 1024.0;
     let sobol = most(discrepancies(SOBOL, 1024, 1024));
     assert!(sobol <= bound, "{sobol}");
-    // Independent points lie above it, and about 1/sqrt(N); the sequences are far below that.
+    // Independent points: about 1/sqrt(N).
     let random = mean(discrepancies(RANDOM, 32, 1024));
     assert!(random > bound && (0.7..1.6).contains(&(random * n)), "{random}");
     let halton = mean(discrepancies(HALTON, 1024, 1024));
@@ -265,7 +265,7 @@ fn a_rotated_grid_has_more_columns_than_the_grid() {
     };
     assert_eq!((columns(GRID, 4), columns(ROTATED_GRID, 4)), (4, 10));
     assert_eq!((columns(GRID, 2), columns(ROTATED_GRID, 2)), (2, 4));
-    // Turned back, and moved by whole pixels where it left the square, it is the grid.
+    // Rotated, and wrapped by whole pixels.
     let (c, s) = (2.0 / 5f64.sqrt(), 1.0 / 5f64.sqrt());
     for side in [1, 2, 4, 7, 16] {
         for i in 0..side * side {
@@ -278,8 +278,7 @@ fn a_rotated_grid_has_more_columns_than_the_grid() {
     }
 }
 
-/// How far from independent two sets of numbers from 0 to 1 are: the chi-square of 8 x 8 cells, less its mean, in its
-/// standard deviations.
+/// Returns the chi-square of 8 x 8 cells, less its mean, in standard deviations.
 fn dependence(pairs: impl Iterator<Item = (f32, f32)>) -> f64 {
     let mut cells = [0.0; 64];
     for (a, b) in pairs {
@@ -297,7 +296,7 @@ fn samples_of_pixels_and_lights_are_independent() {
             let key = sample_key(UVec2::new(pixel % 64, pixel / 64), 1, purpose);
             sample_square(pattern, 16, sample % 16, sample / 16, key)
         };
-        // Over the pixels for one sample; over the samples of one pixel; of neighbours.
+        // Over pixels, over samples, and of adjacent pixels.
         let pixels = dependence((0..4096).map(|i| (at(i, 0, 5).x, at(i, 1, 5).x)));
         let samples = dependence((0..4096).map(|i| (at(7, 0, i).x, at(7, 1, i).x)));
         let crossed = dependence((0..4096).map(|i| (at(7, 0, i).y, at(7, 2, i).x)));
@@ -306,7 +305,7 @@ fn samples_of_pixels_and_lights_are_independent() {
             assert!(found < 6.0, "pattern {pattern}, pairs {what}: {found}");
         }
     }
-    // negative control: sequences in one order, even if scrambled or rotated differently
+    // The control: equal order with different scrambles.
     let one_order = |purpose| {
         let key = sample_key(UVec2::ZERO, 1, purpose);
         move |i: u32| i.reverse_bits().wrapping_add(key.x) as f32 / 4_294_967_296.0 * 0.999_999

@@ -1,5 +1,5 @@
-//! Adaptive sampling against truth and against the same number of samples everywhere: its pictures are not darker where
-//! things are thin, and not worse.
+//! Adaptive sampling against converged images and uniform sampling: thin objects keep their brightness, errors do not
+//! grow.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use wgray_render::records::Packed;
 use crate::pictures::reference;
 use crate::scenes;
 
-/// How a picture's pixels are sampled: sobol samples, and the error that adaptive sampling aims at.
+/// Sobol' samples per round, and the target error of adaptive sampling.
 #[derive(Clone, Copy, Debug)]
 struct Sampling {
     round: u32,
@@ -29,13 +29,13 @@ fn scene(size: u32, height: f64, sampling: Sampling, content: &str) -> Packed {
     ))
 }
 
-/// White dots of 0.2 pixels on black, one in each square of `spacing` pixels, in the picture's units somewhere.
+/// Returns white dots of 0.2 pixels, one in each square of `spacing` pixels.
 fn dots(spacing: u32, sampling: Sampling) -> Packed {
     let size = 20;
     let mut content = String::new();
     for i in 0..size / spacing {
         for j in 0..size / spacing {
-            // places that follow no pattern of pixels
+            // Unrelated to the pixel grid.
             let [x, y] = [0.754877666, 0.569840291].map(|a: f64| (0.5 + a * f64::from(i * 31 + j * 17)).fract());
             let at = |cell: u32, x: f64| f64::from(spacing) * f64::from(cell) + 0.1 + x * (f64::from(spacing) - 0.2);
             let [x, y] = [at(i, x), at(j, y)].map(|x| x - f64::from(size) / 2.0);
@@ -54,7 +54,7 @@ fn dots(spacing: u32, sampling: Sampling) -> Packed {
     scene(size, f64::from(size), sampling, &content)
 }
 
-/// Thin lines that turn away from the pixels' rows, ever closer to each other.
+/// Returns thin, slightly tilted lines with decreasing distances.
 fn lines(sampling: Sampling) -> Packed {
     let mut content = String::new();
     let mut y = -11.0;
@@ -77,7 +77,6 @@ fn lines(sampling: Sampling) -> Packed {
     scene(24, 24.0, sampling, &content)
 }
 
-/// A star of triangles.
 fn star(sampling: Sampling) -> Packed {
     let mut content = String::new();
     for i in 0..10 {
@@ -95,7 +94,7 @@ fn star(sampling: Sampling) -> Packed {
     scene(32, 32.0, sampling, &content)
 }
 
-/// A soft shadow, of a light that each of the pixel's samples sees one sample of.
+/// Returns a soft shadow with one light sample per pixel sample.
 fn shadow(sampling: Sampling) -> Packed {
     let content = "\
 shapes = [
@@ -137,7 +136,7 @@ fn brightness(film: &Film) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The mean, and the standard error of it.
+/// Returns the mean and its standard error.
 fn estimate(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -145,7 +144,7 @@ fn estimate(values: &[f64]) -> (f64, f64) {
     (mean, (square / n).sqrt())
 }
 
-/// Rounds, and the errors that are aimed at. Rounds of 4 have the first look of rounds of 16, and so the same pictures.
+/// Samples per round and target errors. Rounds of 4 and 16 have equal pilot passes and images.
 const SETTINGS: [(u32, f64); 2] = [(16, 0.02), (4, 0.01)];
 
 #[test]
@@ -159,10 +158,10 @@ fn small_rounds_have_the_same_first_look() {
     }
 }
 
-/// Three standard errors hold 997 of 1000 right means, and these seeds' always.
+/// Three standard errors contain 99.7 % of means; the seeds are fixed.
 #[test]
 fn dots_and_lines_keep_their_brightness() {
-    // discs of radius 0.1, each whole in the picture
+    // Discs of radius 0.1 inside of the image.
     let of_dots = |spacing: u32| std::f64::consts::PI * 0.01 / f64::from(spacing * spacing);
     let truth_of_lines = brightness(&seeded(lines(uniform(4096)), 99));
     type Make = Box<dyn Fn(Sampling) -> Packed>;
@@ -185,7 +184,7 @@ fn dots_and_lines_keep_their_brightness() {
             );
         }
     }
-    // Negative control: pixels that are content with 16 samples which are all the same.
+    // The control: stopping after 16 black samples.
     let (few, many) = (dots(2, uniform(16)), dots(2, uniform(256)));
     let own = (0..24).map(|seed| {
         let (few, many) = (seeded(few.clone(), seed), seeded(many.clone(), seed));
@@ -205,7 +204,7 @@ fn uniform(round: u32) -> Sampling {
     Sampling { round, error: None }
 }
 
-/// Of the same number of samples everywhere, between powers of two by the power law that fits both.
+/// Returns the RMS error of uniform sampling, by a power law between powers of two.
 fn error_of_uniform(make: &dyn Fn(Sampling) -> Packed, truth: &[f64], seeds: u32, samples: f64) -> f64 {
     let below = samples.log2().floor().min(8.0);
     let square = |count: f64| {

@@ -1,4 +1,4 @@
-//! Pictures with textures, mirrors and glass on the device against the CPU: bit for bit on software Vulkan.
+//! Textures, mirrors and glass: GPU and CPU agree, bit by bit on software Vulkan.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -13,7 +13,6 @@ use crate::pictures::{Way, backend, film, reference, whole};
 use crate::render::compare;
 use crate::{adapter, sources};
 
-/// All scenes that this is about, small.
 fn scenes(folder: &Path) -> Vec<(String, Packed)> {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let mut scenes = Vec::new();
@@ -42,7 +41,7 @@ fn scenes(folder: &Path) -> Vec<(String, Packed)> {
     scenes
 }
 
-/// Smooth meshes with normal maps: one whose texture goes around it, and one whose texture is mirrored in its middle.
+/// Returns smooth meshes with normal maps: coordinates around the mesh, and mirrored in its middle.
 fn meshes(folder: &Path) -> String {
     let around = Sheet::torus(12, 8);
     let mut mirrored = around.clone();
@@ -174,7 +173,7 @@ fn pictures_are_the_same_on_the_device_and_on_the_cpu() {
     }
 }
 
-/// The control: a footprint twice as large is seen.
+/// Control: no ray differentials.
 #[test]
 fn a_wrong_footprint_is_noticed() {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");

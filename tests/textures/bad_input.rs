@@ -1,4 +1,4 @@
-//! Bad textures and materials: each is told with file, line, key, value and rule, and ends with exit code 3.
+//! Invalid textures and materials: errors with file, line, key, value and rule; exit code 3.
 
 use std::path::Path;
 use std::process::Command;
@@ -47,7 +47,7 @@ fn files(folder: &Path) {
     std::fs::write(path("empty.png"), b"").unwrap();
     std::fs::write(path("text.png"), b"no image at all").unwrap();
     std::fs::write(path("named.jpg"), &png).unwrap();
-    // A header that claims 60000 x 60000 texels, with its checksum.
+    // The header claims 60000 x 60000 texels.
     let mut huge = png.clone();
     huge[16..24].copy_from_slice(&[0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60]);
     let crc = crc32(&huge[12..29]);
@@ -65,7 +65,7 @@ fn files(folder: &Path) {
     std::fs::copy(path("good.png"), path("inner/good.png")).unwrap();
 }
 
-/// The checksum of PNG chunks (ISO 3309).
+/// Returns the CRC of PNG chunks (ISO 3309).
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |mut crc, byte| {
         crc ^= u32::from(*byte);
@@ -137,7 +137,7 @@ fn links_that_leave_the_folder_are_refused() {
     Scene::load_with(folder.path().join("s.toml"), &overrides).unwrap();
 }
 
-/// A copy of a PNG whose header claims another size, with its checksum: what the header rules out is not decoded.
+/// Copies a PNG with another size in its header, which is checked before decoding.
 fn forge_size(from: &Path, to: &Path, width: u32, height: u32) {
     let mut png = std::fs::read(from).unwrap();
     png[16..20].copy_from_slice(&width.to_be_bytes());
@@ -175,7 +175,7 @@ fn all_images_together_must_fit() {
         "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the textures before it 1.0 MiB; \
          the limit is 1024.0 MiB"
     );
-    // What fits is decoded, and then is too short for its header.
+    // Decoded, as the size is within the limit.
     assert!(told(&texture("b", "fits.png", "ewa")).contains("is damaged or truncated"));
 }
 
@@ -201,7 +201,7 @@ fn a_file_is_kept_once_however_it_is_named() {
     assert_eq!(three.textures.texels, alone.textures.texels);
     let levels: Vec<u32> = three.textures.records.iter().map(|texture| texture.levels).collect();
     assert_eq!((three.textures.records.len(), levels), (3, vec![1, 7, 7]));
-    // Another encoding has other levels.
+    // Other mip levels.
     let two = packed(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
     assert_eq!(two.textures.texels.len(), 2 * alone.textures.texels.len());
 }
@@ -245,7 +245,7 @@ fn gray_palettes_and_opacity_are_read_as_their_colours() {
     for name in ["gray", "gray_alpha", "rgba", "palette"] {
         assert_eq!(texels(name), texels("rgb"), "{name}");
     }
-    // 16 bits a channel are floats: as the same values of 8 bits.
+    // 16-bit channels become floats of the same value.
     let deep = |x: u32| image::Luma([257 * (60 * x) as u16]);
     image::ImageBuffer::from_fn(4, 4, |x, _| deep(x))
         .save(path("deep.png"))
@@ -448,7 +448,7 @@ fn the_command_line_ends_with_exit_code_3() {
     assert_eq!(good.status.code(), Some(0), "{good:?}");
 }
 
-/// Whatever key takes a texture's channel, as the page says: what is no image has no alpha, and an image's is that of its file.
+/// For every documented key with a texture channel: only images have alpha, that of their file.
 #[test]
 fn alpha_is_that_of_an_image() {
     let folder = tempfile::tempdir().unwrap();

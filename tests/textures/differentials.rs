@@ -1,4 +1,4 @@
-//! Ray differentials against finite differences of neighbouring rays, traced in f64.
+//! Ray differentials against finite differences in f64.
 
 use std::path::Path as File;
 
@@ -22,7 +22,6 @@ const PERSPECTIVE: &str = "camera = { position = [0.3, -4, 1.6], look_at = [0, 0
 const ORTHOGRAPHIC: &str =
     "camera = { type = 'orthographic', position = [0.3, -4, 1.6], look_at = [0, 0, 0.6], height = 3 }";
 
-/// An ellipsoid of a material over a textured plane.
 fn over_plane(camera: &str, ellipsoid: &str) -> Packed {
     let text = format!(
         "image = {{ width = 64, height = 48 }}
@@ -62,13 +61,13 @@ fn ellipsoid(material: &str) -> String {
     )
 }
 
-/// The same scene in f64, from its description above.
+/// The scene of [`over_plane`] in f64.
 struct Exact<'a> {
     scene: &'a Packed,
-    ellipsoid: Option<bool>, // whether it is of glass
+    ellipsoid: Option<bool>, // true for glass
 }
 
-/// Where a ray ends: on the plane, or on the ellipsoid if it is not specular.
+/// Rays that end at the plane, after specular bounces at the ellipsoid.
 impl Exact<'_> {
     fn rows() -> (DVec3, DMat3) {
         let (a, b, c) = (
@@ -93,7 +92,6 @@ impl Exact<'_> {
         (camera.position.as_dvec3(), (forward + offset).normalize())
     }
 
-    /// The distance of the ellipsoid.
     fn ellipsoid(o: DVec3, d: DVec3) -> Option<f64> {
         let (center, m) = Self::rows();
         let (o, d) = (m * (o - center), m * d);
@@ -127,7 +125,7 @@ impl Exact<'_> {
     }
 }
 
-/// Where a path ends, with its differential there.
+/// Returns the first non-specular hit, with its differential and depth.
 fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, HitDifferential, u32)> {
     let differential = camera_differential(&scene.camera, at, 1.0);
     let ray = camera_ray(&scene.camera, at);
@@ -156,7 +154,7 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, HitDifferenti
     }
 }
 
-/// Compares all pixels whose paths have so many bounces.
+/// Compares all pixels with this many bounces.
 fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
     let exact = Exact {
         scene,
@@ -171,7 +169,7 @@ fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
             };
             let end = exact.end(at.as_dvec2());
             let known = (surface.position.as_dvec3() - end).length() < 1e-3 * end.length().max(1.0);
-            // Far away the plane is seen at so flat an angle that f32 positions say little.
+            // Far away, f32 positions are inaccurate at grazing angles.
             if depth != bounces || !known || end.length() > 30.0 {
                 continue;
             }
@@ -180,7 +178,7 @@ fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
                 let neighbour = |side: f64| exact.end(at.as_dvec2() + step * (h * side));
                 let expected = (neighbour(1.0) - neighbour(-1.0)) / (2.0 * h);
                 let error = (found.position.as_dvec3() - expected).length();
-                // Near a silhouette differentials change within the step.
+                // Derivatives change within the step near silhouettes.
                 let bend = (neighbour(1.0) + neighbour(-1.0) - end * 2.0).length() / h;
                 if bend < 0.01 * expected.length() {
                     assert!(
@@ -265,7 +263,7 @@ fn texture_coordinates_on_an_ellipsoid_change_as_on_neighbouring_rays() {
     assert!(compared > 500, "{compared}");
 }
 
-/// The control: without the normal's own change, a curved mirror's differential is far off.
+/// Control: without the derivative of the normal, curved mirrors are wrong.
 #[test]
 fn a_curved_mirror_needs_its_curvature() {
     let scene = over_plane(PERSPECTIVE, &ellipsoid("mirror"));
@@ -297,7 +295,6 @@ fn a_curved_mirror_needs_its_curvature() {
     assert!(error(Vec3::ZERO) > 0.3, "{}", error(Vec3::ZERO));
 }
 
-/// A smooth mesh under this map.
 fn torus(sheet: &Sheet, camera: &str, matrix: DMat3) -> Packed {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("torus.obj"), sheet.obj()).unwrap();
@@ -325,14 +322,13 @@ fn torus(sheet: &Sheet, camera: &str, matrix: DMat3) -> Packed {
     scene(&text, folder.path())
 }
 
-/// What a point of a mesh is like, in f64.
 struct Point {
     position: DVec3,
     uv: DVec2,
     normal: DVec3,
 }
 
-/// The point where a ray meets the plane of a mesh's triangle.
+/// Returns the hit with the plane of a triangle.
 fn on_triangle(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DVec3)) -> Point {
     let corners = sheet.form.triangles[triangle].map(|vertex| vertex as usize);
     let [p, q, r] = corners.map(|corner| matrix * sheet.form.points[corner] + 0.1);
@@ -354,7 +350,7 @@ fn on_triangle(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DV
     Point {
         position,
         uv: uv.truncate(),
-        // Towards the viewer, as its triangle is.
+        // Faces the viewer, like the triangle.
         normal: if d.dot(across) * matrix.determinant() > 0.0 {
             -normal
         } else {
@@ -372,7 +368,7 @@ fn points_of_a_mesh_change_as_on_neighbouring_rays() {
         DVec3::new(0.1, -0.6, 0.8),
     );
     let mirroring = DMat3::from_cols(turned.x_axis, turned.y_axis, -turned.z_axis);
-    // From inside of its tube.
+    // Inside the tube.
     let inside = "camera = { position = [1, 0.45, 0.4], look_at = [0.5, 0.75, 0.7], fov = 70 }";
     for (camera, matrix) in [
         (PERSPECTIVE, turned),

@@ -1,4 +1,4 @@
-//! What the filters make of images.
+//! Texture filtering: nearest, bilinear, trilinear and EWA.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -12,7 +12,6 @@ use wgray_render::records::{CLAMP, MIRRORED, Packed, REPEAT};
 use super::{scene, write_exr, write_png};
 use crate::random::Random;
 
-/// A scene with one texture, of a file in the folder.
 pub fn textured(folder: &Path, keys: &str) -> Packed {
     let text = format!(
         "image = {{ width = 4, height = 4 }}
@@ -30,7 +29,7 @@ fn color(scene: &Packed, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec3 {
     texture_color(scene, &scene.textures.records[0], Footprint { uv, dx, dy })
 }
 
-/// Footprints of all sizes and shapes, and what grazing rays make.
+/// Returns footprints of all sizes and shapes, and grazing ones.
 fn footprints() -> Vec<(Vec2, Vec2, Vec2)> {
     let numbers = Random::new(1);
     let mut footprints = Vec::new();
@@ -74,7 +73,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
                 for (uv, dx, dy) in footprints() {
                     let found = color(&scene, uv, dx, dy);
                     if file == "spot.png" {
-                        varied += u32::from(found != expected); // the control: one texel is seen
+                        varied += u32::from(found != expected); // control: a single texel is visible
                     } else {
                         assert_eq!(found, expected, "{keys}\n{uv} {dx} {dy}");
                     }
@@ -82,7 +81,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
             }
         }
     }
-    // fewer than half, as clamped ones see nothing but the edge beyond it
+    // Fewer than half: clamped ones beyond the edge do not see it.
     assert!(varied > 800, "{varied}");
 }
 
@@ -120,7 +119,7 @@ fn weights_kept_for_the_next_texture_are_those_of_the_reference() {
         }
         different += u32::from((1..here.len()).all(|i| here[i] != here[0]));
     }
-    assert!(different > 100, "{different}"); // the control: the lookups differ
+    assert!(different > 100, "{different}"); // control: the lookups differ
 }
 
 #[test]
@@ -148,7 +147,7 @@ fn an_image_without_filter_is_its_texels() {
     let scene = textured(folder.path(), "type = 'image'\nfile = 't.exr'\nfilter = 'nearest'");
     for y in 0..3 {
         for x in 0..5 {
-            // The first row of a file is the top of the picture.
+            // Row 0 is the top.
             let uv = Vec2::new((x as f32 + 0.5) / 5.0, 1.0 - (y as f32 + 0.5) / 3.0);
             assert_eq!(color(&scene, uv, Vec2::ZERO, Vec2::ZERO), Vec3::from(texel(x, y)));
         }
@@ -174,14 +173,14 @@ fn coordinates_go_on_beyond_the_image_as_they_should() {
     }
 }
 
-/// Random texels, and the file that has them.
+/// Writes and returns random texels.
 fn noise(folder: &Path, width: u32, height: u32) -> Vec<f64> {
     let numbers = Random::new(5);
     let texels: Vec<f32> = (0..width * height).map(|_| numbers.unit() as f32).collect();
     write_exr(&folder.join("noise.exr"), width, height, |x, y| {
         [texels[(y * width + x) as usize]; 3]
     });
-    // From the bottom, as v goes up.
+    // Bottom row first, as v points up.
     let rows = texels.chunks(width as usize).rev();
     rows.flatten().map(|&texel| f64::from(texel)).collect()
 }
@@ -192,7 +191,7 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
     let n = 32;
     let texels = noise(folder.path(), n, n);
     let scene = textured(folder.path(), "type = 'image'\nfile = 'noise.exr'\nfilter = 'ewa'");
-    // exp(-2 q) - exp(-2) where q = p^T (M + I)^-1 p < 1: M of the footprint, in texels, and I of their reconstruction.
+    // exp(-2 q) - exp(-2) where q = p^T (M + I)^-1 p < 1: footprint M and reconstruction I in texels.
     let exact = |uv: DVec2, dx: DVec2, dy: DVec2| {
         let edges = DMat2::from_cols(dx, dy) * f64::from(n);
         let inverse = (edges * edges.transpose() + DMat2::IDENTITY).inverse();
@@ -213,7 +212,7 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
     };
     let numbers = Random::new(9);
     let texel = 1.0 / f64::from(n);
-    // None is wider than three texels: it would be looked up in coarser levels, too.
+    // Less than three texels wide: only the finest level is used.
     for (longest, narrowest) in [(1.0, 1.0), (6.0, 0.8), (7.0, 2.9)] {
         let (mut narrower, mut mirrored) = (0, 0);
         for _ in 0..200 {
@@ -232,7 +231,7 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
             mirrored += u32::from((found - exact(uv, dx * mirror, dy * mirror)).abs() > 0.01);
         }
         assert!(narrower > 20, "{narrower}");
-        assert_eq!(mirrored > 20, longest > 1.0, "{mirrored}"); // a circle is its mirror image
+        assert_eq!(mirrored > 20, longest > 1.0, "{mirrored}"); // a circle is its own mirror image
     }
 }
 
@@ -260,7 +259,7 @@ fn wide_footprints_see_the_whole_image() {
     }
 }
 
-/// The mean over a long footprint follows it: EWA is near the mean over its ellipse where trilinear has blurred all.
+/// EWA keeps detail across long footprints, which trilinear filtering blurs.
 #[test]
 fn ewa_keeps_what_lies_across_a_long_footprint() {
     let folder = tempfile::tempdir().unwrap();
@@ -279,7 +278,7 @@ fn ewa_keeps_what_lies_across_a_long_footprint() {
     assert!(contrast("trilinear") < 0.3, "{}", contrast("trilinear"));
 }
 
-/// A texture of 128 x 128 gray texels, from the bottom.
+/// Returns 128 x 128 gray texels for EWA and trilinear, and as a list, bottom row first.
 fn gray(folder: &Path, name: &str, texel: impl Fn(usize, usize) -> f32) -> (Packed, Packed, Vec<f64>) {
     write_exr(&folder.join(name), 128, 128, |x, y| {
         [texel(x as usize, 127 - y as usize); 3]
@@ -293,7 +292,7 @@ fn texel_at(texels: &[f64], x: i64, y: i64) -> f64 {
     texels[(y.rem_euclid(128) * 128 + x.rem_euclid(128)) as usize]
 }
 
-/// The mean over the parallelogram around p, in texels, of what lies linearly between the texels.
+/// Integrates the bilinear interpolation over the parallelogram around p, in texels.
 fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     let points = |edge: DVec2| (edge.length() * 1.5).ceil().max(16.0);
     let (columns, rows) = (points(dx), points(dy));
@@ -309,7 +308,7 @@ fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     sum / (columns * rows)
 }
 
-/// The elliptical weighted average of the finest level.
+/// Evaluates EWA over the finest level.
 fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     let edges = DMat2::from_cols(dx, dy);
     let m = edges * edges.transpose() + DMat2::IDENTITY;
@@ -327,8 +326,8 @@ fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     sum / total
 }
 
-/// What the page promises: EWA over the pyramid has at most 1.4 times the error of the same ellipse on the finest level,
-/// for square footprints and long ones at any angle. Trilinear, the control, has more nearly everywhere.
+/// Documented: EWA over the pyramid has at most 1.4 times the error of EWA over the finest level, at any aspect and
+/// angle. Control: trilinear is nearly always worse.
 #[test]
 fn ewa_over_the_pyramid_is_nearly_that_of_the_finest_level() {
     let folder = tempfile::tempdir().unwrap();
@@ -383,7 +382,7 @@ fn ewa_over_the_pyramid_is_nearly_that_of_the_finest_level() {
             for ((name, _), errors) in textures.iter().zip(&errors) {
                 let [ewa, finest, trilinear] = errors.map(f64::sqrt);
                 let stripes = name.ends_with("stripes");
-                // A stripe's error on the finest level is next to 0 at some sizes.
+                // Stripes have almost no error at some sizes.
                 let bound = 1.4 * finest + if stripes { 0.05 } else { 0.0005 };
                 assert!(
                     ewa <= bound,
@@ -402,7 +401,7 @@ fn ewa_over_the_pyramid_is_nearly_that_of_the_finest_level() {
     assert!(worse > cases / 2, "{worse} of {cases}");
 }
 
-/// A footprint's work is bounded for images of all shapes: none is longer in texels than its level's limit.
+/// The cost is bounded for any image shape.
 #[test]
 fn ewa_is_bounded_for_flat_images() {
     let folder = tempfile::tempdir().unwrap();
@@ -429,10 +428,10 @@ fn ewa_is_bounded_for_flat_images() {
         }
     }
     let seconds = start.elapsed().as_secs_f64();
-    assert!(seconds < 20.0, "{seconds} s"); // without the bound, minutes
+    assert!(seconds < 20.0, "{seconds} s"); // minutes without the bound
 }
 
-/// Texels of 8 bits are exact, and their means stay: a white texel in the dark is not lost, whatever the level.
+/// 8-bit texels are exact, and levels keep the mean: a white texel in the dark is never lost.
 #[test]
 fn levels_of_8_bit_images_keep_what_is_dark() {
     let folder = tempfile::tempdir().unwrap();
@@ -501,7 +500,7 @@ fn a_footprints_ellipse_has_its_conjugate_axes() {
     assert!(clamped > 100);
 }
 
-/// Beyond a clamped edge there is the edge's colour, however far away and coarse the footprint is.
+/// Beyond a clamped edge only its color is visible, at any distance and footprint size.
 #[test]
 fn beyond_a_clamped_edge_nothing_else_is_seen() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,11 +1,11 @@
-//! EXR files of one channel are gray images.
+//! EXR files with one channel are gray images.
 
 use exr::prelude::*;
 use wgray::scene::{Overrides, Scene, Texels, TextureKind};
 
 const SIZE: (usize, usize) = (3, 2);
 
-/// A file with these channels, each value made of the channel's number and the texel's.
+/// Writes a file whose values depend on channel and texel.
 fn write(path: &std::path::Path, names: &[&str], sample: impl Fn(Vec<f32>) -> FlatSamples) {
     let texels = SIZE.0 * SIZE.1;
     let channels = names.iter().enumerate().map(|(i, name)| {

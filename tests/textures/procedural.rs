@@ -1,4 +1,4 @@
-//! Computed textures against means of many points.
+//! Procedural textures against numerical means.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn point(kind: u32, width: f64, u: f64, v: f64) -> f64 {
     f64::from(u8::from(share))
 }
 
-/// The mean over the parallelogram of the footprint, at n x n points.
+/// Returns the mean over the parallelogram, at n x n points.
 fn mean(kind: u32, width: f64, f: Footprint, n: i32) -> f64 {
     let mut sum = 0.0;
     for i in 0..n {
@@ -34,7 +34,7 @@ fn mean(kind: u32, width: f64, f: Footprint, n: i32) -> f64 {
     sum / f64::from(n * n)
 }
 
-/// The part of a polygon where `normal . p <= limit`.
+/// Clips to `normal . p <= limit`.
 fn clipped(polygon: &[DVec2], normal: DVec2, limit: f64) -> Vec<DVec2> {
     let mut part = Vec::new();
     for (i, &a) in polygon.iter().enumerate() {
@@ -55,12 +55,12 @@ fn area(polygon: &[DVec2]) -> f64 {
     fan.sum::<f64>().abs() / 2.0
 }
 
-/// The part of a polygon between two multiples of an axis.
+/// Clips to a strip along an axis.
 fn strip(polygon: &[DVec2], axis: DVec2, from: f64, to: f64) -> Vec<DVec2> {
     clipped(&clipped(polygon, axis, to), -axis, -from)
 }
 
-/// The exact mean over the parallelogram of the footprint, cell by cell.
+/// Returns the exact mean over the parallelogram, cell by cell.
 fn exact(kind: u32, width: f64, f: Footprint) -> f64 {
     let (uv, a, b) = (f.uv.as_dvec2(), f.dx.as_dvec2() / 2.0, f.dy.as_dvec2() / 2.0);
     let whole = [uv - a - b, uv + a - b, uv + a + b, uv - a + b];
@@ -95,8 +95,7 @@ fn exact(kind: u32, width: f64, f: Footprint) -> f64 {
     sum / area(&whole) + if kind == CHECKER { 0.0 } else { 1.0 }
 }
 
-/// Footprints of a size: turned by any angle and by nearly 45 degrees, as wide as long to very thin, sheared, some near
-/// a corner of the pattern.
+/// Returns a footprint at any angle or nearly 45 degrees, square to very thin, sheared, sometimes near a corner.
 fn slanted(size: f64, aspects: &[f64], numbers: &Random) -> Footprint {
     let angle = if numbers.once_in(2) {
         numbers.between(0.0, TAU)
@@ -121,7 +120,7 @@ fn slanted(size: f64, aspects: &[f64], numbers: &Random) -> Footprint {
     }
 }
 
-/// What the page promises: 0.001 where the long edge is below 64 squares or 32 cells; 0.01 beyond.
+/// Documented: 0.001 for long edges below 64 squares or 32 cells, 0.01 above.
 #[test]
 fn footprints_of_any_size_and_angle_have_the_exact_mean() {
     let numbers = Random::new(11);
@@ -147,7 +146,7 @@ fn footprints_of_any_size_and_angle_have_the_exact_mean() {
     }
 }
 
-/// Turned by 45 degrees, one to two squares a pixel: no stripes but those that are there.
+/// At 45 degrees and one to two squares per pixel: no moire.
 #[test]
 fn slanted_checkers_have_their_contrast() {
     for size in [1.0, 1.5, 2.0] {
@@ -167,7 +166,7 @@ fn slanted_checkers_have_their_contrast() {
     }
 }
 
-/// Lines, points, and what no ray has: always a share.
+/// Degenerate, infinite and NaN footprints give 0 to 1.
 #[test]
 fn footprints_without_an_area_have_a_share() {
     let numbers = Random::new(12);
@@ -205,7 +204,7 @@ fn footprints_without_an_area_have_a_share() {
             }
         }
     }
-    // A thin line is the mean along it, from 0.7 to 1.6 along the diagonal and along an axis.
+    // Segments from 0.7 to 1.6, along an axis and the diagonal.
     let along = |uv: Vec2, dx: Vec2| f64::from(procedural_share(CHECKER, 0.0, Footprint { uv, dx, dy: Vec2::ZERO }));
     assert!((along(Vec2::new(1.15, 0.55), Vec2::new(0.9, 0.0)) - 0.6 / 0.9).abs() < 2e-3);
     assert!((along(Vec2::new(1.15, 0.65), Vec2::splat(0.9)) - 0.5 / 0.9).abs() < 5e-3);
@@ -219,7 +218,7 @@ fn upright_footprints_have_the_exact_mean() {
         let kind = [CHECKER, LINES][i % 2];
         let size = 4f64.powf(numbers.between(-3.0, 2.0)) as f32;
         let uv = Vec2::new(numbers.between(-20.0, 20.0) as f32, numbers.between(-20.0, 20.0) as f32);
-        // Some are lines along one axis, where the other is not averaged.
+        // Some are segments, averaged along one axis only.
         let (width, height) = match i % 10 {
             4 | 5 => (size, 0.0),
             6 | 7 => (0.0, size),

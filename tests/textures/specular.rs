@@ -1,4 +1,4 @@
-//! Mirrors and glass: known values, energy, and what is seen in them.
+//! Mirrors and glass: known values, energy, visible objects.
 
 use std::path::Path;
 
@@ -18,10 +18,10 @@ fn reflectance(degrees: f64, ior: f64) -> f64 {
 fn reflectances_are_those_of_fresnel() {
     assert!((reflectance(0.0, 1.5) - 0.04).abs() < 1e-6);
     assert!((reflectance(0.0, 1.0 / 1.5) - 0.04).abs() < 1e-6);
-    // At Brewster's angle only one polarisation is reflected: ((n^2 - 1) / (n^2 + 1))^2, and half of the light has it.
+    // Brewster's angle: only one polarization, half of the light, reflects ((n^2 - 1) / (n^2 + 1))^2.
     let brewster = 1.5f64.atan().to_degrees();
     assert!((reflectance(brewster, 1.5) - 0.5 * (1.25f64 / 3.25).powi(2)).abs() < 1e-6);
-    // Beyond the critical angle all is.
+    // Total internal reflection.
     let critical = (1.0 / 1.5f64).asin().to_degrees();
     assert_eq!(reflectance(critical + 0.1, 1.0 / 1.5), 1.0);
     assert!(reflectance(critical - 0.1, 1.0 / 1.5) < 0.9);
@@ -30,12 +30,11 @@ fn reflectances_are_those_of_fresnel() {
         assert_eq!(reflectance(f64::from(degrees), 1.0), 0.0);
         let there = reflectance(f64::from(degrees), 1.5);
         let refracted = (f64::from(degrees).to_radians().sin() / 1.5).asin().to_degrees();
-        // The same from the other side.
+        // From the other side.
         assert!((there - reflectance(refracted, 1.0 / 1.5)).abs() < 1e-4);
     }
 }
 
-/// A ball and more before a background.
 fn ball(background: &str, material: &str, more: &str) -> Packed {
     let text = format!(
         "image = {{ width = 40, height = 40 }}
@@ -107,7 +106,7 @@ fn a_glass_ball_before_a_uniform_background_keeps_its_energy() {
         }
     }
     let tinted = cpu_picture(&ball("[1, 1, 1]", "type = 'glass'\nior = 1.5\ntint = [0.9, 1, 1]", ""));
-    assert!(tinted.iter().any(|pixel| pixel[0] < 0.85)); // 0.9 on the way in and on the way out
+    assert!(tinted.iter().any(|pixel| pixel[0] < 0.85)); // 0.9 at entry and at exit
     assert!(tinted.iter().all(|pixel| (pixel[1] - 1.0).abs() < 1e-6));
 }
 
@@ -125,7 +124,7 @@ fn clear_glass_of_index_1_is_invisible() {
         &format!("{ROOM}\n"),
     ));
     assert_eq!(clear, far_away);
-    // Without the ball at all: the same text with the ball out of the picture.
+    // Without the ball.
     let nothing = {
         let mut scene = ball("[0.1, 0.2, 0.3]", "type = 'glass'\nior = 1", ROOM);
         let keep = scene.counts.primitives[ELLIPSOID as usize].x as usize;
@@ -135,7 +134,7 @@ fn clear_glass_of_index_1_is_invisible() {
         cpu_picture(&scene)
     };
     let visible = |picture: &[[f32; 3]]| farthest(picture, &nothing).iter().filter(|d| **d > 1e-3).count();
-    assert!(visible(&clear) <= 2, "{}", visible(&clear)); // edges, by the rays' offset from the surface
+    assert!(visible(&clear) <= 2, "{}", visible(&clear)); // edges, due to ray offsets
     assert!(visible(&dense) > 100, "{}", visible(&dense));
     assert_eq!(without.len(), clear.len());
 }
@@ -245,10 +244,10 @@ fn glass_casts_a_shadow_unless_it_is_transparent() {
     assert_eq!(floor("transparent", "type = 'mirror'"), 0.0);
 }
 
-/// After the splits a branch is chosen at random: in the mean it is what following both would give.
+/// After the splits, random branches have the mean of following both.
 #[test]
 fn branches_chosen_at_random_have_the_right_mean() {
-    // Between the plates, light is reflected and refracted again and again: the sum of the series is known.
+    // A geometric series of reflections between the plates.
     let text = |depth: u32| {
         format!(
             "image = {{ width = 1, height = 1 }}
@@ -284,10 +283,10 @@ fn branches_chosen_at_random_have_the_right_mean() {
         )
     };
     let r = (9.0f64 / 11.0).powi(2);
-    let plate = (1.0 - r) / (1.0 + r); // what passes both surfaces, after any number of reflections between them
+    let plate = (1.0 - r) / (1.0 + r); // after any number of internal reflections
     let found = f64::from(cpu_picture(&scene(&text(64), Path::new(".")))[0][0]);
     assert!((found - plate).abs() < 4e-3, "{found} {plate}");
-    // The control: with 3 bounces most light is still on its way.
+    // Control: 3 bounces are too few.
     let cut = f64::from(cpu_picture(&scene(&text(3), Path::new(".")))[0][0]);
     assert!(plate - cut > 0.03, "{cut}");
 }

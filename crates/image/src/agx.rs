@@ -1,51 +1,50 @@
-//! AgX: a view transform in which bright colours go to white gradually, as on film. By T. Sobotka; in the form that Blender
-//! has, from version 4.0 on, without a look.
+//! AgX (T. Sobotka): a view transform that desaturates bright colors gradually, like film. This is the variant of
+//! Blender 4.0 and later, without a look.
 //!
-//! The source of all constants and steps is Z. Zhou ("EaryChow"), `AgX_LUT_Gen`: `AgXBaseRec2020.py`, whose matrices Blender's
-//! tables are made of, and `AgXBasesRGB.py`; the curve is J. Smith's, as in `sigmoid.py` there. Two things are simpler: the tables
-//! are computed, not looked up between 57 x 57 x 57 points, and colours that a display lacks are clipped, not moved.
+//! All constants and steps are from Z. Zhou, `AgX_LUT_Gen`: `AgXBaseRec2020.py`, whose matrices Blender's tables use,
+//! and `AgXBasesRGB.py`. The curve is by J. Smith (`sigmoid.py` there). Two simplifications: values are computed, not
+//! interpolated in a 57 x 57 x 57 table, and colors outside the display gamut are clipped, not moved into it.
 
 use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3};
 
-/// A color in 64-bit floats.
 pub(super) type Rgb = [f64; 3];
 
-/// From linear Rec. 709 to Rec. 2020, rows: ITU-R BT.2087-0, section 2.
+/// Linear Rec. 709 to Rec. 2020, by rows: ITU-R BT.2087-0, section 2.
 const TO_REC2020: [[f64; 3]; 3] = [
     [0.627_403_9, 0.329_283_0, 0.043_313_1],
     [0.069_097_3, 0.919_540_4, 0.011_362_3],
     [0.016_391_4, 0.088_013_3, 0.895_595_3],
 ];
 
-/// Moves the primaries inwards and turns them: what keeps bright saturated colours from a false hue.
+/// Moves the primaries inwards and rotates them, which avoids hue shifts of bright saturated colors.
 const INSET: [[f64; 3]; 3] = [
     [0.856_627_153_315_983, 0.095_121_240_538_158_8, 0.048_251_606_145_858_3],
     [0.137_318_972_929_847, 0.761_241_990_602_591, 0.101_439_036_467_562],
     [0.111_898_212_999_95, 0.076_799_418_603_190_3, 0.811_302_368_396_859],
 ];
 
-/// The inverse of what moves them outwards again, for colour.
+/// Inverse of the outset matrix, which restores saturation after the curve.
 const OUTSET_INVERSE: [[f64; 3]; 3] = [
     [0.899_796_955_911_611, 0.087_199_619_202_835_1, 0.013_003_424_885_555],
     [0.111_420_988_957_48, 0.875_575_586_156_966, 0.013_003_424_885_554_8],
     [0.111_420_988_957_48, 0.087_199_619_202_834_9, 0.801_379_391_839_686],
 ];
 
-/// Middle grey, and the stops below and above it that are told apart.
+/// Middle gray, and the dynamic range of the curve in stops below and above it.
 const MIDDLE: f64 = 0.18;
 const STOPS_BELOW: f64 = 10.0;
 const STOPS_ABOVE: f64 = 6.5;
-/// What displays of that curve make of a value.
+/// Exponent that decodes the output of the curve to linear display light.
 const POWER: f64 = 2.4;
-/// The curve's slope at middle grey, and how suddenly it bends.
+/// Slope of the curve at middle gray, and the power of its shoulder and toe.
 const SLOPE: f64 = 2.4;
 const BEND: f64 = 1.5;
-/// The share of the curve's own change of hue that stays.
+/// Fraction of the hue shift of the curve that is kept.
 const HUE: f64 = 0.4;
 
-/// Linear light of a display, for linear light from 0 on. It may be outside of what a display has.
+/// Returns linear display light for linear scene light >= 0. The result may be outside the display gamut.
 pub(super) fn agx(light: Rgb) -> Rgb {
     let light = *INWARDS * DVec3::from(light);
     let shown = light.map(|value| curve(place(value)).powf(POWER));
@@ -53,7 +52,7 @@ pub(super) fn agx(light: Rgb) -> Rgb {
     (*OUTWARDS * shown).into()
 }
 
-/// From linear Rec. 709 to where the curve is applied, and back to Rec. 709.
+/// Linear Rec. 709 to the space of the curve, and back.
 static INWARDS: LazyLock<DMat3> = LazyLock::new(|| matrix(INSET) * matrix(TO_REC2020));
 static OUTWARDS: LazyLock<DMat3> = LazyLock::new(|| (matrix(OUTSET_INVERSE) * matrix(TO_REC2020)).inverse());
 
@@ -61,13 +60,13 @@ fn matrix(rows: [[f64; 3]; 3]) -> DMat3 {
     DMat3::from_cols_array_2d(&rows).transpose()
 }
 
-/// Where a value is between the darkest and the brightest that are told apart: 0 to 1, in stops.
+/// Position of a value in the dynamic range, logarithmic, 0 to 1.
 fn place(value: f64) -> f64 {
-    let stops = (value / MIDDLE).log2(); // of 0 it is below all
+    let stops = (value / MIDDLE).log2(); // -inf for 0
     ((stops + STOPS_BELOW) / (STOPS_BELOW + STOPS_ABOVE)).clamp(0.0, 1.0)
 }
 
-/// The curve from (0, 0) to (1, 1), steepest in middle grey, which keeps its brightness.
+/// Sigmoid from (0, 0) to (1, 1), steepest at middle gray, which it keeps.
 fn curve(x: f64) -> f64 {
     let Halves { below, above } = &*HALVES;
     let (middle, grey) = pivot();
@@ -77,14 +76,14 @@ fn curve(x: f64) -> f64 {
     }
 }
 
-/// Where middle grey is, and what it becomes.
+/// Returns the position of middle gray and the value of the curve there.
 fn pivot() -> (f64, f64) {
     (STOPS_BELOW / (STOPS_BELOW + STOPS_ABOVE), *GREY)
 }
 
 static GREY: LazyLock<f64> = LazyLock::new(|| MIDDLE.powf(1.0 / POWER));
 
-/// How far the curve's halves go, were they not bent at their ends: found once, not for every value.
+/// Asymptotic heights of the halves of the sigmoid, computed once.
 struct Halves {
     below: f64,
     above: f64,
@@ -102,13 +101,13 @@ static HALVES: LazyLock<Halves> = LazyLock::new(|| {
     }
 });
 
-/// From middle grey on, upwards or downwards.
+/// One half of the sigmoid, relative to middle gray.
 fn bent(x: f64, scale: f64) -> f64 {
     let x = SLOPE * x / scale;
     scale * x / (1.0 + x.powf(BEND)).powf(1.0 / BEND)
 }
 
-/// The hue in turns, 0 to 1, as HSV has it: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978. 0 where there is none.
+/// Returns the hue of HSV in turns, 0 to 1; 0 for grays. A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978.
 fn hue(color: DVec3) -> f64 {
     let (most, spread) = (color.max_element(), color.max_element() - color.min_element());
     let [r, g, b] = color.into();
@@ -123,13 +122,13 @@ fn hue(color: DVec3) -> f64 {
     }
 }
 
-/// A hue between two, on the shorter way around the circle.
+/// Interpolates two hues along the shorter arc.
 fn mixed(from: f64, to: f64, share: f64) -> f64 {
     let way = (to - from + 0.5).rem_euclid(1.0) - 0.5;
     from + share * way
 }
 
-/// The colour of the same value and saturation that has this hue.
+/// Returns the color with the same value and saturation, and this hue.
 fn with_hue(color: DVec3, hue: f64) -> DVec3 {
     let (most, spread) = (color.max_element(), color.max_element() - color.min_element());
     let part = |number: f64| {

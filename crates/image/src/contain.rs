@@ -1,5 +1,5 @@
-//! Panics of libraries, contained: what they panic for is an error here. wgpu 30 panics where it waits for a device that is
-//! lost, and some of what it drops does too.
+//! Conversion of panics in libraries to errors. wgpu 30 panics when it waits for a lost device, and when some of its
+//! objects are dropped then.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -11,13 +11,13 @@ thread_local! {
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Whether a panic of this thread, now, would be contained. A program's panic hook that asks this can be silent, as the
-/// error is told by whoever contains it; [`install_quiet_hook`] installs such a hook.
+/// Returns true if a panic of this thread would be caught by [`catch_panic`]. Panic hooks can then stay silent, since
+/// the caller reports the error; [`install_quiet_hook`] installs such a hook.
 pub fn is_contained() -> bool {
     DEPTH.try_with(Cell::get).is_ok_and(|depth| depth > 0)
 }
 
-/// Sets a panic hook that says nothing of panics that are contained, and leaves all others to the hook of before.
+/// Installs a panic hook that ignores caught panics and passes all others to the previous hook.
 pub fn install_quiet_hook() {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
@@ -27,11 +27,11 @@ pub fn install_quiet_hook() {
     }));
 }
 
-/// Runs calls to a library.
+/// Calls a closure.
 ///
 /// # Errors
 ///
-/// The message of their panic. What the calls have touched is fit for being dropped, and for nothing else.
+/// The message of its panic. Values that the closure has modified may only be dropped after that.
 pub fn catch_panic<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
     let _inside = Inside::enter();
     catch_unwind(AssertUnwindSafe(calls)).map_err(|panic| message(panic.as_ref()))
@@ -40,17 +40,17 @@ pub fn catch_panic<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-    // Of several lines one: wgpu lists causes below each other.
+    // Joins the lines of the message: wgpu prints each cause on its own line.
     let lines = text.unwrap_or("it panicked").lines().map(str::trim);
     lines.filter(|line| !line.is_empty()).collect::<Vec<_>>().join(": ")
 }
 
-/// Counted while it lives.
+/// Marks the thread as inside of [`catch_panic`] while it exists.
 struct Inside;
 
 impl Inside {
     fn enter() -> Inside {
-        let _ = DEPTH.try_with(|depth| depth.set(depth.get() + 1)); // a thread that ends has none, and its panics are told
+        let _ = DEPTH.try_with(|depth| depth.set(depth.get() + 1)); // thread-locals fail while the thread ends; its panics are printed then
         Inside
     }
 }
@@ -61,12 +61,12 @@ impl Drop for Inside {
     }
 }
 
-/// A library's value whose drop may panic, which then is contained.
+/// A value of a library whose drop may panic; such panics are ignored.
 #[derive(Clone)]
 pub struct DropContained<T>(ManuallyDrop<T>);
 
 impl<T> DropContained<T> {
-    /// Takes the value.
+    /// Wraps a value.
     pub fn new(value: T) -> DropContained<T> {
         DropContained(ManuallyDrop::new(value))
     }
@@ -82,9 +82,9 @@ impl<T> Deref for DropContained<T> {
 
 impl<T> Drop for DropContained<T> {
     fn drop(&mut self) {
-        // SAFETY: the value is not used any more.
+        // SAFETY: the value is not used afterwards.
         let value = unsafe { ManuallyDrop::take(&mut self.0) };
-        let _ = catch_panic(|| drop(value)); // nobody is left to be told
+        let _ = catch_panic(|| drop(value)); // a destructor cannot return errors
     }
 }
 

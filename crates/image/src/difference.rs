@@ -1,19 +1,19 @@
-//! How far two pictures are apart.
+//! Per-value comparison of two images.
 
 use super::Pixels;
 
-/// The differences of all values of two pictures of the same size.
+/// Differences between two images of the same size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Pixels that are not the same bits, signed zeros and NaN told apart.
+    /// Pixels that are not bit-identical; signed zeros and NaN payloads differ.
     pub unequal: usize,
-    /// The largest difference of two values; NaN if any is.
+    /// Largest difference of two values; NaN if any difference is NaN.
     pub largest: f32,
-    /// Pixels with a value that differs by more than the tolerance, or by no number.
+    /// Pixels with a difference that exceeds the tolerance or is NaN.
     pub beyond: usize,
 }
 
-/// Compares two pictures value by value; `None` if their sizes differ.
+/// Compares two images value by value; `None` if their sizes differ.
 pub fn difference(a: &Pixels, b: &Pixels, tolerance: f32) -> Option<Difference> {
     if (a.width, a.height) != (b.width, b.height) {
         return None;

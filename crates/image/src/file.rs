@@ -1,5 +1,5 @@
-//! Files that appear when they are whole: written under another name in the same folder, then renamed. What is no file gets
-//! its bytes when all are there.
+//! Atomic file output. Regular files are written under a temporary name in the same folder, then renamed. Pipes and
+//! devices get all bytes at the end.
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -10,21 +10,21 @@ use tempfile::{Builder, NamedTempFile};
 use super::output::{Output, Place, named, open};
 use super::temporary;
 
-/// A file in the making. It is removed when dropped; its errors name the file.
+/// An unfinished output, deleted when dropped. Its errors name the output.
 #[derive(Debug)]
 pub struct Pending {
     name: String,
     output: BufWriter<Spool>,
-    /// The first error, for encoders that pass over one.
+    /// The first error, for encoders that ignore one.
     failure: Option<(io::ErrorKind, String)>,
 }
 
-/// Where the bytes are until all are there.
+/// Temporary storage of the bytes.
 #[derive(Debug)]
 enum Spool {
-    /// Beside the file that it becomes, and the permissions of one that it replaces.
+    /// A temporary file in the folder of its target, the target, and the permissions of the file that it replaces.
     Beside(NamedTempFile, PathBuf, Option<Permissions>),
-    /// In a file without a name, which no end of the process leaves behind, and where they then go.
+    /// An anonymous file, which the operating system deletes with the process, and the pipe or device to copy it to.
     Nameless(File, File),
 }
 
@@ -54,11 +54,11 @@ impl Seek for Spool {
 }
 
 impl Pending {
-    /// Starts what an output will be. What a process that was killed left of the same file is removed.
+    /// Starts writing an output, after deleting temporary files that killed processes left for the same target.
     ///
     /// # Errors
     ///
-    /// Folders that may not be written, and what cannot be opened.
+    /// The folder cannot be written, or the pipe or device cannot be opened.
     pub fn start(output: Output) -> io::Result<Pending> {
         let name = output.name().to_owned();
         let spool = match output.place {
@@ -76,18 +76,18 @@ impl Pending {
         })
     }
 
-    /// What messages call it.
+    /// Returns the name for messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Brings every byte to the disk, so that only the file's name is missing.
+    /// Flushes all bytes to the disk. Only the rename or the copy is left for [`Pending::finish`].
     pub fn complete(&mut self) -> io::Result<()> {
         self.flush()?;
         if let Some((kind, message)) = &self.failure {
             return Err(io::Error::new(*kind, message.clone()));
         }
-        // A full or broken disk may say so only now.
+        // A full or faulty disk may report an error only now.
         let result = match self.output.get_mut() {
             Spool::Beside(file, ..) => file.as_file().sync_data(),
             Spool::Nameless(..) => Ok(()),
@@ -95,7 +95,7 @@ impl Pending {
         self.noted(result)
     }
 
-    /// Gives the file its name, in place of any file that has it; what is no file gets the bytes.
+    /// Renames the file to its target, replacing an existing file; copies the bytes to a pipe or device.
     pub fn finish(mut self) -> io::Result<()> {
         self.complete()?;
         let spool = self.output.into_inner().map_err(|error| error.into_error());
@@ -156,10 +156,10 @@ fn nameless(to: File) -> io::Result<Spool> {
     Ok(Spool::Nameless(spool?, to))
 }
 
-/// The longest part of a file's name that a temporary name repeats, in bytes.
+/// Maximum part of the target's name in a temporary name, in bytes.
 const LONGEST_NAME: usize = 120;
 
-/// What stands before and after the random part of a temporary name: `.wgray-PID@HOST-` and `-NAME`.
+/// Prefix and suffix of a temporary name: `.wgray-PID@HOST-` and `-NAME`, around a random part.
 struct Name {
     host: String,
     end: String,
@@ -179,7 +179,7 @@ impl Name {
         format!(".wgray-{process}@{}-", self.host)
     }
 
-    /// Whether this program, on this machine, made a file of this name on its way to the same file.
+    /// Returns true if this program created a file of this name on this machine for the same target.
     fn fits(&self, file_name: &str) -> bool {
         let number = file_name.strip_prefix(".wgray-").and_then(|rest| rest.split_once('@'));
         let Some(Ok(process)) = number.map(|(number, _)| number.parse()) else {
@@ -191,15 +191,15 @@ impl Name {
     }
 }
 
-/// Characters of a temporary name that tell it from others of the same process.
+/// Length of the random part of a temporary name.
 const RANDOM: usize = 6;
 
-/// A temporary file in the folder of what it becomes, locked as long as it is open: by that others know that its process
-/// lives.
+/// Creates a temporary file in the folder of its target. It is locked while it is open, so that other processes know
+/// that it is in use.
 ///
 /// # Errors
 ///
-/// Folders that may not be written.
+/// The folder cannot be written.
 pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let name = Name::of(path);
@@ -209,15 +209,15 @@ pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
     builder.prefix(&start).suffix(&name.end).rand_bytes(RANDOM);
     #[cfg(unix)]
     {
-        // As for any new file: everybody may read and write but for what the umask forbids.
+        // The default mode of new files, before the umask.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(Permissions::from_mode(0o666));
     }
     loop {
         let file = builder.tempfile_in(folder)?;
-        // Where a file system has no locks nobody can take the file for stale either.
+        // On a file system without locks, no other process can lock the file to delete it either.
         let _ = file.as_file().lock();
-        // Another process may have taken it for stale before the lock.
+        // Another process may have deleted it before it was locked.
         if file.path().exists() {
             temporary::register(file.path());
             return Ok(file);
@@ -225,7 +225,7 @@ pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
     }
 }
 
-/// Removes what processes left that were killed on the way to the same file. Nothing here must end a render.
+/// Deletes temporary files that killed processes left for the same target. Ignores all errors.
 pub fn remove_stale_beside(path: &Path) {
     remove_stale(path.parent().unwrap_or(Path::new(".")), &Name::of(path));
 }
@@ -237,7 +237,7 @@ fn remove_stale(folder: &Path, name: &Name) {
         if !fits || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
-        // Whoever still writes it holds its lock.
+        // A process that still writes it holds the lock.
         let Ok(file) = File::options().write(true).open(entry.path()) else {
             continue;
         };
@@ -247,7 +247,7 @@ fn remove_stale(folder: &Path, name: &Name) {
     }
 }
 
-/// The machine's name, of letters that file names take.
+/// Returns the host name, reduced to characters that are safe in file names.
 fn host() -> String {
     #[cfg(unix)]
     let name = rustix::system::uname().nodename().to_string_lossy().into_owned();

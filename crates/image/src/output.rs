@@ -1,11 +1,11 @@
-//! Where something is written to, looked at before anything is done: a file that will be replaced, or a pipe, a device or
-//! standard output, which is written through.
+//! Output targets, checked before rendering: a regular file, which is replaced at the end, or a pipe, a device or
+//! standard output, which is written directly.
 
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A place to write to. Its errors name it.
+/// A target to write to. Its errors name it.
 #[derive(Debug)]
 pub struct Output {
     name: String,
@@ -14,21 +14,21 @@ pub struct Output {
 
 #[derive(Debug)]
 pub(super) enum Place {
-    /// A regular file, there or not yet.
+    /// A regular file, which may not exist yet.
     File {
-        /// Its path, without links.
+        /// Path without symbolic links.
         path: PathBuf,
-        /// The file that is there now: what tells it from others, and its permissions.
+        /// Identity and permissions of the existing file.
         there: Option<(Identity, Permissions)>,
     },
     /// A pipe or a device.
     Through {
         path: PathBuf,
         identity: Identity,
-        /// It, once it is open.
+        /// Handle, once it is open.
         file: Option<File>,
     },
-    /// What the program was started with.
+    /// A standard stream of the process.
     Standard(Stream),
 }
 
@@ -38,12 +38,12 @@ pub(super) enum Stream {
     Error,
 }
 
-/// What tells a file from others, whatever its name.
+/// Identity of a file, whatever its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Identity {
-    /// Device and inode, where there are such.
+    /// Device and inode, on Unix.
     numbers: Option<(u64, u64)>,
-    /// Takes what it is given and mixes nothing: a terminal, `/dev/null`.
+    /// True for devices that several outputs can share, such as a terminal or `/dev/null`.
     is_character_device: bool,
 }
 
@@ -72,11 +72,11 @@ impl Identity {
     }
 }
 
-/// As many links in a row as systems follow.
+/// Maximum number of symbolic links to follow, that of Linux.
 const LINKS: usize = 40;
 
 impl Output {
-    /// Standard output.
+    /// Returns standard output.
     pub fn standard() -> Output {
         Output {
             name: "standard output".to_owned(),
@@ -84,11 +84,11 @@ impl Output {
         }
     }
 
-    /// What a path leads to. A file is not touched, but it must be possible to write it.
+    /// Resolves a path. Files are not modified, but must be writable.
     ///
     /// # Errors
     ///
-    /// Folders, files in folders that are not there, and files that may not be written, by their mode alone too.
+    /// The path is a folder, its folder does not exist, or the file is not writable or is marked read-only.
     pub fn find(path: &Path) -> io::Result<Output> {
         let name = path.display().to_string();
         match place(path) {
@@ -97,11 +97,12 @@ impl Output {
         }
     }
 
-    /// Opens what is written through, before [`Pending::start`](super::Pending::start) would; a pipe waits for its reader.
+    /// Opens a pipe or a device now, not in [`Pending::start`](super::Pending::start). Opening a pipe blocks until it
+    /// has a reader.
     ///
     /// # Errors
     ///
-    /// What cannot be opened.
+    /// The pipe or device cannot be opened.
     pub fn connect(&mut self) -> io::Result<()> {
         if let Place::Through { path, file, .. } = &mut self.place {
             *file = Some(open(path).map_err(|error| named(&self.name, &error))?);
@@ -109,7 +110,7 @@ impl Output {
         Ok(())
     }
 
-    /// Returns the same file as it is now, so that it can be written once more.
+    /// Resolves the same file again, to write it once more.
     ///
     /// # Errors
     ///
@@ -129,17 +130,17 @@ impl Output {
         }
     }
 
-    /// What messages call it.
+    /// Returns the name for messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Whether it is a regular file, there or not yet; else it is written through.
+    /// Returns true for a regular file, which may not exist yet.
     pub fn is_file(&self) -> bool {
         matches!(self.place, Place::File { .. })
     }
 
-    /// The file's path, without links; none for what is no file.
+    /// Returns the path of a regular file, without symbolic links.
     pub fn path(&self) -> Option<&Path> {
         match &self.place {
             Place::File { path, .. } => Some(path),
@@ -147,7 +148,8 @@ impl Output {
         }
     }
 
-    /// Whether two outputs would be one: the same file or pipe under any names. A terminal and `/dev/null` take both.
+    /// Returns true if both outputs are the same file, pipe or stream, under any names. Character devices can be shared
+    /// and are never the same.
     pub fn is_same(&self, other: &Output) -> bool {
         let same_path = self.path().is_some() && self.path() == other.path();
         let same_stream = match (&self.place, &other.place) {
@@ -158,7 +160,7 @@ impl Output {
         same_path || same_stream || identities.is_some_and(|(a, b)| a.is(&b))
     }
 
-    /// Whether writing would change this file, under any of its names.
+    /// Returns true if writing would change an input file, under any of its names.
     pub fn is_input(&self, path: &Path) -> bool {
         let same_path = self.path().is_some() && fs::canonicalize(path).ok().as_deref() == self.path();
         let input = fs::metadata(path).ok().map(|data| Identity::of(&data));
@@ -178,7 +180,7 @@ impl Output {
 }
 
 impl Stream {
-    /// Another handle to it, which has no buffer.
+    /// Returns an unbuffered handle.
     pub(super) fn file(self) -> io::Result<File> {
         #[cfg(unix)]
         {
@@ -205,7 +207,7 @@ impl Stream {
     }
 }
 
-/// Opens what is there for writing; it is neither made nor cut short.
+/// Opens an existing file for writing, without truncating it.
 pub(super) fn open(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).open(path)
 }
@@ -235,7 +237,7 @@ fn place(path: &Path) -> io::Result<Place> {
             Ok(data) if data.is_symlink() => {
                 let target = fs::read_link(&path)?;
                 if path.starts_with("/proc") && target.is_relative() {
-                    break; // a pipe that is open: `pipe:[123]` is no name to follow
+                    break; // an open pipe: `pipe:[123]` is not a path
                 }
                 path = parent.join(target);
             }
@@ -263,8 +265,8 @@ fn place(path: &Path) -> io::Result<Place> {
     }
 }
 
-/// Which of the program's own streams a path is: what `/dev/stdout` and `/dev/fd/1` lead to. Opening that path again would
-/// write from the start of a file that the shell has opened to go on in.
+/// Returns the standard stream that a resolved path names, such as that of `/dev/stdout` and `/dev/fd/1`. Opening the
+/// path again would overwrite a file to which the shell appends.
 fn stream(path: &Path) -> Option<Stream> {
     let own = PathBuf::from(format!("/proc/{}/fd", std::process::id()));
     if path.parent() != Some(&own) {
@@ -281,10 +283,10 @@ fn folder() -> io::Error {
     io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")
 }
 
-/// An error in words that name what cannot be written.
+/// Adds the name of the output to an error.
 pub(super) fn named(name: &str, error: &io::Error) -> io::Error {
     let text = error.to_string();
-    // tempfile adds the temporary name, which means nothing to the user
+    // tempfile adds the temporary name, which means nothing to the user.
     let reason = text.split(" at path ").next().unwrap_or_default();
     io::Error::new(error.kind(), format!("{name}: cannot be written: {reason}"))
 }

@@ -1,7 +1,7 @@
-//! View transforms: from linear light to what a display is sent, 0 to 1, before it is rounded to whole numbers.
+//! View transforms: from linear light to display values, 0 to 1, before quantization.
 //!
-//! Light is linear RGB with the primaries of sRGB (Rec. 709, D65). What is no number counts as 0, an infinite value as the
-//! largest finite one, and what is negative, for which a display has no light, as 0.
+//! Light is linear RGB with the primaries of sRGB (Rec. 709, D65). NaN and negative values are treated as 0, infinity
+//! as the largest finite value.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,26 +9,26 @@ use serde::{Deserialize, Serialize};
 use crate::agx::{Rgb, agx};
 use crate::color::{linear_to_srgb, srgb_to_linear};
 
-/// From linear light to what a display is sent. In a file the names are those of [`ViewTransform::name`].
+/// Transform from linear light to display values. [`ViewTransform::name`] is the name in files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 pub enum ViewTransform {
-    /// Clamped to 0 ... 1, to the power 1/2.2.
+    /// Clamps to 0 ... 1, then gamma 1/2.2.
     #[default]
     #[serde(rename = "gamma22")]
     Gamma22,
-    /// Clamped to 0 ... 1, then the curve of sRGB.
+    /// Clamps to 0 ... 1, then the sRGB curve.
     #[serde(rename = "srgb")]
     Srgb,
-    /// AgX: bright colours go to white gradually, as on film. Without a look.
+    /// AgX without a look: desaturates bright colors gradually, like film.
     #[serde(rename = "agx")]
     Agx,
-    /// Khronos' PBR Neutral: colours stay as they are up to a brightness, those above it are compressed.
+    /// Khronos PBR Neutral: keeps colors up to a brightness, and compresses brighter ones.
     #[serde(rename = "khronos-pbr-neutral")]
     KhronosPbrNeutral,
 }
 
 impl ViewTransform {
-    /// All of them.
+    /// All view transforms.
     pub const ALL: [ViewTransform; 4] = [
         ViewTransform::Gamma22,
         ViewTransform::Srgb,
@@ -36,7 +36,7 @@ impl ViewTransform {
         ViewTransform::KhronosPbrNeutral,
     ];
 
-    /// The name in files and options.
+    /// Returns the name in files and options.
     pub const fn name(self) -> &'static str {
         match self {
             ViewTransform::Gamma22 => "gamma22",
@@ -47,20 +47,20 @@ impl ViewTransform {
     }
 }
 
-/// How a picture is shown. What is kept as numbers, such as OpenEXR, takes neither.
+/// Exposure and view transform of an image. Formats with linear values, such as OpenEXR, ignore both.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ViewSettings {
-    /// From linear light to what a display is sent.
+    /// View transform.
     pub transform: ViewTransform,
-    /// Stops, -100 to 100: light is multiplied by 2 to this power before the transform.
+    /// Exposure in stops, -100 to 100: light is multiplied by 2 to this power before the transform.
     pub exposure: f64,
 }
 
 impl ViewSettings {
-    /// The most stops, up or down: light stays far inside of what 64-bit floats hold.
+    /// Maximum exposure in stops, up or down. It keeps light far from the limits of 64-bit floats.
     pub const MOST_STOPS: f64 = 100.0;
 
-    /// The rule of an exposure that breaks it.
+    /// Returns the exposure, or the rule that it violates.
     pub fn check_exposure(stops: f64) -> Result<f64, String> {
         match stops.abs() <= ViewSettings::MOST_STOPS {
             true => Ok(stops),
@@ -70,18 +70,19 @@ impl ViewSettings {
 }
 
 impl ViewSettings {
-    /// What a display is sent for a linear colour: each from 0 to 1.
+    /// Returns the display values of a linear color, 0 to 1.
     pub fn display(&self, linear: [f32; 3]) -> [f64; 3] {
         transformed(self.transform, self.exposed(linear))
     }
 
-    /// Returns the light that is displayed as this color, 0 to 1 each, or nearly so if no light is.
+    /// Returns the light that is displayed as this color, 0 to 1 each. Approximate for colors outside the range of the
+    /// transform.
     pub fn light_of(&self, display: [f64; 3]) -> [f64; 3] {
         let factor = self.exposure.exp2();
         inverse(self.transform, display).map(|light| light / factor)
     }
 
-    /// What a display is sent for a share of light, such as an albedo: its curve alone.
+    /// Returns the display values of a reflectance such as an albedo: only the curve is applied.
     pub fn display_share(&self, share: [f32; 3]) -> [f64; 3] {
         match self.transform {
             ViewTransform::Gamma22 => share.map(sane).map(gamma22),
@@ -89,31 +90,30 @@ impl ViewSettings {
         }
     }
 
-    /// Light with its exposure.
     fn exposed(&self, linear: [f32; 3]) -> Rgb {
         let factor = self.exposure.exp2();
         linear.map(|value| sane(value) * factor)
     }
 
-    /// The same in 8 bits each.
+    /// Returns the display values in 8 bits.
     pub fn rgb8(&self, linear: [f32; 3]) -> [u8; 3] {
         self.display(linear).map(to_8_bits)
     }
 
-    /// What a display is sent for a colour that is weighted by its alpha: the colour of what is there by itself, black where
-    /// nothing is; then the share that it covers, linear.
+    /// Returns the straight (not premultiplied) display values of a color that is premultiplied by alpha, black where
+    /// alpha is 0, and the linear alpha.
     pub fn display_straight(&self, linear: [f32; 3], alpha: f32) -> [f64; 4] {
         let by_itself = linear.map(|value| if alpha > 0.0 { value / alpha } else { 0.0 });
         let [r, g, b] = self.display(by_itself);
         [r, g, b, sane(alpha).min(1.0)]
     }
 
-    /// The same in 8 bits each.
+    /// Returns the straight display values in 8 bits.
     pub fn rgba8(&self, linear: [f32; 3], alpha: f32) -> [u8; 4] {
         self.display_straight(linear, alpha).map(to_8_bits)
     }
 
-    /// Whether the values are encoded as sRGB has it.
+    /// Returns true if the values are sRGB-encoded.
     pub fn is_srgb(&self) -> bool {
         self.transform != ViewTransform::Gamma22
     }
@@ -128,8 +128,8 @@ fn transformed(transform: ViewTransform, light: Rgb) -> Rgb {
     }
 }
 
-/// Returns the light that is displayed as a color, or nearly so if none is displayed as it: then the nearest of what [`solution`] finds and
-/// the multiples of the linear color.
+/// Returns the light that is displayed as a color. If no light is, returns the nearest of the result of [`solution`]
+/// and the multiples of the linear color.
 fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
     const EXACT: f64 = 0.5 / 255.0;
     let distance = |light: &Rgb| {
@@ -147,9 +147,10 @@ fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
     all.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(found)
 }
 
-/// Solves `transformed(transform, light) == display` by bisection of one channel after the other, as each grows with its own light.
+/// Solves `transformed(transform, light) == display` by coordinate-wise bisection: each channel increases with its own
+/// light.
 fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
-    /// The maximum light of a channel. PBR Neutral only approaches white.
+    /// Maximum light of a channel. PBR Neutral only approaches white.
     const MAX_LIGHT: f64 = 1e3;
     /// A displayed value that is rounded to white in 8 bits.
     const NEARLY_WHITE: f64 = 1.0 - 0.25 / 255.0;
@@ -180,23 +181,23 @@ fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
     light
 }
 
-/// A linear value as 8 bits by [`ViewTransform::Gamma22`]: clamped to [0, 1], raised to the power 1/2.2, times 255, rounded to
-/// the nearest whole number; 0 if it is no number.
+/// Encodes a linear value in 8 bits by [`ViewTransform::Gamma22`]: clamped to [0, 1], raised to the power 1/2.2, times
+/// 255, rounded to the nearest integer. NaN yields 0.
 pub fn encode(linear: f32) -> u8 {
     to_8_bits(gamma22(sane(linear)))
 }
 
-/// The nearest of 256 steps from 0 to 1; halves go up.
+/// Rounds to the nearest of 256 steps from 0 to 1; halves round up.
 pub fn to_8_bits(value: f64) -> u8 {
-    (value * 255.0 + 0.5) as u8 // the conversion saturates, and takes NaN to 0
+    (value * 255.0 + 0.5) as u8 // the cast saturates and maps NaN to 0
 }
 
-/// The nearest of 65,536 steps from 0 to 1; halves go up.
+/// Rounds to the nearest of 65,536 steps from 0 to 1; halves round up.
 pub fn to_16_bits(value: f64) -> u16 {
     (value * 65_535.0 + 0.5) as u16
 }
 
-/// A value as light: not negative, and finite.
+/// Replaces NaN and negative values by 0, and infinity by the largest finite value.
 fn sane(value: f32) -> f64 {
     match value > 0.0 {
         true => f64::from(value.min(f32::MAX)),
@@ -204,21 +205,19 @@ fn sane(value: f32) -> f64 {
     }
 }
 
-/// The exponent of the course's display curve.
+/// Exponent of [`ViewTransform::Gamma22`].
 pub const GAMMA: f64 = 1.0 / 2.2;
 
-/// Clamped, and to the power 1/2.2.
 fn gamma22(light: f64) -> f64 {
     light.min(1.0).powf(GAMMA)
 }
 
-/// Clamped and encoded.
 fn srgb(light: f64) -> f64 {
     linear_to_srgb(light.clamp(0.0, 1.0))
 }
 
-/// PBR Neutral: Khronos Group, "PBR Neutral Tone Mapper" specification (2024), with its F90 = 0.04, Ks = 0.8 - 0.04 and Kd = 0.15.
-/// Linear light up to 1.
+/// Khronos Group, "PBR Neutral Tone Mapper" specification, 2024, with F90 = 0.04, Ks = 0.8 - 0.04 and Kd = 0.15.
+/// Returns linear display light up to 1.
 fn khronos_pbr_neutral(light: Rgb) -> Rgb {
     const F90: f64 = 0.04;
     const START: f64 = 0.8 - F90;
@@ -262,7 +261,6 @@ mod tests {
         }
     }
 
-    /// The largest difference of two colours.
     fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
@@ -288,12 +286,12 @@ mod tests {
                 }
             }
         }
-        // The curve of sRGB is inverted exactly.
+        // The sRGB curve is inverted exactly.
         let srgb = view(ViewTransform::Srgb).light_of([1.0, 0.5, 0.0]);
         assert!(apart(srgb, [1.0, 0.214_041_14, 0.0]) < 1e-8, "{srgb:?}");
     }
 
-    /// In each of the standard's branches, and where they meet.
+    /// Checks each branch of the curve and the point where they meet.
     #[test]
     fn srgb_has_the_values_of_its_standard() {
         for (linear, shown) in [
@@ -312,8 +310,9 @@ mod tests {
         assert!(apart(gamma, [0.735_356_98; 3]) > 1e-3, "another curve is seen");
     }
 
-    /// The specification's own: greys lose 0.04 up to 0.8, those of 0.08 or less are x² / 0.16; primaries keep what they are up to
-    /// 0.76; above it the brightest is 1 - 0.0576 / (x - 0.52), and the others are drawn to it.
+    /// Checks the formulas of the specification: grays lose 0.04 up to 0.8, and grays up to 0.08 become x² / 0.16.
+    /// Primaries up to 0.76 are kept. Above, the peak becomes 1 - 0.0576 / (x - 0.52) and the other channels move
+    /// towards it.
     #[test]
     fn neutral_keeps_colours_up_to_a_brightness() {
         let neutral = view(ViewTransform::KhronosPbrNeutral);
@@ -328,7 +327,7 @@ mod tests {
             let (found, expected) = (neutral.display(light), srgb.display(linear));
             assert!(apart(found, expected) < 1e-6, "{light:?}: {found:?}, {expected:?}");
         }
-        // x = 2 has a peak of 2 and is shown as 1 - 0.0576 / 1.48; the share of white is 1 - 1 / (0.15 (2 - that) + 1).
+        // x = 2 has a peak of 2, displayed as 1 - 0.0576 / 1.48. The weight of white is 1 - 1 / (0.15 (2 - that) + 1).
         let peak = 1.0 - 0.0576 / 1.48;
         let white = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
         let expected = srgb.display([peak as f32, (peak * white) as f32, (peak * white) as f32]);
@@ -356,7 +355,7 @@ mod tests {
         assert!(red > 0.85 && green < 0.15 && blue < 0.15, "{red} {green} {blue}");
     }
 
-    /// By `benches/peers/view_check.py`: its own formula in numpy, and what Blender's tables have.
+    /// Reference values of `benches/peers/view_check.py`: its numpy formula, and Blender's tables.
     #[test]
     fn agx_is_that_of_blender() {
         let agx = view(ViewTransform::Agx);
@@ -420,7 +419,7 @@ mod tests {
         }
     }
 
-    /// Whatever comes out of a render is something from 0 to 1.
+    /// Any rendered value must map to 0 ... 1.
     #[test]
     fn every_value_can_be_shown() {
         let values = [
@@ -461,7 +460,7 @@ mod tests {
         }
     }
 
-    /// Brighter light is never shown darker.
+    /// Brighter light must not be displayed darker.
     #[test]
     fn greys_keep_their_order() {
         for transform in ViewTransform::ALL {

@@ -1,9 +1,9 @@
-//! Text of strangers on a terminal: what would move its cursor, colour it, or turn its direction is shown as `\u{1b}`.
+//! Escaping of untrusted text for terminals: controls and direction marks are printed as `\u{1b}`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// Whether a character does something else than to be shown: controls, and marks of direction (Unicode's UAX 9).
+/// Returns true for control characters and for direction marks (Unicode UAX 9).
 fn acts(c: char) -> bool {
     let turns = ['\u{61c}', '\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'];
     c.is_control()
@@ -12,12 +12,12 @@ fn acts(c: char) -> bool {
         || ('\u{2066}'..='\u{2069}').contains(&c)
 }
 
-/// A text as it may be shown: one line, whatever is in it.
+/// Escapes a text, including line breaks.
 pub fn visible(text: &str) -> Cow<'_, str> {
     shown(text, &[])
 }
 
-/// A text of several lines as it may be shown.
+/// Escapes a text of several lines; line breaks and tabs are kept.
 pub fn visible_lines(text: &str) -> Cow<'_, str> {
     shown(text, &['\n', '\t'])
 }

@@ -1,17 +1,17 @@
-//! Files that never end, or would have their reader wait for ever, by the names that somebody gave.
+//! Rejection of input paths that may block forever or never end.
 
 use std::fs::{self, FileType};
 use std::io;
 use std::path::Path;
 
-/// Refuses devices, and pipes that have a name: opening one waits for a writer. A pipe without a name, such as standard input or
-/// what a shell makes of `<(...)`, has somebody who writes. What is not there is nothing of this.
+/// Rejects devices, and named pipes, which block until a writer opens them. Anonymous pipes are accepted: standard
+/// input and `<(...)` of a shell have a writer. A missing file is accepted; opening it reports the error.
 pub fn check(path: &Path) -> io::Result<()> {
     let Ok(data) = fs::metadata(path) else { return Ok(()) };
     let refused = |rule| Err(io::Error::new(io::ErrorKind::InvalidInput, rule));
     match kind(data.file_type()) {
         Kind::Device => refused("it is a device, and must be a file"),
-        // The link of a pipe without a name leads nowhere.
+        // The link of an anonymous pipe does not resolve.
         Kind::Pipe if path.canonicalize().is_ok() => {
             refused("it is a named pipe, which may never deliver data; it must be a file")
         }

@@ -1,5 +1,4 @@
-//! What renders, and what it promises. The backends are below: [`Cpu`](crate::cpu::Cpu) and [`Gpu`](crate::gpu::Gpu).
-//! The schedule of work is above: [`job`](crate::job).
+//! The [`Backend`] trait with its contract, and the argument checks that its implementations share.
 
 use std::ops::Range;
 
@@ -8,92 +7,90 @@ use crate::film::{Film, Form};
 use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
 
-/// A scene on a device, with one film at a time.
+/// A scene on a device, with at most one film at a time.
 ///
-/// This is the contract of every backend; `tests/contract.rs` holds each of them to it.
+/// `tests/contract.rs` tests every backend against this contract.
 ///
 /// # Films
 ///
-/// - There is no film at first. [`begin`](Backend::begin) starts an empty one, [`resume`](Backend::resume) goes on from
-///   one that was read before, by whichever backend. Either takes the place of the film before.
-/// - A film is a region of the picture. It may have no pixels.
-/// - A film has the scene's [form](crate::film::Form): under adaptive sampling moments and looks beside its sums, and where
-///   layers were asked for ([`Packed::with_layers`]) these too. With layers and without, all else has the same bits.
-/// - [`film`](Backend::film) copies the film. It can be read at any time between two calls, as often as one likes, and
-///   reading changes nothing.
+/// - Initially no film exists. [`begin`](Backend::begin) creates an empty one. [`resume`](Backend::resume) continues
+///   one that was read earlier, possibly from another backend. Both replace the current film.
+/// - A film covers a region of the image. It may have no pixels.
+/// - A film has the scene's [form](crate::film::Form): moments and pilot statistics under adaptive sampling, and layers
+///   if they were requested ([`Packed::with_layers`]). Layers do not change the bits of the other lists.
+/// - [`film`](Backend::film) copies the film. It can be called whenever nothing is pending, and changes nothing.
 ///
-/// # Calls
+/// # Dispatches
 ///
-/// - [`submit`](Backend::submit) starts a call, which adds a range of samples to the pixels of a tile of the film. It does
-///   not wait for the device. The call is pending until [`poll`](Backend::poll) returns true or [`wait`](Backend::wait)
-///   returns. One call can be pending. [`render`](Backend::render) submits and waits.
-/// - `poll` never waits for a device. A backend without a device of its own does the work in `poll` or `wait`, and then
-///   either takes as long as the work does.
-/// - With nothing pending, `poll` returns true and `wait` returns at once.
-/// - Every cut of the work gives the same film, all of its lists, bit for bit: tiles of any shape in any order, and ranges of any length,
-///   if every pixel gets each sample once, in ascending order.
+/// - [`submit`](Backend::submit) starts a dispatch, which adds a range of samples to the pixels of a tile, and does not
+///   wait for the device. The dispatch is pending until [`poll`](Backend::poll) returns true or [`wait`](Backend::wait)
+///   returns. At most one is pending. [`render`](Backend::render) submits and waits.
+/// - `poll` never waits for a device. A backend without a device does the work inside `poll` or `wait`.
+/// - With nothing pending, `poll` returns true and `wait` returns immediately.
+/// - All lists of the film have the same bits for every partition of the work: tiles of any shape in any order and
+///   ranges of any length, if every pixel gets each sample once, in ascending order.
 /// - Under adaptive sampling all pixels of the film get their first [`samples_of_all`](Backend::samples_of_all) samples
-///   before any pixel gets a further one. One range may hold both for the last tile that lacks first ones.
+///   before any pixel gets a further one. For the last tile that lacks pilot samples, one range may contain both.
 /// - An empty tile or an empty range of samples changes nothing, wherever it lies.
 ///
 /// # First hits
 ///
-/// - [`first_hits`](Backend::first_hits) needs no film, and leaves it as it is.
+/// - [`first_hits`](Backend::first_hits) needs no film and does not change it.
 ///
 /// # Errors
 ///
-/// Wrong calls are refused, and change nothing:
+/// Calls that violate the contract fail and change nothing:
 ///
 /// - [`RenderError::NoFilm`]: `submit` or `film` without a film;
-/// - [`RenderError::Pending`]: anything but `poll` and `wait` while a call is pending;
-/// - [`RenderError::Outside`]: a tile that is not inside the film, or a film or first hits that are not inside the picture;
-/// - [`RenderError::FilmMismatch`]: `resume` with a film that is not of the scene's form;
-/// - [`RenderError::PilotIncomplete`]: further samples before all pixels of the film have their first ones.
+/// - [`RenderError::Pending`]: any method except `poll` and `wait` while a dispatch is pending;
+/// - [`RenderError::Outside`]: a tile outside the film, or a film or first hits outside the image;
+/// - [`RenderError::FilmMismatch`]: `resume` with a film of another form than the scene's;
+/// - [`RenderError::PilotIncomplete`]: further samples before all pixels of the film have their pilot samples.
 ///
-/// Any other error is the device's. After it nothing is pending and there is no film; `begin` and `resume` may work.
+/// All other errors come from the device. After one of them nothing is pending and no film exists; `begin` and `resume`
+/// may succeed.
 pub trait Backend {
-    /// Starts an empty film of a region of the picture.
+    /// Creates an empty film of a region of the image.
     fn begin(&mut self, region: Region) -> Result<(), RenderError>;
 
-    /// Goes on from a film.
+    /// Continues a film.
     fn resume(&mut self, film: Film) -> Result<(), RenderError>;
 
-    /// Starts to add a range of samples to the pixels of a tile of the film.
+    /// Starts to add a range of samples to the pixels of a tile.
     fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError>;
 
-    /// Whether nothing is pending. A call that has ended is brought to its end here, or sent on if it needs several steps.
+    /// Returns true if nothing is pending. Completes a dispatch that has ended, or submits its next step.
     fn poll(&mut self) -> Result<bool, RenderError>;
 
     /// Waits until nothing is pending.
     fn wait(&mut self) -> Result<(), RenderError>;
 
-    /// Adds a range of samples to the pixels of a tile of the film, and returns when this is done.
+    /// Adds a range of samples to the pixels of a tile, and waits for it.
     fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         self.submit(tile, samples)?;
         self.wait()
     }
 
-    /// A copy of the film as it is now. Waits until it is copied.
+    /// Copies the film, and waits for the copy.
     fn film(&mut self) -> Result<Film, RenderError>;
 
-    /// What the rays through the centres of a region's pixels meet first, row by row from the top. Waits until they are
-    /// found; [`job::first_hits`](crate::job::first_hits) cuts a large region.
+    /// Returns the first hits of the rays through the pixel centers, row by row from the top. Waits for them;
+    /// [`job::first_hits`](crate::job::first_hits) splits a large region.
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
 
-    /// The largest film that it can have, in pixels. It has room for the pixels [`around`](Backend::around) a film of this
-    /// size.
+    /// Returns the maximum size of a film in pixels. The pixels [`around`](Backend::around) such a film fit too.
     fn largest_film(&self) -> u64;
 
-    /// How many samples all pixels get. Under adaptive sampling further ones are left out where they are not needed, as the
-    /// first ones of the pixels around tell; else there is no such number, and this is the largest one.
+    /// Returns the number of pilot samples, which all pixels get and on which the number of further samples depends;
+    /// `u32::MAX` without adaptive sampling.
     fn samples_of_all(&self) -> u32;
 
-    /// The pixels whose samples decide on those of a region's pixels: itself, and under adaptive sampling the pixels beside
-    /// it.
+    /// Returns the pixels whose samples determine the sample counts in a region: the region, and under adaptive
+    /// sampling its neighbors.
     fn around(&self, region: Region) -> Region;
 }
 
-/// What a backend refuses, and what it tells, by its scene alone: the same for all of them.
+/// Argument checks and scene-derived limits shared by all backends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rules {
     picture: Region,
@@ -101,11 +98,11 @@ pub(crate) struct Rules {
     first_look: u32,
 }
 
-/// A film as far as the rules see it.
+/// The state of a film that the checks depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Started {
     pub region: Region,
-    /// Samples of the first look that were added, over all pixels.
+    /// Number of pilot samples so far, over all pixels.
     first_samples: u64,
 }
 
@@ -118,19 +115,18 @@ impl Rules {
         }
     }
 
-    /// What a film has beside its sums.
+    /// The form of a film.
     #[cfg(feature = "gpu")]
     pub fn form(&self) -> Form {
         self.form
     }
 
-    /// The whole picture.
     #[cfg(feature = "gpu")]
     pub fn picture(&self) -> Region {
         self.picture
     }
 
-    /// A picture of another size.
+    /// Sets the size of the image.
     #[cfg(feature = "gpu")]
     pub fn set_size(&mut self, width: u32, height: u32) {
         self.picture = Region::whole(width, height);
@@ -150,7 +146,6 @@ impl Rules {
         }
     }
 
-    /// A film of a region without any sample.
     pub fn empty_film(&self, region: Region) -> Film {
         Film::of(region, self.form)
     }
@@ -196,7 +191,7 @@ impl Rules {
         })
     }
 
-    /// Whether there is anything to do.
+    /// Checks a dispatch and counts its pilot samples. Returns false if it is empty.
     pub fn call(&self, film: &mut Started, tile: Region, samples: &Range<u32>) -> Result<bool, RenderError> {
         if tile.is_empty() || samples.is_empty() {
             return Ok(false);
@@ -216,7 +211,7 @@ impl Rules {
         Ok(true)
     }
 
-    /// The end of what one kernel can do of a range of samples: first ones or further ones.
+    /// Returns the end of the samples that one kernel can process: either pilot samples or further ones.
     pub fn end_of_part(&self, samples: &Range<u32>) -> u32 {
         match self.form.adaptive && samples.start < self.first_look {
             true => samples.end.min(self.first_look),

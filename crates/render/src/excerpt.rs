@@ -1,19 +1,19 @@
-//! A line of a text with a place marked in it, as messages show it.
+//! Excerpts of source text for messages: a numbered line with the location marked.
 
-/// What stands before the bar in a line of an excerpt that is none of the text's.
+/// Prefix of the lines of an excerpt that are not part of the text, in place of a line number.
 pub const NO_NUMBER: &str = "      |";
-/// So many characters of a line are shown.
+/// Maximum number of characters of a line.
 const WIDTH: usize = 160;
-/// So many of them before the place, where the line is longer.
+/// Number of characters before the location in a truncated line.
 const BEFORE: usize = 60;
 
-/// A line with its number, counted from 1; of a long one the beginning.
+/// Returns a line with its number, which counts from 1. A long line is truncated.
 pub fn numbered(number: usize, line: &str) -> String {
     let (part, _) = window(line, 0);
     format!("{number:>5} | {part}").trim_end().to_string()
 }
 
-/// The same with marks below so many characters from `start` on; of a long line the part about them.
+/// Returns a numbered line with marks below `length` characters from `start`. A long line is truncated around them.
 pub fn marked(number: usize, line: &str, start: usize, length: usize) -> String {
     let (part, at) = window(line, start);
     let room = part.chars().count().saturating_sub(at).max(1);
@@ -21,7 +21,7 @@ pub fn marked(number: usize, line: &str, start: usize, length: usize) -> String 
     format!("{number:>5} | {part}\n{NO_NUMBER} {indent}{marks}")
 }
 
-/// The part of a line that is shown, and where in it a character of the line is.
+/// Returns the part of a line to print, and the position of the character `place` in it.
 fn window(line: &str, place: usize) -> (String, usize) {
     let count = line.chars().count();
     let place = place.min(count);

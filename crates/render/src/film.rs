@@ -1,48 +1,48 @@
-//! The film: what a render accumulates, in linear f32.
+//! The film: sums over the samples of each pixel, in linear f32.
 
 use bytemuck::Zeroable;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use wgray_image::Region;
 
-/// What a film has beside its sums.
+/// The optional lists of a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Form {
-    /// Moments and looks, for adaptive sampling.
+    /// Moments and pilot statistics, for adaptive sampling.
     pub adaptive: bool,
-    /// The layers.
+    /// The sums of each [`Layer`].
     pub layers: bool,
 }
 
 impl Form {
-    /// How many lists of pixels such a film has.
+    /// Returns the number of lists.
     pub fn lists(self) -> usize {
         let (adaptive, layers) = (usize::from(self.adaptive), usize::from(self.layers));
         1 + 2 * adaptive + Layer::ALL.len() * layers
     }
 
-    /// The bytes of a pixel.
+    /// Returns the number of bytes per pixel.
     pub fn bytes(self) -> usize {
         self.lists() * size_of::<Vec4>()
     }
 }
 
-/// What the samples of a pixel show besides their radiance, as the integrator `path` sees it.
+/// Sums of the path integrator besides the radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
-    /// Light that was not reflected; a is the share of the samples whose rays meet anything.
+    /// Emitted radiance; a: fraction of samples whose camera rays hit anything.
     Emission,
-    /// Light that was reflected once.
+    /// Radiance that was scattered once.
     Direct,
-    /// Light that was reflected more often.
+    /// Radiance that was scattered more often.
     Indirect,
-    /// The share of light that the surface reflects.
+    /// Albedo of the surface.
     Albedo,
-    /// The normal that the surface is shaded by, outwards.
+    /// Shading normal, outward.
     Normal,
 }
 
 impl Layer {
-    /// All of them, in the order of a film's lists.
+    /// All layers, in the order of a film's lists.
     pub const ALL: [Layer; 5] = [
         Layer::Emission,
         Layer::Direct,
@@ -52,29 +52,28 @@ impl Layer {
     ];
 }
 
-/// The sums of a rectangle of pixels.
+/// Accumulated samples of a rectangle of pixels, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
-    /// Which pixels of the picture these are.
+    /// The pixels in the image.
     pub region: Region,
-    /// Row by row from the top: in rgb the sum of the samples' radiances, in a the sum of their weights.
+    /// rgb: sum of weighted radiances; a: sum of weights.
     pub sums: Vec<Vec4>,
-    /// Under adaptive sampling the moments of the same pixels, else nothing: in rgb the sum of the samples' squared
-    /// deviations from their mean, in a the number of samples.
+    /// rgb: sum of squared deviations from the mean; a: number of samples. Empty without adaptive sampling.
     pub moments: Vec<Vec4>,
-    /// Under adaptive sampling what the first samples of the same pixels tell their neighbours, else nothing.
+    /// Statistics of the pilot samples, for the neighbors. Empty without adaptive sampling.
     pub looks: Vec<Vec4>,
-    /// Where layers were asked for, the sums of each [`Layer`] of the same pixels, weighted as the radiances are; else nothing.
+    /// Weighted sums of each [`Layer`]. Empty unless layers were requested.
     pub layers: [Vec<Vec4>; Layer::ALL.len()],
 }
 
 impl Film {
-    /// A film without any sample, and without moments and layers.
+    /// Returns an empty film without moments and layers.
     pub fn new(region: Region) -> Film {
         Film::of(region, Form::default())
     }
 
-    /// A film without any sample, for adaptive sampling.
+    /// Returns an empty film for adaptive sampling.
     pub fn adaptive(region: Region) -> Film {
         let form = Form {
             adaptive: true,
@@ -83,7 +82,7 @@ impl Film {
         Film::of(region, form)
     }
 
-    /// A film without any sample.
+    /// Returns an empty film.
     pub fn of(region: Region, form: Form) -> Film {
         let list = |there: bool| match there {
             true => vec![Vec4::zeroed(); region.pixels() as usize],
@@ -98,7 +97,7 @@ impl Film {
         }
     }
 
-    /// What it has beside its sums; a film without pixels has nothing.
+    /// Returns the form; a film without pixels has the default one.
     pub fn form(&self) -> Form {
         Form {
             adaptive: !self.moments.is_empty(),
@@ -106,7 +105,7 @@ impl Film {
         }
     }
 
-    /// Every list of its pixels, also those that are empty: sums, moments, looks, layers.
+    /// Returns all lists, including empty ones: sums, moments, pilot statistics, layers.
     pub fn lists(&self) -> impl Iterator<Item = &Vec<Vec4>> {
         let Film {
             region: _,
@@ -118,7 +117,7 @@ impl Film {
         [sums, moments, looks].into_iter().chain(layers)
     }
 
-    /// The same, to be changed.
+    /// Returns [`Film::lists`] mutably.
     pub fn lists_mut(&mut self) -> impl Iterator<Item = &mut Vec<Vec4>> {
         let Film {
             region: _,
@@ -130,7 +129,7 @@ impl Film {
         [sums, moments, looks].into_iter().chain(layers)
     }
 
-    /// A part of the film, which must lie in it.
+    /// Returns the part of the film in a region, which must lie inside it.
     pub fn part(self, part: Region) -> Film {
         if part == self.region {
             return self;
@@ -151,36 +150,36 @@ impl Film {
         }
     }
 
-    /// How many samples a pixel has, under adaptive sampling.
+    /// Returns the number of samples of a pixel, under adaptive sampling.
     pub fn sample_count(&self, pixel: usize) -> u32 {
         self.moments[pixel].w as u32
     }
 
-    /// How many samples the pixels have, row by row from the top, under adaptive sampling.
+    /// Returns [`Film::sample_count`] of all pixels.
     pub fn sample_counts(&self) -> impl Iterator<Item = u32> {
         (0..self.moments.len()).map(|pixel| self.sample_count(pixel))
     }
 
-    /// The variance of a pixel's mean in red, green and blue, under adaptive sampling, estimated from its samples as if they
-    /// were independent: on average an upper bound for patterns that are more even. Where all samples are the same it is
-    /// 0. It is not what decided on the pixel's samples, which is what its neighbours are like.
+    /// Returns the estimated variance of a pixel's mean per channel, under adaptive sampling. It treats samples as
+    /// independent: for stratified patterns it is an upper bound on average. The number of samples of the pixel depends
+    /// on its neighbors instead.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
         variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
     }
 
-    /// Whether it has layers, which a film without pixels has not.
+    /// Returns true if the film has pixels with layers.
     pub fn has_layers(&self) -> bool {
         self.layers.iter().all(|list| !list.is_empty())
     }
 
-    /// The mean of a layer over a pixel's samples; 0 if there are no samples, or no layers.
+    /// Returns the mean of a layer over a pixel's samples; 0 without samples or layers.
     pub fn layer(&self, layer: Layer, pixel: usize) -> [f32; 3] {
         let sum = self.layers[layer as usize].get(pixel).copied().unwrap_or_default();
         mean(sum.xyz().extend(self.sums[pixel].w))
     }
 
-    /// The share of a pixel's samples whose rays meet anything; 0 if there are no samples, 1 if there are no layers. A filter with
-    /// weights of either sign may take it out of 0 to 1.
+    /// Returns the fraction of a pixel's samples whose camera rays hit anything; 0 without samples, 1 without layers. A
+    /// filter with negative weights can move it out of 0 to 1.
     pub fn alpha(&self, pixel: usize) -> f32 {
         let all = self.sums[pixel].w;
         match self.layers[Layer::Emission as usize].get(pixel) {
@@ -190,20 +189,20 @@ impl Film {
         }
     }
 
-    /// The means of all pixels: linear RGB, row by row from the top.
+    /// Returns the means of all pixels in linear RGB.
     pub fn means(&self) -> impl Iterator<Item = [f32; 3]> {
         self.sums.iter().copied().map(mean)
     }
 }
 
-/// The variance of a pixel's mean in red, green and blue, by its sum and its moments, if its samples were independent.
+/// Returns the variance of a pixel's mean per channel, for independent samples.
 pub fn variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3 {
     let n = moments.w;
     let scale = n / ((n - 1.0) * sum.w * sum.w);
     moments.xyz() * scale
 }
 
-/// The mean of a pixel's samples: linear RGB, black if there are none.
+/// Returns the mean of a pixel's samples in linear RGB, black without samples.
 pub fn mean(sum: Vec4) -> [f32; 3] {
     if sum.w == 0.0 {
         [0.0; 3]

@@ -10,7 +10,7 @@ use super::validate::{color, view};
 use super::{Description, EnvironmentDescription, EnvironmentName};
 use wgray_image::color::srgb_to_linear;
 
-/// The background that the camera sees in place of the environment.
+/// The background of the camera in place of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Background {
@@ -35,7 +35,7 @@ pub(super) fn surround(description: &mut Description, environment: &EnvironmentD
 }
 
 impl Background {
-    /// Shows this to the camera. The light of the scene is not changed.
+    /// Shows this to the camera. Does not change the light.
     pub(super) fn show(self, description: &mut Description) -> Result<(), Problem> {
         let seen = match self {
             Background::Transparent => return transparent(description),
@@ -77,7 +77,7 @@ fn transparent(description: &mut Description) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Returns a problem of the environment override as one of the option.
+/// Returns a problem of the environment as one of the option.
 pub(super) fn of_option(problem: &Problem) -> Option<Problem> {
     let key = problem.key.to_string();
     let is_of_option = matches!(key.strip_prefix("environment"), Some("" | ".color" | ".file"));
@@ -101,7 +101,7 @@ impl FromStr for Background {
 impl FromStr for EnvironmentDescription {
     type Err = String;
 
-    /// A built-in environment by its name, a color, or the path of an image, relative to the current folder.
+    /// A built-in environment, a color, or an image relative to the current folder.
     fn from_str(text: &str) -> Result<EnvironmentDescription, String> {
         let own = EnvironmentName::ALL.into_iter().find(|name| name.name() == text);
         if let Some(name) = own {
@@ -124,7 +124,6 @@ impl FromStr for EnvironmentDescription {
 /// Examples of colors in messages.
 const COLOR: &str = "such as white, #ff8000 or 1,0.2,0 (linear)";
 
-/// Names of colors, and their hexadecimal forms.
 const COLOR_NAMES: [(&str, &str); 4] = [
     ("black", "#000000"),
     ("gray", "#808080"),
@@ -154,7 +153,6 @@ fn display_of(text: &str) -> Option<DVec3> {
     Some(DVec3::new(component(2), component(1), component(0)))
 }
 
-/// Returns three linear numbers.
 fn linear_of(text: &str) -> Option<DVec3> {
     let numbers: Vec<f64> = text
         .split(',')
@@ -252,7 +250,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         let opaque = path.replace("alpha = true, ", "");
         let clear = with(None, Some(Background::Transparent));
         assert_eq!(found(&opaque, &clear), (Some((light, true, None)), true));
-        // A background is seen where nothing lights, and where what lights was not seen.
+        // Also without an environment, or with an invisible one.
         let dark = "render.integrator = 'path'\n";
         assert_eq!(
             found(dark, &with(None, color(red))),
@@ -269,7 +267,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
             found(&unseen, &with(None, color(red))),
             (Some((light, true, seen)), false)
         );
-        // Direct light has a background of its own.
+        // Phong uses `render.background`.
         let scene = load("render.background = [1, 2, 3]\n", &with(None, color(red))).unwrap();
         assert_eq!((scene.render.background.to_array(), scene.environment), (red, None));
     }
@@ -347,7 +345,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
             assert!(matches!(error, SceneError::Override(_)), "{error}");
             assert!(error.to_string().starts_with(wanted), "{error}: {wanted}");
         }
-        // What the file says is its own.
+        // Errors in values of the file name the file.
         let error = told(
             &format!("{path}materials.a = {{ type = 'glass', ior = 0 }}\n"),
             Some("sky"),

@@ -1,30 +1,30 @@
-//! A camera that moves: what it is like at any frame.
+//! Animated cameras.
 
 use glam::DVec3;
 
 use super::spline::{Key, value};
 use super::{CameraDescription, CameraKeyDescription, Interpolation};
 
-/// How a scene's camera moves.
+/// The path of a scene's camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
-    /// What has no keys is as here.
+    /// Values without keys.
     still: CameraDescription,
     interpolation: Interpolation,
     position: Vec<Key<DVec3>>,
     look_at: Vec<Key<DVec3>>,
     up: Vec<Key<DVec3>>,
-    /// Field of view in degrees, or the height that is seen.
+    /// Field of view in degrees, or height in scene units.
     extent: Vec<Key<f64>>,
     aperture: Vec<Key<f64>>,
     focus_distance: Vec<Key<f64>>,
     frames: (f64, f64),
-    /// The file and the line that it is in, if it is in one.
+    /// Scene file and line.
     pub(crate) place: Option<(String, usize)>,
 }
 
 impl CameraPath {
-    /// The path of a camera whose keys have been checked; `None` if there is none, or it has no keys.
+    /// Returns the path of a validated camera, or `None` without keys.
     pub(super) fn of(camera: &CameraDescription) -> Option<CameraPath> {
         let path = camera.path()?;
         let (first, last) = (path.keys.first()?, path.keys.last()?);
@@ -47,17 +47,16 @@ impl CameraPath {
         })
     }
 
-    /// The frames of the first and of the last key. Before and after these the camera stands.
+    /// Returns the frames of the first and of the last key. The camera is constant before and after these.
     pub fn frames(&self) -> (f64, f64) {
         self.frames
     }
 
-    /// Says where it is in a file, for messages.
     pub(super) fn set_place(&mut self, origin: &str, line: usize) {
         self.place = Some((origin.to_owned(), line));
     }
 
-    /// The camera at a frame, not checked.
+    /// Returns the camera at a frame, not validated.
     pub(crate) fn description(&self, frame: f64) -> CameraDescription {
         let mut camera = self.still.clone();
         let at = |keys: &[Key<f64>]| value(keys, frame, self.interpolation);
@@ -65,7 +64,7 @@ impl CameraPath {
             CameraDescription::Perspective(c) => {
                 c.fov = at(&self.extent).unwrap_or(c.fov);
                 if let Some(aperture) = at(&self.aperture) {
-                    (c.aperture, c.f_number) = (Some(aperture), None); // whichever says how wide the lens is
+                    (c.aperture, c.f_number) = (Some(aperture), None); // either key sets the lens diameter
                 }
                 c.focus_distance = at(&self.focus_distance).or(c.focus_distance);
                 (&mut c.position, &mut c.look_at, &mut c.up)

@@ -1,5 +1,5 @@
-//! Scene files in JSON, as a course on path tracing has them: `docs/scene-format.md` has their keys. They become a
-//! [`Description`] like any other, with +Z up, where theirs is +Y.
+//! Scene files in JSON, in the format of a path tracing course (keys: `docs/scene-format.md`), converted from +Y up to
+//! a [`Description`] with +Z up.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use super::{
     SamplesDescription, Scale, Up, parse,
 };
 
-/// The largest file in bytes: what is made of it takes many times its memory.
+/// Maximum size of a file in bytes. The parsed values need many times as much memory.
 const LARGEST: usize = 4 << 20;
 
 #[derive(Deserialize)]
@@ -79,7 +79,7 @@ struct Object {
     translate: DVec3,
     #[serde(default = "one")]
     scale: f64,
-    /// A hint: every mesh has a tree of boxes.
+    /// Ignored: all meshes have a BVH.
     #[serde(default, rename = "has_bvh")]
     _has_bvh: bool,
 }
@@ -88,8 +88,8 @@ fn one() -> f64 {
     1.0
 }
 
-/// The folder that the files it names must lie in, if nothing else is said: the one that has the scene's own folder, as
-/// they are named `../assets/...`.
+/// Returns the default of the folder that must contain all files of a scene: the parent of the scene's folder, because
+/// the files are named `../assets/...`.
 pub fn asset_root(folder: &Path) -> PathBuf {
     let folder = match folder.as_os_str().is_empty() {
         true => Path::new("."),
@@ -100,7 +100,6 @@ pub fn asset_root(folder: &Path) -> PathBuf {
     parent.map_or_else(|| folder.join(".."), Path::to_owned)
 }
 
-/// Reads the text of a file; `origin` is its name in messages.
 pub fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Description, SceneError> {
     let course = read_json(text, defines).map_err(|broken| match broken {
         Broken::Values(problems) => {
@@ -121,11 +120,10 @@ pub fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Descripti
     Ok(description(&course))
 }
 
-/// Returns the error of a text whose description has problems, or which has them itself.
 pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) -> SceneError {
     let problems = problems.map(|problem| Problem {
         key: key_in_file(text, &problem.key, defines),
-        // The type has another name in the file.
+        // The file names the type "specular".
         message: problem.message.replace("\"conductor\"", "\"specular\""),
         ..problem
     });
@@ -140,20 +138,17 @@ pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) 
     problems.into_error(|problem| begin(text, &problem.key), invalid)
 }
 
-/// What is wrong with a text.
+/// Reason why a text cannot be read.
 enum Broken {
-    /// With the text as JSON.
     Text(serde_json::Error, KeyPath),
-    /// With the types of values, or keys.
+    /// Invalid types or keys.
     Values(Problems),
-    /// With its length.
     Large,
 }
 
-/// Returns the error of a text that is not JSON.
 fn text_error(text: &str, origin: &str, error: serde_json::Error, key: KeyPath) -> SceneError {
     let (line, bytes) = (error.line().max(1), error.column());
-    // It counts bytes.
+    // serde_json counts columns in bytes.
     let before = text.lines().nth(line - 1).unwrap_or_default().as_bytes();
     let before = &before[..bytes.saturating_sub(1).min(before.len())];
     let column = String::from_utf8_lossy(before).chars().count() + 1;
@@ -201,7 +196,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
         .put(&[], &mut table, |_| false)
         .map_err(|problem| Broken::Values(problem.into()))?;
     let in_json = |problem: Problem| {
-        // It is told in TOML's words.
+        // It is worded for TOML.
         let shown = find(text, &problem.key).filter(|value| value.starts_with('{'));
         let message = match (problem.message.rsplit_once(" must be "), shown) {
             (Some((_, rule)), Some(shown)) => format!("{} must be {rule}", cut(&one_line(shown))),
@@ -217,7 +212,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
     parse::read_for(table, Integrator::Path).map_err(|problems| Broken::Values(problems.map(in_json)))
 }
 
-/// Checks what is not told in the file's own numbers once it is turned.
+/// Validates values whose errors must show the numbers of the file, which the conversion to +Z up changes.
 fn check(course: &Course) -> Result<(), Problems> {
     let Course {
         cam_config,
@@ -226,7 +221,8 @@ fn check(course: &Course) -> Result<(), Problems> {
         objects,
         ..
     } = course;
-    // +z, which the file may name, is not the default `up` here.
+    // `validate_frame`, because a vertical view is only allowed for the default `up`, +Z, which is not the default of
+    // these files.
     let mut found = Collector::default();
     found.values(camera(cam_config).validate_frame().map_err(Problems::from).at("camera"));
     found.value(light(&self::rectangle(light_config).into()).at(0).at("lights"));
@@ -246,7 +242,7 @@ fn check(course: &Course) -> Result<(), Problems> {
     found.end(())
 }
 
-/// A camera in the file's coordinates.
+/// Returns the camera in the coordinates of the file.
 fn camera(camera: &Camera) -> super::CameraDescription {
     let mut described = PerspectiveDescription::new(camera.position, camera.look_at, camera.vertical_fov);
     described.up = camera.ref_up;
@@ -254,12 +250,12 @@ fn camera(camera: &Camera) -> super::CameraDescription {
     described.into()
 }
 
-/// A light in the file's coordinates.
+/// Returns the light in the coordinates of the file.
 fn rectangle(light: &Light) -> RectangleLightDescription {
     RectangleLightDescription::new(light.position, light.size, DVec3::NEG_Y, DVec3::X, light.radiance)
 }
 
-/// A vector with +Y up as one with +Z up: what [`Up::Y`] does to meshes.
+/// Converts a vector from +Y up to +Z up, like [`Up::Y`] for meshes.
 fn turned(v: DVec3) -> DVec3 {
     DVec3::new(v.x, -v.z, v.y)
 }
@@ -314,7 +310,7 @@ fn description(course: &Course) -> Description {
     scene
 }
 
-/// The path in the file of a value that is at a path of its description. A path of the file stays.
+/// Returns the path in the file for a path in its description. Paths of the file are returned unchanged.
 fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
     let renamed = |segment: &Segment| match segment {
         Segment::Key(key) => Segment::from(match key.as_str() {
@@ -369,7 +365,7 @@ fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
     })
 }
 
-/// The text of the value at a path; of the innermost one that is there if it is not.
+/// Returns the text of the value at a path, or of its innermost ancestor that exists.
 fn find<'a>(text: &'a str, path: &KeyPath) -> Option<&'a str> {
     let whole: &RawValue = serde_json::from_str(text).ok()?;
     let mut value = whole.get();
@@ -392,12 +388,12 @@ fn find<'a>(text: &'a str, path: &KeyPath) -> Option<&'a str> {
     Some(value)
 }
 
-/// The byte where the value at a path begins.
+/// Returns the byte offset of a value.
 fn begin(text: &str, path: &KeyPath) -> usize {
     find(text, path).map_or(0, |value| value.as_ptr() as usize - text.as_ptr() as usize)
 }
 
-/// Line and column, counted from 1, of a byte.
+/// Returns line and column, from 1, of a byte offset.
 fn place(text: &str, at: usize) -> (usize, usize) {
     let before = text.get(..at).unwrap_or_default();
     let line = before.rsplit('\n').next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Image files to texels, within limits that are known from a file's header before anything is decoded.
+//! Decoder of image files, with limits that are checked against the header before any texel is decoded.
 
 mod gray_exr;
 
@@ -13,19 +13,19 @@ use self::gray_exr::gray_exr;
 use super::ktx2::{self, Ktx2};
 use super::texture::{Image, Texels};
 
-/// Most texels along a side.
+/// Maximum number of texels along a side.
 pub(super) const LONGEST_SIDE: u32 = 16_384;
-/// What a decoder may take beside the image, in bytes: rows, tables, the parts of a compressed file.
+/// Memory limit of a decoder besides the image, in bytes: rows, tables and parts of a compressed file.
 const BESIDE: usize = 64 << 20;
 
-/// What the values of an image may take, in bytes, and how many more for a byte of its file; decoders take as much again beside them. A small file may be an
-/// image of 16,384 x 16,384 zeros.
+/// Limit of the decoded values in bytes, and its increase per byte of the file; decoders use as much again. A small
+/// file may be an image of 16,384 x 16,384 zeros.
 const LARGEST: (u64, u64) = (256 << 20, 32);
 
-/// What texels that an EXR file shows and does not store may take, in bytes, beside as many for a byte of the file.
+/// Limit in bytes of the texels that an EXR file displays but does not store; it increases with the file size like
+/// [`LARGEST`].
 const BLANK: u64 = 64 << 20;
 
-/// A format of image files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     /// A format of the crate `image`.
@@ -45,7 +45,7 @@ const FORMATS: [(Format, &str); 6] = [
 ];
 
 impl Format {
-    /// Returns the format of a file, by its first bytes, or `None` if it is not supported.
+    /// Returns the format by the first bytes of a file, or `None` if it is not supported.
     pub fn of(bytes: &[u8]) -> Option<Format> {
         let format = match bytes.starts_with(ktx2::IDENTIFIER) {
             true => Format::Ktx2,
@@ -55,7 +55,7 @@ impl Format {
         is_supported.then_some(format)
     }
 
-    /// Returns the format that the ending of a file's name stands for, supported or not.
+    /// Returns the format of an extension, supported or not.
     pub fn of_name(file: &str) -> Option<Format> {
         let ending = Path::new(file).extension()?;
         match ending.eq_ignore_ascii_case("ktx2") {
@@ -64,24 +64,23 @@ impl Format {
         }
     }
 
-    /// Returns the name of the format.
     pub fn name(self) -> &'static str {
         let found = FORMATS.iter().find(|(known, _)| *known == self);
         found.map_or("unknown", |(_, name)| name)
     }
 }
 
-/// What a header says.
+/// The values of a header that the limits depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub width: u32,
     pub height: u32,
-    /// Whether its values have more than 8 bits.
+    /// True if the values have more than 8 bits.
     pub is_deep: bool,
 }
 
 impl Header {
-    /// The header that an image in memory would have in a file.
+    /// Returns the header of an image in memory.
     pub fn of(image: &Image) -> Header {
         Header {
             width: image.width,
@@ -91,25 +90,23 @@ impl Header {
     }
 }
 
-/// Why an image is refused.
+/// Reason for rejecting an image.
 pub(super) enum Refused {
-    /// By its decoder.
     Image(ImageError),
-    /// By a rule, which is told.
+    /// A violated rule of the caller.
     Rule(String),
-    /// By a rule that is told behind its name.
+    /// A violated size limit; the message follows the file's name.
     Large(String),
-    /// By a rule of its format, to be printed after its name.
+    /// A violated rule of the format; the message follows the file's name.
     Damaged(String),
-    /// It has other channels than those that are read.
     Channels(Channels),
 }
 
-/// What an EXR file has that is not read.
+/// The channels of an EXR file without supported ones.
 pub(super) struct Channels {
-    /// The channels of all its layers.
+    /// The names in all layers.
     pub names: Vec<String>,
-    /// Whether their pixels hold any number of values each.
+    /// True if the pixels have any number of values per channel ("deep" data).
     pub are_deep: bool,
 }
 
@@ -138,7 +135,7 @@ impl IntoError for LimitErrorKind {
     }
 }
 
-/// Decodes an image, once `fits` has nothing against its header. The result has the file's own type of values.
+/// Decodes an image if `fits` accepts its header. The result has the value type of the file.
 pub(super) fn decode(
     bytes: &[u8],
     format: Format,
@@ -151,7 +148,7 @@ pub(super) fn decode(
     if format == ImageFormat::Png {
         return decode_png(bytes, fits);
     }
-    // The texels that the layers of an EXR file store. What they show may be fewer, and may be more.
+    // Texels stored by the layers of an EXR file. The display window may have fewer or more.
     let stored = Cell::new(0);
     if format == ImageFormat::OpenExr
         && let Some(image) = gray_exr(
@@ -185,7 +182,7 @@ pub(super) fn decode(
     Ok(DynamicImage::from_decoder(decoder)?)
 }
 
-/// Refuses an image whose values take far more than its file has bytes.
+/// Rejects an image that is too large for the size of its file.
 fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Result<(), Refused> {
     let bytes = u64::from(width) * u64::from(height) * bytes_of_texel;
     let length = file.len() as u64;
@@ -198,7 +195,7 @@ fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Resul
     }
 }
 
-/// Refuses an EXR file whose window shows far more than it stores: what is blank costs such a file no bytes at all.
+/// Rejects an EXR file with too many texels that are not stored and do not add to its size.
 fn weigh_blank(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), Refused> {
     let blank = (u64::from(width) * u64::from(height)).saturating_sub(stored);
     let (bytes, length) = (blank * 3 * size_of::<f32>() as u64, file.len() as u64);
@@ -232,14 +229,15 @@ fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Res
     file.decode().map_err(Refused::Damaged)
 }
 
-/// By the PNG library itself: it can pass over colour profiles and texts, whose decompressed size no header tells.
+/// Uses the PNG crate directly: it can skip color profiles and texts, whose decompressed size is unknown before
+/// decoding.
 fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, Refused> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);
     options.set_ignore_iccp_chunk(true);
     let mut decoder = png::Decoder::new_with_options(Cursor::new(bytes), options);
     decoder.set_limits(png::Limits { bytes: BESIDE });
-    decoder.set_transformations(png::Transformations::EXPAND); // palettes to colours, fewer bits to 8
+    decoder.set_transformations(png::Transformations::EXPAND); // palettes to colors, fewer than 8 bits to 8
     let info = decoder.read_header_info()?;
     let (width, height) = (info.width, info.height);
     let is_deep = info.bit_depth == png::BitDepth::Sixteen;

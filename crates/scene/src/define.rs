@@ -1,4 +1,4 @@
-//! Values in place of those of a scene file, by the keys that the file has: `shapes[2].radius=0.5`.
+//! Overrides of values of a scene file by key: `shapes[2].radius=0.5`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -14,10 +14,10 @@ use super::problem::At as _;
 use super::problem::{Problem, Problems};
 use super::suggest;
 
-/// A value for a key of a scene file: `KEY=VALUE`.
+/// An override of the value of a key: `KEY=VALUE`.
 ///
-/// `KEY` is a path from the top of the file, `render.seed`, `materials."dark red".color`, `shapes[2].radius` or
-/// `shapes.2.radius`; elements of lists are counted from 0. `VALUE` is TOML; what is none is a text, so that it needs no quotes.
+/// `KEY` is a path from the top of the file, such as `render.seed`, `materials."dark red".color`, `shapes[2].radius` or
+/// `shapes.2.radius`; list indices start at 0. `VALUE` is TOML; other text is a string without quotes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Define {
     key: KeyPath,
@@ -25,11 +25,11 @@ pub struct Define {
 }
 
 impl Define {
-    /// A value for a key.
+    /// Parses a key and a value.
     ///
     /// # Errors
     ///
-    /// A key that is no path, no value, and values that begin as TOML but are none.
+    /// An invalid path, an empty value, and a value that starts like TOML but is not.
     pub fn new(key: &str, value: &str) -> Result<Define, Problem> {
         let (path, rest) = read_key(key, unreadable)?;
         match rest {
@@ -58,7 +58,7 @@ impl FromStr for Define {
 }
 
 impl Define {
-    /// Whether the value stands in for that of a key of the file, for a part of it or for what it is a part of.
+    /// Returns true if the override sets this key, a part of it or a table around it.
     pub(super) fn stands_in_for(&self, key: &KeyPath) -> bool {
         self.key.0.iter().zip(&key.0).all(|(own, step)| is_step(own, step))
     }
@@ -84,7 +84,7 @@ fn unreadable(text: &str) -> Problem {
 }
 
 impl Problems {
-    /// Returns the error of the first value that a define brought.
+    /// Returns the error of the first problem that an override caused.
     pub(super) fn of_define(&self, defines: &Defines) -> Option<SceneError> {
         let problem = self.iter().find(|problem| defines.brought(&problem.key))?;
         Some(SceneError::Override(problem.clone().at("define")))
@@ -94,7 +94,7 @@ impl Problems {
 impl FromStr for KeyPath {
     type Err = Problem;
 
-    /// A path as a scene file has it: `materials."dark red".color`, `shapes[2].radius`.
+    /// Parses a path in the syntax of a scene file: `materials."dark red".color`, `shapes[2].radius`.
     fn from_str(text: &str) -> Result<KeyPath, Problem> {
         match read_key(text, no_path)? {
             (path, "") => Ok(path),
@@ -107,18 +107,18 @@ fn no_path(text: &str) -> Problem {
     Problem::new(format!("{} must be a path, such as shapes[2].radius", cut(text)))
 }
 
-/// Maximum number of segments of a path, which is the nesting limit of a file.
+/// Maximum number of segments of a path: the nesting limit of a file.
 const MAX_SEGMENTS: usize = 80;
 
 fn too_deep(text: &str) -> Problem {
     Problem::new(format!("{} must have at most {MAX_SEGMENTS} steps", cut(text)))
 }
 
-/// The path at the start of a text, and what is behind it: nothing, or what begins with `=`. What is told of another text is
-/// `unreadable`.
+/// Parses the path at the start of a text. Returns it and the rest, which is empty or starts with `=`. `unreadable`
+/// makes the error.
 fn read_key(text: &str, unreadable: fn(&str) -> Problem) -> Result<(KeyPath, &str), Problem> {
     let mut path = Vec::new();
-    // What may come next: a name, and what stands between names.
+    // The tokens that are valid next: a name, or a separator of names.
     let (mut name, mut between) = (true, false);
     let mut rest = "";
     let mut tokens = Source::new(text).lex();
@@ -167,7 +167,7 @@ fn index(text: &str) -> Option<usize> {
     text.parse().ok().filter(|_| digits)
 }
 
-/// Parses a TOML value, or a string without quotes. A text that starts like a list, table or quoted string must be one.
+/// Parses a TOML value, or a string without quotes. Text that starts like a list, table or quoted string must be one.
 fn read_value(text: &str) -> Result<Value, String> {
     let text = text.trim();
     if text.is_empty() {
@@ -187,19 +187,18 @@ fn read_value(text: &str) -> Result<Value, String> {
     }
 }
 
-/// Defined values that are inserted while a file is parsed. Their paths are kept, so that messages attribute errors to them.
+/// Overrides that are applied while a file is parsed. Their paths are kept to attribute errors to them.
 pub(super) struct Defines<'a> {
     given: &'a [Define],
-    /// Those that have been put, or could not be.
+    /// Applied and failed ones.
     put: Vec<Put>,
 }
 
 struct Put {
-    /// Index among the given values.
     number: usize,
-    /// The key, with numbers where lists are.
+    /// The key, with indices for list elements.
     path: Vec<Segment>,
-    /// How much of the key is not the file's: what is behind it was made for it.
+    /// Length of the path of the outermost table or value that the override created or replaced.
     own: usize,
 }
 
@@ -208,17 +207,16 @@ impl<'a> Defines<'a> {
         Defines { given, put: Vec::new() }
     }
 
-    /// The same values, none of them put.
     pub fn anew(&self) -> Defines<'a> {
         Defines::new(self.given)
     }
 
-    /// Forgets what was put: the file is read once more.
+    /// Resets the state to read the file again.
     pub fn restart(&mut self) {
         self.put.clear();
     }
 
-    /// Returns true if the value of this key, or of a table around it, was defined.
+    /// Returns true if an override set the value of this key or of a table around it.
     pub fn brought(&self, key: &KeyPath) -> bool {
         let key = key.0.as_slice();
         self.put.iter().any(|put| {
@@ -228,8 +226,8 @@ impl<'a> Defines<'a> {
         })
     }
 
-    /// Puts all values into a table that is at a path of the file, of those that belong there: with an empty path those that no
-    /// part takes.
+    /// Applies the overrides that belong to the table at this path; with an empty path, those for which `is_elsewhere`
+    /// is false.
     pub fn put(
         &mut self,
         at: &[Segment],
@@ -263,7 +261,6 @@ impl<'a> Defines<'a> {
         Ok(())
     }
 
-    /// The problem of a key that leads to nothing.
     pub fn not_there(&mut self, key: &KeyPath) -> Problem {
         self.put.push(Put {
             number: self.given.len(),
@@ -273,7 +270,7 @@ impl<'a> Defines<'a> {
         about(key, "does not exist".to_owned())
     }
 
-    /// A key that no table of the file took.
+    /// Returns a key that was not applied to any table.
     pub fn left(&self) -> Option<&'a KeyPath> {
         let is_put = |number: usize| self.put.iter().any(|put| put.number == number);
         let mut left = self.given.iter().enumerate().filter(|(number, _)| !is_put(*number));
@@ -281,7 +278,7 @@ impl<'a> Defines<'a> {
     }
 }
 
-/// Returns true if a segment of a key is this one; an index may be written as a name.
+/// Compares segments; an index may be written as a name.
 fn is_step(written: &Segment, step: &Segment) -> bool {
     match (written, step) {
         (Segment::Key(name), Segment::Index(number)) => index(name) == Some(*number),
@@ -289,14 +286,15 @@ fn is_step(written: &Segment, step: &Segment) -> bool {
     }
 }
 
-/// Returns true if the value at a path is a number of samples, which stands for a table.
+/// Returns true if the value at a path is a sample count, which is short for a table.
 fn is_samples(path: &[Segment]) -> bool {
     let names = ["pixel_samples", "light_samples"];
     matches!(path, [Segment::Key(section), Segment::Key(key)] if section == "render" && names.contains(&key.as_str()))
 }
 
-/// Puts a value into a tree. Tables on the way are made where there are none, but for what has names of its own. Adds to `path`
-/// where it went, or how far; gives how much of that is no table that was there.
+/// Sets a value in a tree of tables and lists. Creates missing tables, except named textures, materials and meshes.
+/// Appends the path of the value, or of the failure, to `path`. Returns the length of the path of the outermost created
+/// table, or else of the value.
 fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
     let mut own = None;
     let mut value = root;
@@ -410,7 +408,6 @@ radius = 0.5
         parse(SCENE, &[define]).unwrap_err().to_string()
     }
 
-    /// The scene with another text in place of one that is there once.
     fn edited(from: &str, to: &str) -> Scene {
         assert_eq!(SCENE.matches(from).count(), 1, "{from}");
         parse(&SCENE.replace(from, to), &[]).unwrap()
@@ -472,7 +469,6 @@ radius = 0.5
             ..Overrides::default()
         };
         assert_eq!(Scene::parse_with(SCENE, "s.toml", &overrides).unwrap().render.seed, 8);
-        // A material may be made, then used.
         let made = parse(SCENE, &["materials.new={type=\"mirror\"}", "shapes[0].material=new"]).unwrap();
         assert_eq!(made.material_names[made.shapes[0].material], "new");
     }
@@ -536,7 +532,7 @@ radius = 0.5
                 told(define)
             );
         }
-        // What the file brings is the file's.
+        // Errors in values of the file name the file.
         let bad = SCENE.replace("radius = 0.5", "radius = -1");
         let message = parse(&bad, &["shapes[0].radius=2", "camera.fov=50"])
             .unwrap_err()

@@ -1,4 +1,4 @@
-//! Images that textures name: files, found, decoded within limits, and checked; and images in memory.
+//! Images of textures: files, which are located, decoded within limits and validated, and images in memory.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,38 +18,37 @@ use super::texture::{Encoding, Image, Texels};
 use crate::mesh::{Mesh, in_other_case};
 use wgray_image::color::srgb_to_linear;
 
-/// The largest file, in bytes.
+/// Maximum size of a file in bytes.
 const LARGEST_FILE: u64 = 512 << 20;
-/// The largest texel, as of any colour.
+/// Maximum component of a texel, as of all colors.
 const BRIGHTEST: f32 = 1e6;
 
-/// Where the images that a scene names are.
+/// Locations of the images and meshes of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assets {
-    /// The folder that images' names are relative to, that of the scene file.
+    /// Folder of the scene file, which file names are relative to.
     pub folder: PathBuf,
-    /// The folder that images must lie in.
+    /// Folder that must contain all files.
     pub root: PathBuf,
-    /// Files that may lie elsewhere, by the absolute names that the scene has for them.
+    /// Files outside of it, by the absolute paths in the scene.
     pub elsewhere: BTreeSet<PathBuf>,
-    /// Images in memory by their names: a texture that names one of them as its file has it, and no file is read.
+    /// Images in memory by name. A texture uses one instead of a file of this name.
     pub images: BTreeMap<String, Arc<Image>>,
-    /// Image files in memory, as they would be on a disk, by their names.
+    /// Encoded image files in memory by name.
     pub encoded: BTreeMap<String, Arc<[u8]>>,
-    /// The longest side of what is kept of those, in texels: larger ones are halved until they are no longer than it.
+    /// Maximum side in texels of images in `encoded`; larger ones are halved until they fit.
     pub longest_side: Option<u32>,
-    /// Image files that are missing, by the names that textures have for them, with the reason.
+    /// Missing image files by the names in textures, with the reason.
     pub(super) absent: BTreeMap<String, String>,
-    /// Meshes in memory by their names.
+    /// Meshes in memory by name.
     pub meshes: BTreeMap<String, Arc<Mesh>>,
-    /// Whether damage to a file is an error. Otherwise it is a warning, and a stand-in is rendered.
+    /// If true, damage to a file is an error; otherwise it is a warning and a placeholder is rendered.
     pub strict: bool,
 }
 
-/// A place that an image comes from.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Place {
-    /// A file, without links.
+    /// A canonical path.
     File(PathBuf),
     /// An image of [`Assets::images`].
     Memory(String),
@@ -58,14 +57,14 @@ pub(super) enum Place {
 }
 
 impl Default for Assets {
-    /// Files in the current folder, and no images in memory.
+    /// Returns the assets of the current folder, without images in memory.
     fn default() -> Self {
         Assets::beside(Path::new("."))
     }
 }
 
 impl Assets {
-    /// Files in a folder, and no images in memory.
+    /// Returns the assets of a folder, without images in memory.
     pub fn beside(folder: &Path) -> Assets {
         let folder = match folder.as_os_str().is_empty() {
             true => Path::new("."),
@@ -84,7 +83,7 @@ impl Assets {
         }
     }
 
-    /// Returns the warning about damage to a file, which names the stand-in for what is missing.
+    /// Returns the warning about damage to a file, with its placeholder.
     ///
     /// # Errors
     ///
@@ -96,8 +95,7 @@ impl Assets {
         }
     }
 
-    /// Takes an image from memory. `encoding` is what its values should mean, if that is said; `fits` is asked before it is
-    /// looked at. The error is the value with the rule.
+    /// Returns an image in memory. `encoding`, if given, must be that of the image; `fits` checks the header first. The error is the value with the violated rule.
     fn image_in_memory(
         &self,
         name: &str,
@@ -137,8 +135,8 @@ impl Assets {
         })
     }
 
-    /// Reads an image. `encoding` is what its values mean, if that is said; `fits` is asked before anything is decoded. The
-    /// error is the value with the rule.
+    /// Reads an image; `fits` checks the header before anything is decoded. The error is the value with the violated
+    /// rule.
     pub(super) fn image(
         &self,
         file: &str,
@@ -228,7 +226,7 @@ impl Assets {
         inside.unwrap_or(file)
     }
 
-    /// Where an image is.
+    /// Returns the location of an image.
     pub(super) fn find(&self, file: &str) -> Result<Place, Problem> {
         if let Some(why) = self.absent.get(file) {
             return Err(Problem::damage(why));
@@ -293,7 +291,7 @@ fn in_range(name: &str, image: &Image) -> Result<(), String> {
     Ok(())
 }
 
-/// Clamps the values of texels that no image has. Returns what was wrong with them, if anything was.
+/// Clamps invalid texels. Returns their description, or `None`.
 fn clamp(image: &mut Image) -> Option<String> {
     let Texels::Floats(values) = &mut image.texels else {
         return None;
@@ -319,25 +317,23 @@ fn clamp(image: &mut Image) -> Option<String> {
     }
 }
 
-/// A file that was read, or an image that was in memory.
 #[derive(Clone)]
 pub(super) struct File {
     pub image: Arc<Image>,
-    /// None if its name says none, as in memory.
+    /// `None` in memory, where names do not determine the format.
     format: Option<Format>,
     default: Encoding,
     encoding: Encoding,
     is_alpha: bool,
-    /// Bad texels of the file, which were clamped.
     pub damage: Option<String>,
 }
 
-/// What is taken of a file.
+/// The part of an image that a texture uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
-    /// Its colours, with what their values mean if that is said.
+    /// Colors, in this encoding if given.
     Colors(Option<Encoding>),
-    /// Its alpha, as gray.
+    /// Alpha, as gray.
     Alpha,
 }
 
@@ -351,12 +347,12 @@ impl Part {
 }
 
 impl File {
-    /// Whether it is this part of what another texture names, by another name perhaps.
+    /// Returns true if this is the given part of the file.
     pub fn is(&self, part: Part) -> bool {
         self.is_alpha == (part == Part::Alpha) && part.encoding().unwrap_or(self.default) == self.encoding
     }
 
-    /// Refuses a name that says another format.
+    /// Rejects a name with the extension of another format.
     pub fn check_name(&self, file: &str) -> Result<(), String> {
         self.format.map_or(Ok(()), |format| check_name(file, format))
     }
@@ -375,7 +371,7 @@ fn check_name(file: &str, format: Format) -> Result<(), String> {
 fn read(file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
     let mut bytes = Vec::new();
     let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
-    // What says so at once is not read.
+    // Most large files are rejected without reading them.
     if fs::metadata(path).is_ok_and(|data| data.len() > LARGEST_FILE) {
         return Err(too_large());
     }
@@ -392,7 +388,7 @@ fn unreadable(file: &str, error: &io::Error) -> String {
     format!("{file:?} cannot be read: {error}")
 }
 
-/// What is told of an image that is not decoded, behind its name.
+/// Returns the message about an invalid image, without its name.
 fn refused_image(error: &ImageError) -> String {
     match error {
         ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
@@ -404,7 +400,7 @@ fn refused_image(error: &ImageError) -> String {
     }
 }
 
-/// What is told of an EXR file that has no channels to be read, behind its name.
+/// Returns the message about an EXR file without supported channels, without its name.
 fn refused_channels(channels: &Channels) -> String {
     match channels.are_deep {
         true => "must have one value for each pixel and channel; it is deep".to_owned(),
@@ -442,7 +438,7 @@ fn texels(image: DynamicImage, is_float: bool, encoding: Encoding) -> Texels {
     Texels::Bytes(encoding, bytes)
 }
 
-/// The alpha of an image that has it, as gray.
+/// Returns the alpha channel as gray, if there is one.
 fn alpha(image: DynamicImage) -> Option<Texels> {
     if !image.color().has_alpha() {
         return None;

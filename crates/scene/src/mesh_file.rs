@@ -1,4 +1,4 @@
-//! Mesh files that scenes name: each is read once, and kept as long as any scene has it.
+//! Cache of the mesh files in use.
 
 use std::collections::HashMap;
 use std::fs;
@@ -8,7 +8,7 @@ use std::time::SystemTime;
 
 use crate::mesh::{Mesh, MeshError, Normals};
 
-/// What tells two readings of a file apart.
+/// File version and options.
 #[derive(PartialEq, Eq, Hash)]
 struct Key {
     path: PathBuf,
@@ -17,27 +17,27 @@ struct Key {
     normals: Option<Normals>,
 }
 
-/// Length and time of change of a file, if it is there.
+/// Length and modification time.
 type Stamp = Option<(u64, SystemTime)>;
 
-/// A mesh, and its files of materials as they were.
+/// A mesh, and the stamps of its MTL files.
 struct Known {
     mesh: Weak<Mesh>,
     libraries: Vec<Stamp>,
 }
 
-/// The meshes that are in use. So a scene that is read again, as by the development mode, has the trees that are built.
+/// Scenes that are reloaded in development mode reuse BVHs.
 static IN_USE: Mutex<Option<HashMap<Key, Known>>> = Mutex::new(None);
 
-/// Reads a mesh, unless it is in use and neither its file nor its files of materials have changed.
+/// Reads a mesh, unless it is in use and its files have not changed.
 pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
     let Some(key) = key(path, normals) else {
-        return Mesh::load(path, normals).map(Arc::new); // which says what is wrong with the file
+        return Mesh::load(path, normals).map(Arc::new); // reports the error
     };
     if let Some(mesh) = known(&key) {
         return Ok(mesh);
     }
-    // Not under the lock: reading is done by all threads, and one of them may have come here for another scene.
+    // Not under the lock: reading uses all threads, one of which may be here for another scene.
     let read = Arc::new(Mesh::load(path, normals)?);
     let libraries = libraries(&read);
     if let Some(mesh) = known(&key) {
@@ -49,7 +49,7 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
     Ok(read)
 }
 
-/// The mesh, if it is in use and its files of materials are as they were.
+/// Returns the mesh if in use and its MTL files have not changed.
 fn known(key: &Key) -> Option<Arc<Mesh>> {
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     let in_use = in_use.get_or_insert_default();
@@ -91,13 +91,13 @@ mod tests {
         fs::write(&path, SMALL).unwrap();
         let first = load(&path, None).unwrap();
         assert!(Arc::ptr_eq(&first, &load(&path, None).unwrap()));
-        // Other normals are another mesh.
+        // Other normals: another mesh.
         let flat = load(&path, Some(Normals::Flat)).unwrap();
         assert!(!Arc::ptr_eq(&first, &flat));
         let smooth = load(&path, Some(Normals::Smooth)).unwrap();
         assert_eq!((smooth.normals.len(), flat.normals.len()), (3, 0));
         assert!(Arc::ptr_eq(&first, &load(&path, None).unwrap()));
-        // Another file of the same bytes too.
+        // A copy is another mesh.
         let copy = folder.path().join("b.obj");
         fs::copy(&path, &copy).unwrap();
         assert!(!Arc::ptr_eq(&first, &load(&copy, None).unwrap()));
@@ -108,7 +108,6 @@ mod tests {
         use rayon::prelude::*;
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<PathBuf> = (0..32).map(|i| folder.path().join(format!("{i}.obj"))).collect();
-        // So large that all threads read it.
         let many = SMALL.replace("1 2 3", "-3 -2 -1").repeat(2000);
         files.iter().for_each(|file| fs::write(file, &many).unwrap());
         let read = files.par_iter().chain(&files).map(|file| load(file, None).unwrap());
@@ -139,7 +138,7 @@ mod tests {
         let path = folder.path().join("a.obj");
         fs::write(&path, SMALL).unwrap();
         let first = load(&path, None).unwrap();
-        // Another length.
+        // A different length.
         fs::write(&path, format!("{SMALL}v 0 0 1\nf 1 2 4\n")).unwrap();
         let second = load(&path, None).unwrap();
         assert_eq!((first.triangles.len(), second.triangles.len()), (1, 2));
@@ -151,7 +150,7 @@ mod tests {
         let third = load(&path, None).unwrap();
         assert_eq!(third.positions[3].z, 5.0);
         assert_eq!(second.positions[3].z, 1.0);
-        // A file that is gone, or wrong by now, is told although its mesh is in use.
+        // A missing or invalid file is an error even if in use.
         fs::write(&path, "v 0 0 0\n").unwrap();
         assert!(load(&path, None).is_err());
         fs::remove_file(&path).unwrap();

@@ -1,4 +1,4 @@
-//! A validated scene: what the file describes, with every name resolved and every value in range.
+//! A validated scene: all names are resolved and all values are in range.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,45 +14,44 @@ use crate::note::Note;
 use crate::texture::{Color, Image, NormalMap, Texture, Value};
 use wgray_image::ViewSettings;
 
-/// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
+/// A validated scene. Lengths have no unit, colors are linear RGB, and angles are in radians.
 ///
-/// Its fields are there to be read. A scene that is edited is not checked again, and may end a render in a panic: edit the
-/// [`Description`](crate::Description), and validate that.
+/// The fields are meant to be read: an edited scene is not validated again, and rendering it may panic. Edit and
+/// validate the [`Description`](crate::Description) instead.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Scene {
-    /// Width of the picture in pixels, 1 to 65,536.
+    /// Width of the image in pixels, 1 to 65,536.
     pub width: u32,
-    /// Height of the picture in pixels, 1 to 65,536.
+    /// Height of the image in pixels, 1 to 65,536.
     pub height: u32,
-    /// How it is shown.
+    /// Display settings.
     pub view: ViewSettings,
-    /// Where the picture is seen from.
+    /// The camera.
     pub camera: Camera,
-    /// How the camera moves from frame to frame, if it does; [`Scene::camera_at`] has it at a frame.
+    /// Animation of the camera; [`Scene::camera_at`] evaluates it at a frame.
     pub camera_path: Option<CameraPath>,
-    /// How it is rendered.
+    /// Render settings.
     pub render: Render,
-    /// The textures that materials name by index: those of the scene file in the order of their names, then those of MTL files.
+    /// Textures, which materials refer to by index: those of the scene file by name, then those of MTL files.
     pub textures: Vec<Texture>,
-    /// The materials that shapes name by index: those of the scene file in the order of their names, then those that meshes
-    /// bring in MTL files.
+    /// Materials, which shapes refer to by index: those of the scene file by name, then those of MTL files.
     pub materials: Vec<Material>,
-    /// The materials' names.
+    /// Names of the materials.
     pub material_names: Vec<String>,
-    /// What surrounds the scene, where that shines. Under [`Integrator::Phong`] there is none.
+    /// The environment, if it emits light; `None` under [`Integrator::Phong`].
     pub environment: Option<Environment>,
-    /// The lights, in file order.
+    /// Lights, in file order.
     pub lights: Vec<Light>,
-    /// The shapes, in file order, and then the instances of meshes, in theirs.
+    /// Shapes in file order, then instances of meshes in file order.
     pub shapes: Vec<Shape>,
-    /// How many of the shapes are instances, the last ones.
+    /// Number of instances, at the end of the shapes.
     pub instances: usize,
-    /// The files that the scene is made of, in order: its textures' images, meshes, and what these name.
+    /// All files of the scene, sorted: images, meshes and the files that these name.
     pub files: Vec<PathBuf>,
-    /// Warnings about the scene and its meshes: `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
+    /// Warnings: `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
-    /// The glTF files, as long as what was made of them is in use.
+    /// Imported glTF files, kept alive by the scene.
     pub imported: Vec<Arc<Imported>>,
 }
 
@@ -60,19 +59,19 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Camera {
-    /// The centre of projection; for an orthographic camera the middle of the image plane.
+    /// Center of projection; for an orthographic camera, the center of the image plane.
     pub position: DVec3,
-    /// What is in the middle of the picture.
+    /// Point at the center of the image.
     pub look_at: DVec3,
-    /// Unit vector to the right in the picture.
+    /// Unit vector to the right of the image.
     pub right: DVec3,
-    /// Unit vector upwards in the picture.
+    /// Unit vector to the top of the image.
     pub up: DVec3,
     /// Unit vector into the scene.
     pub forward: DVec3,
-    /// How points are projected.
+    /// The projection.
     pub projection: Projection,
-    /// Its lens, if it has one: perspective cameras alone do.
+    /// The lens; only for perspective cameras.
     pub lens: Option<Lens>,
 }
 
@@ -80,78 +79,78 @@ pub struct Camera {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Lens {
-    /// Radius of the opening, that of its corners if it has any, in scene units.
+    /// Radius of the aperture, or of its corners, in scene units.
     pub radius: f64,
-    /// Distance of the plane that is sharp, along the view, in scene units.
+    /// Distance of the plane in focus, along the view direction, in scene units.
     pub focus: f64,
-    /// Corners of the opening, 3 to 16; 0 if it is round.
+    /// Number of corners of the aperture, 3 to 16; 0 if it is round.
     pub blades: u32,
-    /// In radians, how far the corners are turned to the left, as seen in the picture; at 0 one is at the top.
+    /// Rotation of the corners in radians, counter-clockwise in the image. At 0, one is at the top.
     pub rotation: f64,
 }
 
-/// How a camera projects.
+/// The projection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// All rays start at the camera's position.
+    /// Perspective projection.
     Perspective {
         /// Vertical field of view in radians, in (0, pi).
         fov: f64,
     },
-    /// All rays are parallel.
+    /// Orthographic projection.
     Orthographic {
-        /// Height of the seen rectangle in scene units.
+        /// Height of the image plane in scene units.
         height: f64,
     },
-    /// The picture shows all directions: longitude from left to right, latitude from the top down.
+    /// All directions: longitude from left to right, latitude from top to bottom.
     Panorama,
 }
 
-/// The settings of a render.
+/// Render settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Render {
-    /// What light is simulated.
+    /// Light transport algorithm.
     pub integrator: Integrator,
-    /// The ambient light that every Phong material reflects by its ambient colour; black under [`Integrator::Path`].
+    /// Ambient light of Phong materials; black under [`Integrator::Path`].
     pub ambient: DVec3,
-    /// Radiance of rays that leave the scene; under [`Integrator::Path`] that of the environment.
+    /// Radiance of rays that leave the scene; under [`Integrator::Path`], that of the environment.
     pub background: DVec3,
-    /// How far above a surface rays start at least, relative to the largest coordinate there.
+    /// Minimum offset of ray origins above a surface, relative to the largest coordinate there.
     pub shadow_epsilon: f64,
-    /// Whether glass casts shadows; under [`Integrator::Path`] always [`Shadows::Opaque`].
+    /// Shadows of glass; [`Shadows::Opaque`] under [`Integrator::Path`].
     pub shadows: Shadows,
-    /// Most bounces of a path. Under [`Integrator::Phong`] those by mirrors and glass, 1 to 64; under [`Integrator::Path`] all
-    /// of them, 0 to 1024: with 0 only what shines is seen, with 1 direct light too.
+    /// Maximum number of bounces of a path: under [`Integrator::Phong`], by mirrors and glass, 1 to 64; under
+    /// [`Integrator::Path`], all, 0 to 1024: 0 is emission only, 1 adds direct light.
     pub max_depth: u32,
-    /// From which bounce on a path may end at random, 0 to 1024. For [`Integrator::Path`] alone.
+    /// First bounce with Russian roulette, 0 to 1024; only for [`Integrator::Path`].
     pub rr_depth: u32,
-    /// The largest component of what one sample of indirect light, of two bounces or more, may add to a pixel's sample:
-    /// greater than 0, to 1e6. For [`Integrator::Path`] alone.
+    /// Maximum component of a sample's indirect light (two bounces or more), greater than 0, to 1e6; only for
+    /// [`Integrator::Path`].
     pub clamp: Option<f64>,
-    /// Whether the background is transparent in the picture. For [`Integrator::Path`] alone.
+    /// Transparent background; only for [`Integrator::Path`].
     pub alpha: bool,
-    /// Whether textures are filtered over the footprint of each ray, or at its point alone.
+    /// If true, textures are filtered over the footprint of each ray; otherwise they are sampled at a point.
     pub ray_differentials: bool,
     /// Seed of all random patterns.
     pub seed: u32,
-    /// Samples of every pixel's area.
+    /// Samples per pixel.
     pub pixel_samples: Samples,
-    /// Samples of every area light, at every hit; without effect under [`Integrator::Path`].
+    /// Samples per area light and hit; unused under [`Integrator::Path`].
     pub light_samples: Samples,
-    /// What a pixel's samples are weighted by.
+    /// Reconstruction filter.
     pub filter: PixelFilter,
-    /// Further samples of the pixels whose error is large; then `pixel_samples` are those of one round.
+    /// Adaptive sampling; `pixel_samples` are then those of one round.
     pub adaptive: Option<Adaptive>,
 }
 
-/// A set of sample positions on the unit square.
+/// A set of sample positions in the unit square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Samples {
-    /// How they are laid out.
+    /// Layout of the samples.
     pub pattern: Pattern,
-    /// How many, 1 to 65,536; a square for patterns of n x n cells.
+    /// Number of samples, 1 to 65,536; a square number for patterns of n x n cells.
     pub count: u32,
 }
 
@@ -159,9 +158,9 @@ pub struct Samples {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Adaptive {
-    /// The standard error of a pixel's displayed value that is aimed at, 0 to 1.
+    /// Target standard error of a pixel's displayed value, 0 to 1.
     pub error: f64,
-    /// The most samples of a pixel, from the count of [`Render::pixel_samples`] to 65,536.
+    /// Maximum number of samples per pixel, from the count of [`Render::pixel_samples`] to 65,536.
     pub max_samples: u32,
 }
 
@@ -169,57 +168,57 @@ pub struct Adaptive {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct PixelFilter {
-    /// Its form.
+    /// Shape of the filter.
     pub kind: PixelFilterKind,
-    /// How far it reaches along x and y, in pixels, 0.01 to 16.
+    /// Radius along x and y in pixels, 0.01 to 16.
     pub radius: f64,
 }
 
-/// What surrounds a scene, infinitely far away.
+/// The environment: radiance from infinitely far away.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Environment {
-    /// The radiance that comes from everywhere; black beside an image.
+    /// Constant radiance; black with an image.
     pub color: DVec3,
-    /// What shines from each direction, if it is not the same from everywhere.
+    /// Environment map.
     pub image: Option<EnvironmentImage>,
-    /// Whether the camera sees it. What mirrors or refracts shows it in either case.
+    /// Visible to the camera. Reflections and refractions show it in either case.
     pub visible: bool,
-    /// What the camera sees in its place, if that is something else.
+    /// Radiance that the camera sees instead.
     pub background: Option<DVec3>,
 }
 
-/// An equirectangular image around a scene: without a turn its middle is towards +x, its left and right edges towards -x, its
-/// upper edge towards +z.
+/// An equirectangular environment map. Without rotation its center is towards +x, its left and right edges towards -x,
+/// and its upper edge towards +z.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct EnvironmentImage {
-    /// The texels; radiance is bilinear between their centres.
+    /// Texels; radiance is interpolated bilinearly between their centers.
     pub image: Arc<Image>,
     /// Factor of the radiance.
     pub scale: f64,
-    /// How it is turned.
+    /// Rotation.
     pub to_world: DMat3,
 }
 
-/// A surface's appearance.
+/// A surface material.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Material {
-    /// What it does to light that arrives.
+    /// Reflection and transmission.
     pub reflection: Reflection,
-    /// The radiance that it sends out by itself, on both sides; black under [`Integrator::Phong`].
+    /// Emitted radiance, on both sides; black under [`Integrator::Phong`].
     pub emission: Color,
-    /// What bends its normals.
+    /// Normal map.
     pub normal_map: Option<NormalMap>,
-    /// Whether the camera sees it. Its rays go through what it does not see; all other rays do not.
+    /// Visible to the camera. If false, only camera rays pass through.
     pub visible: bool,
 }
 
-/// What a surface does to light that arrives.
+/// The BSDF of a material.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reflection {
-    /// Phong's reflection model.
+    /// Phong reflection model.
     Phong {
         /// Factor of the ambient light.
         ambient: Color,
@@ -230,104 +229,104 @@ pub enum Reflection {
         /// Exponent of the specular term, greater than 0.
         shininess: f64,
     },
-    /// A mirror.
+    /// A perfect mirror.
     Mirror {
         /// Factor of the reflected light.
         tint: Color,
     },
-    /// Clear glass, by Fresnel's equations.
+    /// Clear glass, by the Fresnel equations.
     Glass {
-        /// Index of refraction of what is on the side away from the outward normal, relative to the other side.
+        /// Index of refraction on the side opposite to the outward normal, relative to the other side.
         ior: f64,
-        /// Factor of the light that passes the surface, on the way in and on the way out.
+        /// Factor of the transmitted light, on entry and on exit.
         tint: Color,
     },
-    /// A surface that is equally bright from everywhere if it is smooth. For [`Integrator::Path`] alone, as all below.
+    /// A diffuse surface; this and all following only for [`Integrator::Path`].
     Diffuse {
-        /// The share of the light that it reflects, 0 to 1.
+        /// Albedo, 0 to 1.
         color: Color,
-        /// How rough it is, 0 to 1.
+        /// Roughness, 0 to 1.
         roughness: Value,
     },
     /// Metal.
     Conductor {
-        /// The share of the light that it reflects, 0 to 1; white where it has an index of refraction.
+        /// Reflectance, 0 to 1; white with an index of refraction.
         color: Color,
-        /// Its complex index of refraction; without one it reflects the same share at every angle.
+        /// Complex index of refraction; without it the reflectance does not depend on the angle.
         index: Option<MetalIndex>,
-        /// How rough it is.
+        /// Roughness.
         facets: Facets,
     },
-    /// Clear glass or liquid, by Fresnel's equations.
+    /// Clear glass or liquid, by the Fresnel equations.
     Dielectric {
-        /// Index of refraction of what is on the side away from the outward normal, relative to the other side.
+        /// Index of refraction on the side opposite to the outward normal, relative to the other side.
         ior: f64,
-        /// Factor of the light that passes the surface, on the way in and on the way out, 0 to 1.
+        /// Factor of the transmitted light, on entry and on exit, 0 to 1.
         color: Color,
-        /// How much light it swallows on the way through it, for each unit of length: of every component x, exp(-x) is left
-        /// after a length of 1.
+        /// Absorption coefficient x per unit of length: the transmittance over a length of 1 is exp(-x).
         absorption: DVec3,
-        /// Whether it is a thin sheet, behind which all is as before it.
+        /// True for a thin sheet with the same medium on both sides.
         thin: bool,
-        /// How rough it is.
+        /// Roughness.
         facets: Facets,
     },
     /// glTF's metallic-roughness material with its extensions.
     Principled(Box<Principled>),
 }
 
-/// The material `principled`: of every number the range is 0 to 1, if nothing else is said.
+/// The material `principled`. Numbers are from 0 to 1 unless noted otherwise.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Principled {
-    /// The share of light that a dielectric's ground spreads, or a metal reflects head-on; 0 to 1.
+    /// Albedo of the dielectric's diffuse base, or reflectance of the metal at normal incidence; 0 to 1.
     pub base_color: Color,
-    /// How much of it is metal.
+    /// Metallic weight.
     pub metallic: Value,
-    /// How rough it is: the square root of GGX's alpha.
+    /// Roughness: the square root of GGX's alpha.
     pub roughness: Value,
-    /// How much rougher it is along the tangent.
+    /// Increase of the roughness along the tangent.
     pub anisotropy: Value,
-    /// The tangent's angle, counter-clockwise in radians.
+    /// Rotation of the tangent, counter-clockwise in radians.
     pub anisotropy_rotation: f64,
-    /// Index of an image whose red and green, from 0 to 1 as -1 to 1, are the tangent along u and v that is turned so.
+    /// Index of the image of the tangent before that rotation: red and green, 0 to 1 for -1 to 1, are its components
+    /// along u and v.
     pub anisotropy_direction: Option<usize>,
     /// Index of refraction of the dielectric, 1 to 100.
     pub ior: f64,
-    /// Factor of what the dielectric reflects.
+    /// Factor of the dielectric's reflection.
     pub specular: Value,
-    /// Factor of what it reflects head-on.
+    /// Factor of that reflection at normal incidence.
     pub specular_color: Color,
-    /// How much of the dielectric's light passes the surface.
+    /// Fraction of the dielectric's light that is transmitted.
     pub transmission: Value,
-    /// Whether the surface is a thin sheet, which bends no light.
+    /// True for a thin sheet, which does not refract.
     pub thin: bool,
-    /// How much light is swallowed behind a surface that is not thin, for each unit of length: 0 to 1e6.
+    /// Absorption coefficient behind a surface that is not thin, per unit of length: 0 to 1e6.
     pub absorption: DVec3,
-    /// How much there is of a clear coat.
+    /// Weight of the clear coat.
     pub clearcoat: Value,
-    /// How rough that is.
+    /// Roughness of the clear coat.
     pub clearcoat_roughness: Value,
-    /// What bends the coat's normals.
+    /// Normal map of the clear coat.
     pub clearcoat_normal_map: Option<NormalMap>,
-    /// The colour of the sheen of cloth, 0 to 1.
+    /// Color of the sheen, 0 to 1.
     pub sheen_color: Color,
-    /// How rough the sheen is.
+    /// Roughness of the sheen.
     pub sheen_roughness: Value,
-    /// How much of the surface there is.
+    /// Opacity.
     pub alpha: Value,
-    /// What `alpha` does.
+    /// Effect of `alpha`.
     pub alpha_mode: AlphaMode,
-    /// The least alpha of what is there, under [`AlphaMode::Mask`].
+    /// Minimum alpha of opaque points, under [`AlphaMode::Mask`].
     pub alpha_cutoff: f64,
-    /// What the colours of a mesh's vertices are factors of.
+    /// Use of a mesh's vertex colors.
     pub vertex_colors: VertexColors,
-    /// Whether the camera sees its back. All else does.
+    /// If false, back faces are invisible to the camera, but not to other rays.
     pub double_sided: bool,
 }
 
 impl Material {
-    /// The textures that it looks up.
+    /// Returns the indices of the material's textures.
     pub fn textures(&self) -> Vec<usize> {
         let (mut colors, mut values, mut maps) = (vec![&self.emission], Vec::new(), vec![&self.normal_map]);
         let mut direction = None;
@@ -366,7 +365,8 @@ impl Material {
         colors.chain(values).chain(maps).chain(direction).collect()
     }
 
-    /// Whether it has a direction along the surface beside that of its normal map: that of facets, or of the map of a coat.
+    /// Returns true if the material needs a tangent other than that of its normal map: for anisotropy, or a clear
+    /// coat's normals.
     pub fn has_direction(&self) -> bool {
         match &self.reflection {
             Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,
@@ -379,12 +379,12 @@ impl Material {
 }
 
 impl Principled {
-    /// The colours.
+    /// Returns all colors.
     pub fn colors(&self) -> [&Color; 3] {
         [&self.base_color, &self.specular_color, &self.sheen_color]
     }
 
-    /// The numbers that may come from textures.
+    /// Returns all scalar values that may be textures.
     pub fn values(&self) -> [&Value; 9] {
         [
             &self.metallic,
@@ -400,22 +400,22 @@ impl Principled {
     }
 }
 
-/// How rough a surface of small facets is.
+/// Roughness of a microfacet surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Facets {
-    /// 0 to 1; the facets' alpha is its square.
+    /// Roughness, 0 to 1; the square root of alpha.
     pub roughness: Value,
-    /// How much rougher the surface is along its first axis, 0 to 1.
+    /// Increase of the roughness along the first axis, 0 to 1.
     pub anisotropy: f64,
-    /// How far that axis is turned from the direction of the texture's u towards that of its v, in degrees.
+    /// Rotation of that axis from the direction of u towards that of v, in degrees.
     pub rotation: f64,
-    /// Whether light that bounces between facets is given back.
+    /// Compensate the energy loss by multiple scattering between microfacets.
     pub compensated: bool,
 }
 
 impl Default for Facets {
-    /// None: polished.
+    /// A smooth surface.
     fn default() -> Self {
         Facets {
             roughness: Value::Plain(0.0),
@@ -426,45 +426,45 @@ impl Default for Facets {
     }
 }
 
-/// A source of light.
+/// A light source.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
-    /// A rectangle that casts no shadow under [`Integrator::Phong`]: both of its sides shine, seen by the camera as its plain
-    /// colour. Under [`Integrator::Path`] the side of its normal, u x v, shines, and it hides what is behind it.
+    /// An area light. Under [`Integrator::Phong`] it emits from both sides, casts no shadow, and the camera sees its
+    /// plain color. Under [`Integrator::Path`] it emits from the side of its normal, u x v, and occludes.
     Rectangle {
-        /// Its place and size.
+        /// Position and size.
         rectangle: Parallelogram,
-        /// Its colour: under [`Integrator::Path`] its radiance.
+        /// Color; under [`Integrator::Path`], the radiance.
         color: DVec3,
-        /// Whether the camera sees it; mirrors do.
+        /// Visible to the camera; always visible to mirrors.
         visible: bool,
     },
-    /// A point, not seen by the camera.
+    /// A point light, invisible to the camera.
     Point {
-        /// Where it is.
+        /// Position.
         position: DVec3,
-        /// Its colour: under [`Integrator::Path`] its intensity, power for each unit of solid angle, which falls off with the
-        /// square of the distance; else without falloff.
+        /// Color. Under [`Integrator::Path`], the intensity (power per unit solid angle) with inverse-square falloff;
+        /// otherwise without falloff.
         color: DVec3,
     },
-    /// Light from infinitely far away, not seen by the camera.
+    /// A directional light, invisible to the camera.
     Directional {
-        /// Unit vector in which the light travels.
+        /// Unit vector of propagation.
         direction: DVec3,
-        /// Its colour: under [`Integrator::Path`] the irradiance of a surface that faces it.
+        /// Color; under [`Integrator::Path`], the irradiance of a perpendicular surface.
         color: DVec3,
     },
-    /// A cone of light from one point, not seen by the camera.
+    /// A spot light, invisible to the camera.
     Spot {
-        /// Where it is.
+        /// Position.
         position: DVec3,
-        /// Unit vector in which the middle of its light travels.
+        /// Unit vector of the axis, away from the light.
         direction: DVec3,
-        /// Its colour in the middle, as that of a point.
+        /// Color on the axis, like that of a point light.
         color: DVec3,
-        /// The angle between the middle and the edge in radians, greater than 0, to pi.
+        /// Angle between axis and edge of the cone in radians, greater than 0, to pi.
         cone: f64,
-        /// The angle up to which it is as bright as in the middle, 0 to `cone`.
+        /// Angle from the axis where the falloff starts, 0 to `cone`.
         inner: f64,
     },
 }

@@ -1,5 +1,5 @@
-//! The JSON Schema of scene files, made of the very types that read them (`description/`) and of the limits that their values are
-//! checked by (`limits.rs`).
+//! The JSON Schema of scene files, derived from the types that parse them (`description/`) and the limits that
+//! validation uses (`limits.rs`).
 
 pub(crate) mod fields;
 
@@ -11,10 +11,10 @@ use super::description::tagged::Tagged as _;
 use super::description::tagged_schema::definition;
 use super::{CameraDescription, Description};
 
-/// A JSON Schema of the draft 2020-12 that scene files in TOML keep, for editors to complete and check them by.
+/// Returns a JSON Schema (draft 2020-12) of scene files in TOML, for completion and validation in editors.
 ///
-/// What it refuses the program refuses. The program knows more rules: those of several values together, such as a camera that looks at
-/// its own position, and of what names refer to.
+/// All files that it rejects are invalid. It omits rules for several values together, such as a camera that looks at
+/// its own position, and for the targets of names.
 pub fn schema() -> String {
     let mut schema = of_files();
     without_kinds(&mut schema);
@@ -23,9 +23,9 @@ pub fn schema() -> String {
     format!("{schema:#}\n")
 }
 
-/// The schema, in which values have their kinds as titles.
+/// Returns the schema, with the kinds of values as titles.
 fn of_files() -> Value {
-    // Editors that do not look beside a reference see all that is said in its place.
+    // Inlined, because editors ignore descriptions next to a reference.
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings
         .into_generator()
@@ -36,7 +36,7 @@ fn of_files() -> Value {
     schema
 }
 
-/// Takes the kinds away, which descriptions tell.
+/// Removes the kinds, which descriptions contain.
 fn without_kinds(schema: &mut Value) {
     match schema {
         Value::Array(all) => all.iter_mut().for_each(without_kinds),
@@ -48,7 +48,7 @@ fn without_kinds(schema: &mut Value) {
     }
 }
 
-/// A camera is perspective if it does not say what it is, and what it does not say may be in the keys of its path.
+/// Without `type` a camera is perspective, and required keys may be in the keys of its path.
 fn of_camera(schema: &mut Value) {
     let camera = &mut schema["properties"]["camera"];
     camera["properties"]["type"]["default"] = json!(CameraDescription::DEFAULT);
@@ -73,8 +73,8 @@ fn of_camera(schema: &mut Value) {
     }
 }
 
-/// Goes through a schema: says in every description what the values may be and what stands for an absent one; takes away what JSON
-/// has and TOML has not, and what only Rust knows.
+/// Adds kinds, ranges and defaults to all descriptions, and removes features of JSON that TOML lacks and formats of
+/// Rust.
 fn finish(schema: &mut Value) {
     match schema {
         Value::Array(all) => all.iter_mut().for_each(finish),
@@ -100,7 +100,7 @@ fn finish(schema: &mut Value) {
     }
 }
 
-/// TOML has no null.
+/// Removes null, which TOML lacks.
 fn without_null(schema: &mut Value) {
     let null = json!("null");
     let types = schema.get_mut("type");
@@ -132,7 +132,7 @@ fn without_null(schema: &mut Value) {
     }
 }
 
-/// Names that each have a description become a list, which all editors know.
+/// Converts names with a description each to a list, which all editors support.
 fn names(schema: &mut Value) {
     let Some(all) = schema.as_object_mut() else { return };
     let Some(Value::Array(list)) = all.get("oneOf") else {
@@ -151,7 +151,7 @@ fn names(schema: &mut Value) {
     all.insert("enumDescriptions".to_owned(), Value::Array(told));
 }
 
-/// Puts what its kind says behind a description.
+/// Appends the kind of a value to its description.
 fn tell_kind(schema: &mut Value) {
     let Some(all) = schema.as_object_mut() else { return };
     let mut told = match all.get("description") {
@@ -179,14 +179,14 @@ fn tell_kind(schema: &mut Value) {
     }
 }
 
-/// The most keys of a table that is told as a default.
+/// Maximum number of keys of a table that is shown as a default.
 const MOST_SAID: usize = 3;
 
-/// Puts what stands for an absent key behind its description.
+/// Appends the default to a description.
 fn tell_default(property: &mut Value) {
     let Some(all) = property.as_object_mut() else { return };
     match (all.get("default"), all.get("description")) {
-        // A whole section, each key of which tells its own.
+        // A section, whose keys have their own defaults.
         (Some(Value::Object(table)), _) if table.is_empty() || table.len() > MOST_SAID => {
             all.remove("default");
         }
@@ -201,7 +201,7 @@ fn tell_default(property: &mut Value) {
     }
 }
 
-/// A value as a scene file has it.
+/// Formats a value as in a scene file.
 fn toml_of(value: &Value) -> String {
     match value {
         Value::Object(table) => {

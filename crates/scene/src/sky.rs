@@ -1,10 +1,10 @@
-//! A clear sky with a sun, as an image around a scene, by a formula: sunlight that the air scatters once, in layers that are flat.
+//! The environment `sky`: an analytic clear sky with a sun, by single scattering in a flat atmosphere.
 //!
-//! Air takes light from a ray by its molecules (Hansen and Travis, "Light Scattering in Planetary Atmospheres", Space Science Reviews 16,
-//! 1974, equation 2.30) and by haze (Ångström's formula, with the turbidity as in Preetham, Shirley and Smits, "A Practical Analytic Model
-//! for Daylight", SIGGRAPH 1999, appendix A.1). How much air there is in a direction is by Kasten and Young, "Revised Optical Air Mass Tables
-//! and Approximation Formula", Applied Optics 28, 1989. Of what is scattered out of the sun's beam a certain share comes down: what scattering once
-//! does not bring of that is added where the air is thick.
+//! Extinction is by molecules (Hansen and Travis, "Light Scattering in Planetary Atmospheres", Space Science Reviews
+//! 16, 1974, equation 2.30) and by haze (Ångström's formula, with the turbidity as in Preetham, Shirley and Smits, "A
+//! Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix A.1). The air mass is by Kasten and Young, "Revised
+//! Optical Air Mass Tables and Approximation Formula", Applied Optics 28, 1989. A fixed fraction of the scattered
+//! sunlight comes down; what single scattering lacks of it is added in proportion to the opacity of the air.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,38 +12,38 @@ use glam::{DVec3, Vec3};
 
 use super::texture::{Image, Texels};
 
-/// Of the image.
+/// Size of the environment map in texels.
 const WIDTH: usize = 2048;
 const HEIGHT: usize = 1024;
-/// The wavelengths that stand for red, green and blue, in micrometres.
+/// Wavelengths of red, green and blue in micrometers.
 const WAVELENGTHS: DVec3 = DVec3::new(0.68, 0.55, 0.44);
-/// Irradiance of a surface that faces the sun above the air: so a white floor at noon has a radiance of about 1.
+/// Extraterrestrial irradiance at normal incidence: a white floor at noon has a radiance of about 1.
 const ABOVE_AIR: f64 = 4.0;
-/// Half the angle in which the sun is seen.
+/// Angular radius of the sun.
 const SUN_RADIUS: f64 = 0.2666 * PI / 180.0;
-/// The share of light that haze scatters of what it takes, and how much forwards: Henyey and Greenstein's g.
+/// Single-scattering albedo of haze, and its asymmetry g (Henyey-Greenstein).
 const HAZE_ALBEDO: f64 = 0.9;
 const HAZE_FORWARD: f64 = 0.75;
-/// The shares of scattered light that come down, of molecules and of haze, which scatters most of it forwards.
+/// Fractions of scattered light that come down: of molecules, and of haze, which scatters mostly forwards.
 const MOLECULES_DOWN: f64 = 0.5;
 const HAZE_DOWN: f64 = 0.8;
-/// The share of light that the ground reflects.
+/// Albedo of the ground.
 const GROUND: f64 = 0.25;
-/// Points along each side of a texel that tell how much of it the sun covers.
+/// Sample points along each side of a texel, for the part that the sun covers.
 const POINTS: usize = 8;
 
-/// A sky: angles in radians.
+/// Parameters of a sky; angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sky {
-    /// The sun above the horizon, 0 to pi / 2.
+    /// Elevation of the sun, 0 to pi / 2.
     pub elevation: f64,
-    /// The sun from +x towards +y.
+    /// Azimuth of the sun, from +x towards +y.
     pub azimuth: f64,
-    /// 1 for clean air, to 10.
+    /// Turbidity, 1 (clean air) to 10.
     pub turbidity: f64,
 }
 
-/// The image of a sky.
+/// Returns the environment map of a sky.
 pub fn sky(sky: &Sky) -> Image {
     let air = Air::of(sky);
     let mut texels = Vec::with_capacity(WIDTH * HEIGHT);
@@ -51,7 +51,7 @@ pub fn sky(sky: &Sky) -> Image {
     let azimuths: Vec<(f64, f64)> = (0..WIDTH)
         .map(|column| azimuth(column as f64 + 0.5).sin_cos())
         .collect();
-    // Of a sky that has no more than single scattering, the irradiance of the ground, and that of what is to be added.
+    // Irradiance of the ground by single scattering, and by the added light at unit scale.
     let (mut once, mut added) = (DVec3::ZERO, DVec3::ZERO);
     for row in &rows {
         let angle = TAU / WIDTH as f64 * ROW * row.sine * row.cosine;
@@ -86,36 +86,36 @@ pub fn sky(sky: &Sky) -> Image {
     }
 }
 
-/// The angle between rows.
+/// Angle between rows.
 const ROW: f64 = PI / HEIGHT as f64;
 
-/// Of a column's place, from the left edge on.
+/// Returns the azimuth of a column, from the left edge.
 fn azimuth(column: f64) -> f64 {
     PI - column * TAU / WIDTH as f64
 }
 
-/// What a ray meets in the air from the ground up.
+/// Properties of the atmosphere.
 struct Air {
-    /// Towards the sun.
+    /// Direction to the sun.
     sun: DVec3,
-    /// How much air there is on the way to it, relative to straight up.
+    /// Air mass towards the sun, relative to the zenith.
     sun_mass: f64,
-    /// The share of the sun's light that comes down straight.
+    /// Transmittance towards the sun.
     through: DVec3,
-    /// Optical depth straight up, and the parts of it that molecules and haze scatter.
+    /// Vertical optical depth, and its scattering parts by molecules and haze.
     depth: DVec3,
     molecules: DVec3,
     haze: DVec3,
 }
 
-/// A row of the image.
+/// A row of the environment map.
 struct Row {
-    /// Of the angle from straight up.
+    /// Sine of the zenith angle.
     sine: f64,
     cosine: f64,
     mass: f64,
     through: DVec3,
-    /// What the air takes of a ray.
+    /// Opacity of the air: 1 - transmittance.
     thickness: DVec3,
 }
 
@@ -138,7 +138,7 @@ impl Air {
         }
     }
 
-    /// At this angle from straight up.
+    /// Returns the row at a zenith angle.
     fn row(&self, angle: f64) -> Row {
         let (sine, cosine) = angle.sin_cos();
         let mass = mass(angle);
@@ -152,8 +152,8 @@ impl Air {
         }
     }
 
-    /// The radiance of sunlight that was scattered once. At the optical depth t the sun's light has gone through t times its mass of air, and what is
-    /// scattered there has the rest times the ray's to go.
+    /// Returns the radiance of sunlight that was scattered once. Sunlight reaches the vertical optical depth t over t
+    /// times its air mass; the scattered light passes the rest times the ray's air mass.
     fn scattered_once(&self, row: &Row, direction: DVec3) -> DVec3 {
         let cosine = direction.dot(self.sun);
         let g = HAZE_FORWARD;
@@ -170,12 +170,12 @@ impl Air {
     }
 }
 
-/// How much air there is at an angle from straight up.
+/// Returns the air mass at a zenith angle.
 fn mass(angle: f64) -> f64 {
     1.0 / (angle.cos() + 0.505_72 * (96.079_95 - angle.to_degrees()).powf(-1.6364))
 }
 
-/// Adds a disc that gives a surface which faces it this irradiance.
+/// Adds the sun as a disk with this irradiance at normal incidence.
 fn add_sun(texels: &mut [DVec3], sun: DVec3, irradiance: DVec3) {
     let nearest = (sun.z.clamp(-1.0, 1.0).acos() / ROW) as usize;
     let reach = (SUN_RADIUS / ROW) as usize + 2;
@@ -183,7 +183,7 @@ fn add_sun(texels: &mut [DVec3], sun: DVec3, irradiance: DVec3) {
     let mut covered = Vec::new();
     let mut all = 0.0;
     for row in nearest.saturating_sub(reach)..(nearest + reach).min(HEIGHT) {
-        // Between the rows of texels radiance is linear in the angle, and between those beside a pole and the pole constant.
+        // Radiance is linear in the angle between rows, and constant from the first or last row to the pole.
         let beside_pole = if row == 0 || row + 1 == HEIGHT {
             13.0 / 12.0
         } else {
@@ -221,8 +221,8 @@ mod tests {
         }
     }
 
-    /// The solid angle that a texel of a row stands for: that of its square, and beside a pole a twelfth more, as the light there is
-    /// constant up to the pole, and then falls off over a row.
+    /// Returns the solid angle of a texel of a row. At a pole it is a twelfth larger, because the radiance is constant
+    /// up to the pole and falls off over a row.
     fn stands_for(row: usize) -> f64 {
         let square = ((row as f64 + 0.5) * ROW).sin() * ROW * TAU / WIDTH as f64;
         if row == 0 || row == HEIGHT - 1 {
@@ -232,7 +232,7 @@ mod tests {
         }
     }
 
-    /// The irradiance of a surface with this normal.
+    /// Returns the irradiance for a normal.
     fn irradiance(image: &Image, normal: DVec3) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for (i, texel) in texels(image).iter().enumerate() {
@@ -259,7 +259,7 @@ mod tests {
                     all.clone().all(|x| (0.0..1e6).contains(x)),
                     "elevation {elevation}, turbidity {turbidity}"
                 );
-                // No more comes down than the sun sends.
+                // The ground receives at most the light of the sun.
                 let sun = f64::to_radians(elevation).sin() * ABOVE_AIR;
                 let down = irradiance(&image, DVec3::Z);
                 assert!(down.max_element() <= sun + 0.1, "{down} of {sun}");
@@ -278,7 +278,7 @@ mod tests {
             };
             let air = Air::of(&asked);
             let image = sky(&asked);
-            // What comes from within twice its radius, on a surface that faces it.
+            // Irradiance at normal incidence from within twice the sun's radius.
             let near: DVec3 = {
                 let mut sum = DVec3::ZERO;
                 for (i, texel) in texels(&image).iter().enumerate() {

@@ -1,12 +1,11 @@
-//! Values between keys: straight from one to the next, or on a curve with a continuous first derivative.
-//!
-//! All is sums, products and quotients of 64-bit floats, so that every machine gets the same bits.
+//! Interpolation between keys, linear or C1-continuous. It only uses sums, products and quotients of 64-bit floats, so
+//! that all machines compute the same bits.
 
 use std::ops::{Add, Mul, Sub};
 
 use super::Interpolation;
 
-/// What keys have: a number or a point.
+/// A value of keys: a number or a point.
 pub trait Point:
     Copy + PartialEq + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
 {
@@ -14,11 +13,11 @@ pub trait Point:
 
 impl<T: Copy + PartialEq + Default + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>> Point for T {}
 
-/// A key: when, and what.
+/// Time and value.
 pub type Key<T> = (f64, T);
 
-/// The value at a time, of keys whose times ascend; `None` without keys. At a key it is the key's own, and outside of all
-/// that of the nearest.
+/// Interpolates keys with ascending times; `None` without keys. At a key the result is exactly its value; outside, it
+/// is that of the nearest key.
 pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -> Option<T> {
     let next = keys.partition_point(|(time, _)| *time <= at);
     let (Some(&a), Some(&b)) = (
@@ -29,21 +28,21 @@ pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -
     };
     let (span, step) = (b.0 - a.0, b.1 - a.1);
     if !(span > 0.0) || at <= a.0 {
-        return Some(a.1); // before the first key, after the last, or at one
+        return Some(a.1); // outside of the keys, or at one
     }
     let s = (at - a.0) / span;
     let (start, end) = match interpolation {
         Interpolation::Linear => return Some(a.1 + step * s),
         Interpolation::Smooth => (slope(keys, next - 1), slope(keys, next)),
     };
-    // The cubic with these values and slopes at its ends (Hermite), as the straight way and what is beside it.
+    // Cubic Hermite segment, as a smoothstep between the values plus the contribution of the slopes.
     let rest = 1.0 - s;
     Some(a.1 + step * (s * s * (3.0 - 2.0 * s)) + (start * rest - end * s) * (span * s * rest))
 }
 
-/// The derivative of the smooth curve at a key: that of the straight way from the key before to the key after (E. Catmull and R.
-/// Rom, "A Class of Local Interpolating Splines", 1974, for any distances of keys in time). At the ends it is what makes the
-/// first and the last piece parabolas. Where two keys in a row have the same value nothing moves between them: the slope is 0.
+/// Returns the derivative of the smooth curve at a key: the secant of its neighbors (E. Catmull and R. Rom, "A Class of
+/// Local Interpolating Splines", 1974, generalized to non-uniform times). At the ends, the slope makes the segment a
+/// parabola. It is 0 next to an equal value, so that nothing moves between equal keys.
 fn slope<T: Point>(keys: &[Key<T>], i: usize) -> T {
     let before = i.checked_sub(1).and_then(|i| keys.get(i));
     let after = keys.get(i + 1);
@@ -55,7 +54,7 @@ fn slope<T: Point>(keys: &[Key<T>], i: usize) -> T {
     }
     match (before, after) {
         (Some(before), Some(after)) => secant(before, after),
-        // A parabola's mean slope between two points is the mean of those at them.
+        // The mean slope of a parabola between two points is the mean of the slopes there.
         (None, Some(after)) if keys.len() > 2 => secant(key, after) * 2.0 - slope(keys, i + 1),
         (Some(before), None) if keys.len() > 2 => secant(before, key) * 2.0 - slope(keys, i - 1),
         (None, Some(after)) => secant(key, after),
@@ -75,7 +74,7 @@ mod tests {
     use super::*;
 
     const WAYS: [Interpolation; 2] = [Interpolation::Linear, Interpolation::Smooth];
-    /// Times and values without any order, but that the times ascend.
+    /// Arbitrary values at ascending, uneven times.
     const KEYS: [Key<f64>; 6] = [
         (-2.0, 3.0),
         (0.5, -1.0),
@@ -115,7 +114,7 @@ mod tests {
         }
     }
 
-    /// What moves evenly, at keys at any times; what falls, at keys at equal times.
+    /// Uniform motion with uneven keys; free fall with even keys.
     #[test]
     fn constant_speeds_and_accelerations_stay() {
         let line = |t: f64| DVec3::new(3.0 - 2.0 * t, t, 0.5);
@@ -139,8 +138,8 @@ mod tests {
         assert!(straightened > 1.0, "no linear way falls so");
     }
 
-    /// By SciPy 1.17: `CubicHermiteSpline(t, v, m)` with `m[1:-1] = (v[2:] - v[:-2]) / (t[2:] - t[:-2])`, and at the ends twice
-    /// the difference quotient less the neighbour's `m`.
+    /// From SciPy 1.17: `CubicHermiteSpline(t, v, m)` with `m[1:-1] = (v[2:] - v[:-2]) / (t[2:] - t[:-2])`, and at the
+    /// ends twice the difference quotient minus the neighbor's `m`.
     #[test]
     fn a_smooth_way_is_that_of_another_implementation() {
         for (time, wanted) in [
@@ -158,7 +157,7 @@ mod tests {
         }
     }
 
-    /// The speeds just before and just after each key.
+    /// Returns the speeds just before and just after each key.
     fn speeds(way: Interpolation) -> Vec<(f64, f64)> {
         let at = |time| value(&KEYS, time, way).unwrap();
         let step = 1e-6;
@@ -185,7 +184,7 @@ mod tests {
                 Some(3.0)
             );
         }
-        // Nor does it swing beyond on the way there.
+        // It does not overshoot before these keys either.
         for i in 0..=40 {
             assert!(value(&keys, f64::from(i) / 10.0, Interpolation::Smooth).unwrap() <= 3.0);
         }

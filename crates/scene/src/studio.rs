@@ -1,4 +1,4 @@
-//! A photographer's studio as an image around a scene, by a formula: grey walls, and rectangular lamps with soft edges.
+//! The environment `studio`: an analytic photo studio with gray walls and rectangular area lights with soft edges.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,27 +7,27 @@ use rayon::prelude::*;
 
 use super::texture::{Image, Texels};
 
-/// Of the image.
+/// Size of the environment map in texels.
 const WIDTH: usize = 1024;
 const HEIGHT: usize = 512;
-/// The radiance of the floor, and of the walls at the height of the eye and overhead.
+/// Radiance of the floor, of the walls at eye level, and of the ceiling.
 const FLOOR: f64 = 0.08;
 const WALL: f64 = 0.14;
 const CEILING: f64 = 0.25;
-/// How wide a lamp's edge is, as a part of a half side.
+/// Width of an emitter's soft edge, relative to half of its side.
 const EDGE: f64 = 0.15;
 
-/// A lamp: a rectangle, one unit away.
+/// A rectangular emitter at a distance of 1.
 struct Lamp {
-    /// The middle.
+    /// Direction of the center.
     towards: DVec3,
-    /// Half its width and half its height.
+    /// Half of the width and of the height.
     half: [f64; 2],
     radiance: f64,
 }
 
-/// The studio. Its main lamp is to the left of who looks along +y, as is its edge; a weaker one to the right, one overhead, and one behind what is
-/// seen.
+/// The emitters for a view along +y: a key light on the left, a weaker fill light on the right, one above, and one
+/// behind the object.
 const LAMPS: [Lamp; 4] = [
     Lamp {
         towards: DVec3::new(-0.75, -0.6, 0.65),
@@ -73,7 +73,7 @@ pub fn studio() -> Image {
 
 fn radiance(lamps: &[Facing], direction: DVec3) -> f64 {
     let z = direction.z;
-    // The floor meets the walls in a wide curve, as a studio's does.
+    // The floor blends smoothly into the walls.
     let room = match z < 0.0 {
         true => WALL + (FLOOR - WALL) * smooth(-3.0 * z),
         false => WALL + (CEILING - WALL) * smooth(z),
@@ -82,7 +82,6 @@ fn radiance(lamps: &[Facing], direction: DVec3) -> f64 {
     lamps.fold(room, f64::max)
 }
 
-/// A lamp with the axes of its rectangle.
 struct Facing {
     axis: DVec3,
     sides: [DVec3; 2],
@@ -107,7 +106,7 @@ impl Lamp {
 }
 
 impl Facing {
-    /// 1 on the lamp, 0 beside it.
+    /// Returns the coverage: 1 inside the emitter, 0 outside.
     fn share(&self, direction: DVec3) -> f64 {
         let ahead = direction.dot(self.axis);
         if ahead <= 0.0 {
@@ -119,7 +118,7 @@ impl Facing {
     }
 }
 
-/// From 0 to 1, without a corner.
+/// Smoothstep.
 fn smooth(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)

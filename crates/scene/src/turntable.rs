@@ -1,4 +1,4 @@
-//! A camera that goes once around what it looks at.
+//! Turntables: camera orbits around the target point.
 
 use std::f64::consts::TAU;
 
@@ -7,11 +7,12 @@ use glam::{DQuat, DVec3};
 use super::problem::Problem;
 use super::{CameraDescription, CameraKeyDescription, CameraPathDescription, Interpolation};
 
-/// The most frames.
+/// Maximum number of frames.
 pub(super) const MOST_FRAMES: u32 = 100_000;
 
-/// The camera with a path of so many frames around what it looks at, counter-clockwise as seen from where up is: frame 1 is where it stands, and
-/// what would come after the last is frame 1 again. Each frame has its own key, so that it lies on the circle.
+/// Replaces the path of a camera by an orbit around its target point, counter-clockwise as seen from `up`. Frame 1 is
+/// the original position; a frame after the last would equal it. Each frame has its own key, to be exactly on the
+/// circle.
 pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraDescription, Problem> {
     if !(1..=MOST_FRAMES).contains(&frames) {
         return Err(Problem::new(format!("{frames} must be from 1 to {MOST_FRAMES}")));
@@ -37,7 +38,7 @@ pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraD
     Ok(camera.clone().with_path(path))
 }
 
-/// A turn by a part of a whole one.
+/// Rotates by a fraction of a full turn.
 fn turned(axis: DVec3, part: f64) -> DQuat {
     DQuat::from_axis_angle(axis.normalize_or(DVec3::Z), part * TAU)
 }

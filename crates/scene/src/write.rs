@@ -1,4 +1,5 @@
-//! Scenes as TOML, in the way that one is written by hand: what has its default is left out, and files are named from where the text will be.
+//! Scenes as TOML in the form of a handwritten file: defaults are omitted, and file names are relative to the new
+//! folder.
 
 use std::io;
 use std::path::{Component, Path};
@@ -8,16 +9,16 @@ use toml::{Table, Value};
 
 use super::{Description, RenderDescription, ShapeDescription, TextureDescription, ViewTransform};
 
-/// What cameras and pictures have if nothing is said.
+/// Defaults of cameras, images, lights and shapes.
 const DEFAULTS: &str = "up = [0.0, 0.0, 1.0]\nfocal_length = 1.0\nblades = 0\nblade_rotation = 0.0\nexposure = 0.0\n\
                         lights = true\nscale = 1.0\nvisible = true\n";
 
 impl Description {
-    /// The text of a scene file that reads back as this description.
+    /// Formats a scene file that parses to this description.
     ///
     /// # Errors
     ///
-    /// Values that TOML has no words for.
+    /// Values that TOML does not support.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         let text = self.sections()?;
         match Description::parse(&text, "") {
@@ -68,11 +69,11 @@ impl Description {
         Ok(sections.join("\n"))
     }
 
-    /// The same scene in another folder: the files that it names are named from there. What are no files here keeps its name.
+    /// Moves the scene to another folder: makes file names relative to it. Names without a file are unchanged.
     ///
     /// # Errors
     ///
-    /// Folders that are not there, and names that are not UTF-8.
+    /// Folders that do not exist, and names that are not UTF-8.
     pub fn in_folder(mut self, before: &Path, folder: &Path) -> io::Result<Description> {
         let here = Path::new(".");
         let whole = |folder: &Path| if folder.as_os_str().is_empty() { here } else { folder }.canonicalize();
@@ -94,7 +95,6 @@ impl Description {
         Ok(self)
     }
 
-    /// The names of all files.
     fn names(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
         names.extend(self.textures.values_mut().filter_map(|texture| match texture {
@@ -116,15 +116,15 @@ impl Description {
     }
 }
 
-/// The keys that a reader looks for first, in this order; all others follow in that of the alphabet.
+/// Keys that come first, in this order; all others follow alphabetically.
 const FIRST: [&str; 5] = ["type", "file", "width", "position", "integrator"];
 
-/// A table of the file, without what the defaults say too.
+/// Formats a section without default values.
 fn section(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
     written(&format!("[{name}]\n"), name, value, defaults, Value::Table)
 }
 
-/// An element of a list of tables.
+/// Formats an element of a list of tables.
 fn element(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
     let list = |table| Value::Array(vec![Value::Table(table)]);
     written(&format!("[[{name}]]\n"), name, value, defaults, list)
@@ -149,7 +149,7 @@ fn written(
     Ok(text + rest.strip_prefix(head).unwrap_or(&rest))
 }
 
-/// The name of a file as seen from a folder, both without links.
+/// Returns the relative path of a file from a folder, both canonical.
 fn from(folder: &Path, path: &Path) -> Option<String> {
     let (folder, path): (Vec<_>, Vec<_>) = (folder.components().collect(), path.components().collect());
     let same = folder.iter().zip(&path).take_while(|(a, b)| a == b).count();
@@ -166,7 +166,7 @@ fn from(folder: &Path, path: &Path) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// Every scene of the project reads back as it was, with its defaults left out.
+    /// Tests that all scenes of the project are unchanged after writing and parsing, with defaults omitted.
     #[test]
     fn texts_read_back_as_the_same_scene() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");

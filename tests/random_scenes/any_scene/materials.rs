@@ -1,4 +1,4 @@
-//! Textures and materials.
+//! Proptest strategies: textures and materials.
 
 use std::collections::BTreeMap;
 
@@ -90,7 +90,7 @@ pub fn material() -> BoxedStrategy<MaterialDescription> {
     prop_oneof![6 => phong, 1 => mirror, 1 => glass].boxed()
 }
 
-/// What paths have more: shines, often; two dark ones among three.
+/// Generates emission, two of three times `None`.
 pub fn emission() -> impl Strategy<Value = Option<ColorDescription>> {
     let texture = select(&["checker", "lines", "constant"][..]).prop_map(str::to_string);
     prop_oneof![
@@ -100,7 +100,7 @@ pub fn emission() -> impl Strategy<Value = Option<ColorDescription>> {
     ]
 }
 
-/// A number from 0 to 1, often an end, or one of a texture's.
+/// Generates 0 to 1, often an end, or a texture channel.
 pub fn share() -> impl Strategy<Value = ValueDescription> {
     let texture = (
         select(&["checker", "lines"][..]).prop_map(str::to_string),
@@ -114,7 +114,7 @@ pub fn share() -> impl Strategy<Value = ValueDescription> {
     ]
 }
 
-/// A principled material with some of its lobes.
+/// Generates principled materials with some lobes.
 pub fn principled() -> impl Strategy<Value = MaterialDescription> {
     let shares = proptest::collection::vec(share(), 8);
     let volume = (select(&[0.0, 1.0][..]), color(1.0), select(&[1.0, 1.3, 1.5, 2.4][..]));
@@ -146,7 +146,7 @@ pub fn principled() -> impl Strategy<Value = MaterialDescription> {
     )
 }
 
-/// A material of any kind, for paths.
+/// Generates any material of `path`.
 pub fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
     let texture = select(&["checker", "lines"][..]).prop_map(str::to_string);
     let roughness = prop_oneof![
@@ -212,5 +212,5 @@ pub fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
             *own = emission;
             material
         })
-        .boxed() // the tree of a strategy that is not is on the stack
+        .boxed() // an unboxed one has its value tree on the stack
 }

@@ -1,4 +1,4 @@
-//! Shapes, meshes and instances of them.
+//! Proptest strategies: shapes, meshes, instances.
 
 use std::collections::BTreeMap;
 
@@ -95,7 +95,7 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
     ]
 }
 
-/// What places a mesh: translate, rotate and scale, or a matrix.
+/// Translate, rotate and scale, or a matrix.
 pub type Placement = (Option<DVec3>, Option<Rotation>, Option<Scale>, Option<Vec<[f64; 4]>>);
 
 pub fn placement() -> impl Strategy<Value = Placement> {
@@ -120,7 +120,7 @@ pub fn up() -> impl Strategy<Value = Up> {
     select(vec![Up::Z, Up::Y, Up::X])
 }
 
-/// Materials of groups that have others than the rest.
+/// Generates materials of mesh groups.
 pub fn materials_of_groups() -> impl Strategy<Value = BTreeMap<String, String>> {
     prop::option::of(select(&["a", "b", "c"][..])).prop_map(|material| {
         let named = material.map(|material| ("second".to_string(), material.to_string()));
@@ -163,7 +163,7 @@ pub fn instance() -> impl Strategy<Value = InstanceDescription> {
     )
 }
 
-/// Meshes for instances, which some scenes have.
+/// Generates mesh files and instances; often none.
 pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>)> {
     let file = || {
         (select(MESHES), normals(), up()).prop_map(|((name, ..), normals, up)| {
@@ -180,8 +180,7 @@ pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>,
     prop_oneof![3 => Just(Default::default()), 1 => some]
 }
 
-/// A few shapes, or so many that they are in a tree. Meshes are few among them, as kernels that walk through trees take seconds
-/// to compile.
+/// Generates a few shapes, or enough for a BVH. Few meshes, as kernels with mesh traversal take seconds to compile.
 pub fn shapes() -> impl Strategy<Value = Vec<ShapeDescription>> {
     let shape = || prop_oneof![9 => shape(), 1 => mesh()];
     let many = MAX_LINEAR_PRIMITIVES + 1..MAX_LINEAR_PRIMITIVES + 20;

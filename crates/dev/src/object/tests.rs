@@ -7,7 +7,6 @@ use crate::edit::edited;
 use wgray_render::pack::pack;
 use wgray_scene::{Draft, Overrides, Scene};
 
-/// A scene as it is looked at.
 fn seen(text: &str, name: &Path, overrides: Overrides) -> SceneView {
     let origin = name.display().to_string();
     let draft = Draft::read(text, &origin, wgray_scene::folder_of(name), &overrides).unwrap();
@@ -24,12 +23,10 @@ fn seen(text: &str, name: &Path, overrides: Overrides) -> SceneView {
     }
 }
 
-/// A scene file's text as a table.
 fn table(text: &str) -> Value {
     Value::Table(toml::from_str(text.trim_start_matches('\u{feff}')).unwrap())
 }
 
-/// A table in which whole numbers are numbers.
 fn plain(value: &Value) -> Value {
     match value {
         Value::Integer(x) => Value::Float(*x as f64),
@@ -39,7 +36,7 @@ fn plain(value: &Value) -> Value {
     }
 }
 
-/// The same table with another value at a path, made where there was none.
+/// Returns a copy with `new` at a path; missing tables are added.
 fn with(whole: &Value, path: &KeyPath, new: &Value) -> Value {
     let mut whole = whole.clone();
     let mut place = &mut whole;
@@ -56,7 +53,7 @@ fn with(whole: &Value, path: &KeyPath, new: &Value) -> Value {
     whole
 }
 
-/// Another value that a field may have.
+/// Returns a valid value that differs from the current one.
 fn another(field: &Field) -> Json {
     let now = field.value.as_ref().or(field.default.as_ref());
     let moved = |now: Option<f64>| {
@@ -93,7 +90,7 @@ fn another(field: &Field) -> Json {
     }
 }
 
-/// Sets every field of every object to its own value and to another one; gives how many.
+/// Sets every field of every object to its own value and to another one. Returns the number of fields.
 fn set_all(seen: &SceneView) -> usize {
     let text = seen.loaded.text.clone();
     let whole = table(&text);
@@ -128,7 +125,7 @@ fn set_all(seen: &SceneView) -> usize {
             let wanted = with(&plain(&whole), &path, &plain(&value));
             assert_eq!(plain(&table(&after)), wanted, "{case}");
             Description::parse(&after, "s.toml").unwrap_or_else(|error| panic!("{error}"));
-            // An absent key goes out again, and with it every byte.
+            // Removing an added key restores every byte.
             if field.value.is_none()
                 && !after.contains(&format!(
                     "[{}]\n",
@@ -235,7 +232,7 @@ fn counts_of_cells_are_squares() {
 #[test]
 fn other_layouts_can_be_set_too() {
     assert!(set_all(&small()) > 60);
-    // The control of the comparisons: another value and another place differ.
+    // Control: `with` changes a table only if the value differs.
     let whole = plain(&table(SCENE));
     let path: KeyPath = "shapes[0].radius".parse().unwrap();
     assert_ne!(with(&whole, &path, &Value::from(0.25)), whole);

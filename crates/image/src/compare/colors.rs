@@ -1,16 +1,16 @@
-//! The colours of two pictures, as measures of what is seen take them.
+//! Colors of two images in the form that perceptual metrics need.
 
 use std::ops::Range;
 
 use super::picture::{Kind, Picture, Plane};
 
-/// The exponent of the curve that linear values are shown by.
+/// Exponent of the display curve of linear values.
 pub const DISPLAY: f64 = 1.0 / 2.2;
 
-/// Red, green and blue of some pixels.
+/// Red, green and blue of a range of pixels.
 pub type Rgb = [Vec<f64>; 3];
 
-/// The colours of two pictures of one size and kind.
+/// Colors of two images of the same size and kind.
 #[derive(Clone, Debug)]
 pub struct Colors<'a> {
     pub width: usize,
@@ -23,7 +23,7 @@ pub struct Colors<'a> {
 #[derive(Clone, Debug)]
 struct Planes<'a> {
     colors: [&'a Plane; 3],
-    /// What colours are not yet weighted by.
+    /// Straight alpha, which the colors are not multiplied by yet.
     alpha: Option<&'a Plane>,
 }
 
@@ -54,7 +54,7 @@ impl<'a> Planes<'a> {
 }
 
 impl<'a> Colors<'a> {
-    /// None if either has no colours.
+    /// Returns `None` if either image has no colors.
     pub fn of(a: &'a Picture, b: &'a Picture) -> Option<Colors<'a>> {
         Some(Colors {
             width: b.width as usize,
@@ -65,7 +65,8 @@ impl<'a> Colors<'a> {
         })
     }
 
-    /// The values of a part of a row in both pictures, over black. What is no finite number in either is 0 in both.
+    /// Returns part of a row of both images, composited over black. Linear values that are not finite in either image
+    /// are 0 in both.
     pub fn values(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
         let pixels = y * self.width + x.start..y * self.width + x.end;
         let (mut a, mut b) = (self.a.values(pixels.clone()), self.b.values(pixels));
@@ -79,7 +80,7 @@ impl<'a> Colors<'a> {
         (a, b)
     }
 
-    /// The same as a screen shows them, from 0 to 1.
+    /// Like `values`, encoded for display: 0 to 1.
     pub fn shown(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
         let (mut a, mut b) = self.values(y, x);
         if self.kind == Kind::Linear {
@@ -90,7 +91,7 @@ impl<'a> Colors<'a> {
         (a, b)
     }
 
-    /// Whether a part of a row is plainly the same in both.
+    /// Returns true if part of a row is known to be equal in both images; see [`Plane::is_plainly`].
     pub fn is_plainly_same(&self, y: usize, x: Range<usize>) -> bool {
         let pixels = y * self.width + x.start..y * self.width + x.end;
         let mut planes = self.a.colors.iter().zip(&self.b.colors);

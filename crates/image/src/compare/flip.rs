@@ -1,7 +1,10 @@
-//! ꟻLIP, how different two pictures look when one flips from one to the other: Andersson, Nilsson, Akenine-Möller, Oskarsson,
-//! Åström and Fairchild, "ꟻLIP: a difference evaluator for alternating images", Proc. ACM Comput. Graph. Interact. Tech. 3 (2),
-//! 2020; of linear values Andersson, Nilsson, Shirley and Akenine-Möller, "Visualizing errors in rendered high dynamic range
-//! images", Eurographics 2021 Short Papers. Filters are separated as in the authors' note "Separated convolutions", 2022.
+//! ꟻLIP, a perceptual image difference for alternating images.
+//!
+//! Display images: Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, "ꟻLIP: a difference evaluator
+//! for alternating images", Proceedings of the ACM on Computer Graphics and Interactive Techniques 3 (2), 2020. Linear
+//! images (HDR-ꟻLIP): Andersson, Nilsson, Shirley and Akenine-Möller, "Visualizing errors in rendered high dynamic
+//! range images", Eurographics 2021 Short Papers. Filters are separable as in the authors' note "Separated
+//! convolutions", 2022.
 
 use std::f64::consts::PI;
 
@@ -11,36 +14,35 @@ use super::colors::Colors;
 use super::picture::{Kind, Picture};
 use crate::color::srgb_to_linear;
 
-/// Pixels for each degree of what is seen, where nothing else is said: a screen 0.7 m wide with 3840 columns, 0.7 m away.
+/// Default resolution in pixels per degree of visual angle: a monitor 0.7 m wide with 3840 columns, 0.7 m away.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
 
-/// Pixels along a tile's side.
 const TILE: usize = 256;
-/// Tiles whose errors are in memory at the same time.
+/// Maximum number of tiles whose errors are in memory.
 const TILES: usize = 64;
 
-/// The result.
+/// Result of the comparison.
 #[derive(Clone, Debug)]
 pub struct Flip {
-    /// The mean error, from 0 to 1.
+    /// Mean error, 0 to 1.
     pub mean: f64,
-    /// The errors, if they were asked for.
+    /// Error map, if requested.
     pub map: Option<Map>,
 }
 
-/// Numbers from 0 to 1 in 255 steps, each the largest of a square of pixels.
+/// Values from 0 to 1 in 255 steps, each the maximum of a square of pixels.
 #[derive(Clone, Debug)]
 pub struct Map {
-    /// Pixels along a square's side.
+    /// Side of a square in pixels.
     pub step: usize,
-    /// Squares in a row.
+    /// Squares per row.
     pub width: usize,
-    /// Their values, row by row.
+    /// Values by rows.
     pub values: Vec<u8>,
 }
 
 impl Map {
-    /// A map of zeros for a picture.
+    /// Returns a map of zeros for an image.
     pub fn new(picture: &Picture, step: usize) -> Map {
         let squares = |side: u32| (side as usize).div_ceil(step);
         let width = squares(picture.width);
@@ -51,7 +53,7 @@ impl Map {
         }
     }
 
-    /// Raises the value at a pixel. Above 0 it is 1 step at least.
+    /// Raises the value at a pixel. Values above 0 are at least one step.
     pub fn raise(&mut self, x: usize, y: usize, value: f64) {
         let steps = (value * 255.0 + 0.5) as u8;
         let steps = if value > 0.0 { steps.max(1) } else { 0 };
@@ -61,7 +63,8 @@ impl Map {
     }
 }
 
-/// Compares the colours of two pictures, the second being the reference. `step` asks for a map. None if either has no colours.
+/// Compares the colors of two images; `b` is the reference. With a `step`, returns an error map too. `None` if either
+/// image has no colors.
 pub fn flip(a: &Picture, b: &Picture, pixels_per_degree: f64, step: Option<usize>) -> Option<Flip> {
     let colors = Colors::of(a, b)?;
     let filters = Filters::new(pixels_per_degree);
@@ -103,34 +106,33 @@ pub fn flip(a: &Picture, b: &Picture, pixels_per_degree: f64, step: Option<usize
 }
 
 // Constants of the paper: section 4.1.1, table 1, and sections 4.1.2, 4.2 and 4.3.
-/// The exponent of the colour difference.
+/// Exponent of the color difference.
 const QC: f64 = 0.7;
-/// The part of the largest difference that is ...
+/// Fraction of the maximum color difference that is mapped ...
 const PC: f64 = 0.4;
-/// ... this part of the error.
+/// ... to this fraction of the error range.
 const PT: f64 = 0.95;
-/// The width of edges, in degrees.
+/// Width of edges in degrees.
 const W: f64 = 0.082;
-/// The exponent of the feature difference.
+/// Exponent of the feature difference.
 const QF: f64 = 0.5;
 
-/// Contrast sensitivity as sums of Gaussians with amplitude and width: of light, of red and green, of blue and yellow.
+/// Contrast sensitivity functions as sums of Gaussians (amplitude, width): achromatic, red-green, blue-yellow.
 const LIGHT: (f64, f64) = (1.0, 0.0047);
 const RED_GREEN: (f64, f64) = (1.0, 0.0053);
 const BLUE_YELLOW: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
 
-/// Weights of pixels from `-radius` to `radius`.
 struct Filters {
     radius: usize,
     light: Vec<f32>,
     red_green: Vec<f32>,
-    /// Two filters, the sum of whose results across and down is the result.
+    /// Two separable filters, whose results are added.
     blue_yellow: [Vec<f32>; 2],
-    /// A Gaussian, its first derivative and its second.
+    /// A Gaussian, and its first and second derivatives.
     gauss: Vec<f32>,
     edge: Vec<f32>,
     point: Vec<f32>,
-    /// The linear values of what a screen shows, at its 256 steps.
+    /// Linear values of the 256 steps of a display.
     curve: [f64; 256],
 }
 
@@ -149,7 +151,7 @@ impl Filters {
             let x = x / pixels_per_degree;
             a * (PI / b).sqrt() * (-PI * PI * x * x / b).exp()
         };
-        // one Gaussian of two dimensions is the product of two of one, which have the root of its amplitude
+        // A 2D Gaussian is the product of two 1D Gaussians with the root of its amplitude.
         let root = |x: f64, (a, b): (f64, f64)| seen(x, ((a / (PI / b).sqrt()).sqrt(), b));
         let light = taps(spatial, &|x| seen(x, LIGHT));
         let red_green = taps(spatial, &|x| seen(x, RED_GREEN));
@@ -165,7 +167,7 @@ impl Filters {
         let edge = taps(feature, &|x| -x * bell(x));
         let point = taps(feature, &|x| (x * x / (deviation * deviation) - 1.0) * bell(x));
         let over = |weights: &[f64], sum: f64| weights.iter().map(|weight| (weight / sum) as f32).collect::<Vec<f32>>();
-        // what is above 0 sums up to 1, what is below to -1
+        // Positive weights sum to 1, negative ones to -1.
         let balanced = |weights: &[f64]| {
             let above: f64 = weights.iter().filter(|weight| **weight > 0.0).sum();
             let below: f64 = weights.iter().filter(|weight| **weight < 0.0).sum();
@@ -185,21 +187,21 @@ impl Filters {
     }
 }
 
-/// The tone curve (a x² + b x + c) / (d x² + e x + f) of HDR-ꟻLIP: Narkowicz, "ACES filmic tone mapping curve", 2015, without its
-/// exposure of 0.6.
+/// Tone curve (a x² + b x + c) / (d x² + e x + f) of HDR-ꟻLIP: Narkowicz, "ACES filmic tone mapping curve", 2015,
+/// without its exposure of 0.6.
 const ACES: [f64; 6] = [0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14];
 
 fn tone(x: f64) -> f64 {
     let [a, b, c, d, e, f] = ACES;
     if x > 1e9 {
-        return a / d; // whose squares may be infinite
+        return a / d; // the squares may overflow
     }
     (a * x * x + b * x + c) / (d * x * x + e * x + f)
 }
 
-/// The exposures, in steps of two, at which a picture of linear values is looked at: from where its brightest pixel comes to 0.85
-/// of the screen to where its median does, some one apart. Pixels without light have no part in a median that is 0, and a black
-/// picture is seen as it is.
+/// Returns the exposures in stops at which linear images are compared. They range from the one that maps the brightest
+/// pixel of the reference to 0.85 to the one that maps the median luminance to 0.85, about one stop apart. If the
+/// median is 0, black pixels are ignored. A black reference has the exposure 0 only.
 fn exposures(colors: &Colors) -> Vec<f64> {
     let rows = (0..colors.height).into_par_iter();
     let luminances = rows.flat_map_iter(|y| {
@@ -238,7 +240,6 @@ fn median(values: &mut [f32]) -> f32 {
     }
 }
 
-/// A part of the picture.
 #[derive(Clone, Copy, Debug)]
 struct Tile {
     x: usize,
@@ -247,15 +248,13 @@ struct Tile {
     height: usize,
 }
 
-/// Three numbers for each pixel of a tile and of what is around it, each kind by itself. Beyond its edges the picture goes on as
-/// it is there.
+/// Three values per pixel of a tile and its filter margin, as separate planes. Pixels beyond the image repeat its edge.
 struct Around {
     width: usize,
     values: [Vec<f32>; 3],
 }
 
 impl Tile {
-    /// The error of each pixel.
     fn errors(&self, colors: &Colors, filters: &Filters, exposures: Option<&[f64]>) -> Vec<f32> {
         let radius = filters.radius;
         let columns = self.x.saturating_sub(radius)..colors.width.min(self.x + self.width + radius);
@@ -301,7 +300,7 @@ impl Tile {
         errors
     }
 
-    /// Raises the errors to those of two pictures in opponent colours.
+    /// Raises the errors to those of two images in opponent colors.
     fn add(&self, a: &Around, b: &Around, filters: &Filters, errors: &mut [f32]) {
         let (lines_a, lines_b) = (
             Lines::across(a, self.width, filters),
@@ -324,7 +323,7 @@ impl Tile {
     }
 }
 
-/// The colours of a tile in the opponent space Y Cx Cz.
+/// Converts to the opponent space Y Cx Cz.
 fn opponents(around: &Around, seen: impl Fn(f64) -> f64) -> Around {
     let count = around.values[0].len();
     let mut values = [const { Vec::new() }; 3].map(|mut list: Vec<f32>| {
@@ -345,7 +344,7 @@ fn opponents(around: &Around, seen: impl Fn(f64) -> f64) -> Around {
     }
 }
 
-/// X, Y and Z of a linear colour in relation to those of white: IEC 61966-2-1, as ꟻLIP has its matrix.
+/// Returns X, Y and Z of a linear color relative to white: IEC 61966-2-1, with the matrix of ꟻLIP.
 fn white_xyz([r, g, b]: [f64; 3]) -> [f64; 3] {
     let x = (10_135_552.0 * r + 8_788_810.0 * g + 4_435_075.0 * b) / 24_577_794.0;
     let y = (2_613_072.0 * r + 8_788_810.0 * g + 887_015.0 * b) / 12_288_897.0;
@@ -356,7 +355,7 @@ fn white_xyz([r, g, b]: [f64; 3]) -> [f64; 3] {
 /// 1 / X and 1 / Z of white.
 const WHITE: [f64; 2] = [1.052_156_925, 0.918_357_670];
 
-/// The linear colour, within the screen's range, of an opponent one.
+/// Converts an opponent color to linear RGB, clamped to 0 ... 1.
 fn linear([y, cx, cz]: [f64; 3]) -> [f64; 3] {
     let y = (y + 16.0) / 116.0;
     let (x, z) = ((y + cx / 500.0) / WHITE[0], (y - cz / 200.0) / WHITE[1]);
@@ -368,7 +367,7 @@ fn linear([y, cx, cz]: [f64; 3]) -> [f64; 3] {
     rows.map(|[a, b, c]: [f64; 3]| (a * x + b * y + c * z).clamp(0.0, 1.0))
 }
 
-/// L*, a* and b* of a linear colour, the last two weighted by lightness as Hunt saw it.
+/// Returns L*, a* and b* of a linear color; a* and b* are scaled by L* (Hunt effect).
 fn hunt_lab(color: [f64; 3]) -> [f64; 3] {
     const DELTA: f64 = 6.0 / 29.0;
     let [x, y, z] = white_xyz(color).map(|value| {
@@ -382,17 +381,17 @@ fn hunt_lab(color: [f64; 3]) -> [f64; 3] {
     [light, 0.01 * light * 500.0 * (x - y), 0.01 * light * 200.0 * (y - z)]
 }
 
-/// The distance HyAB of two colours, to the power of the paper.
+/// HyAB distance of two colors, raised to `QC`.
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     ((a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])).powf(QC)
 }
 
-/// The largest distance, that of green and blue.
+/// Maximum distance, between green and blue.
 fn greatest() -> f64 {
     distance(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0]))
 }
 
-/// From 0 to 1, of two filtered opponent colours.
+/// Error from 0 to 1 of two filtered opponent colors.
 fn color_difference(a: [f32; 3], b: [f32; 3], greatest: f64) -> f64 {
     if a == b {
         return 0.0;
@@ -406,7 +405,8 @@ fn color_difference(a: [f32; 3], b: [f32; 3], greatest: f64) -> f64 {
     }
 }
 
-/// A tile filtered across: light, red and green, blue and yellow twice; then of light a Gaussian and its two derivatives.
+/// A tile filtered horizontally: achromatic, red-green, blue-yellow twice; then the Gaussian of the achromatic channel
+/// and its two derivatives.
 struct Lines {
     width: usize,
     values: [Vec<f32>; 7],
@@ -439,7 +439,7 @@ impl Lines {
     }
 }
 
-/// A row filtered down too: the four of colour; the first and second derivative across, then down.
+/// A row filtered in both directions: four color results; the first and second derivatives in x, then in y.
 struct Seen {
     values: [Vec<f32>; 8],
 }
@@ -477,21 +477,21 @@ impl Seen {
         [light[x], red_green[x], first[x] + second[x]]
     }
 
-    /// How much of an edge and of a point there is. Light is from 0 to 1 here; derivatives see no constant.
+    /// Returns the edge and point features. The achromatic channel is scaled to 0 ... 1; derivatives ignore its offset.
     fn features(&self, x: usize) -> (f32, f32) {
         let [.., edge_x, point_x, edge_y, point_y] = &self.values;
         (edge_x[x].hypot(edge_y[x]) / 116.0, point_x[x].hypot(point_y[x]) / 116.0)
     }
 }
 
-/// Adds a weighted row.
 fn add(to: &mut [f32], from: &[f32], weight: f32) {
     for (to, from) in to.iter_mut().zip(from) {
         *to += weight * from;
     }
 }
 
-/// The linear value of what a screen shows, most often at one of its steps. What is between them is a 32-bit float.
+/// Linear value of a displayed value, from the table if it is one of the 256 steps. Other values have been rounded to
+/// `f32`.
 fn screen_to_linear(curve: &[f64; 256], value: f64) -> f64 {
     let step = (value * 255.0 + 0.5) as u8;
     if value as f32 == (f64::from(step) / 255.0) as f32 {

@@ -1,4 +1,4 @@
-//! How far two pictures are apart: `wgray diff` without its command line. `docs/golden-pictures.md` says what each measure is.
+//! Image comparison metrics behind `wgray diff`. `docs/golden-pictures.md` defines each metric.
 
 mod color_map;
 mod colors;

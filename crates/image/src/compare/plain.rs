@@ -1,41 +1,41 @@
-//! The measures that look at each value by itself: how many pixels differ, by how much, and where.
+//! Per-value metrics: how many pixels differ, by how much, and where.
 
 use rayon::prelude::*;
 
 use super::flip::Map;
 use super::picture::{Kind, Picture, Plane};
 
-/// What a relative error's denominator has beside the square of the reference: that of Rousselle, Knaus and Zwicker, "Adaptive
+/// Added to the squared reference in the denominator of the relative error: Rousselle, Knaus and Zwicker, "Adaptive
 /// sampling and reconstruction using greedy error minimization", ACM Trans. Graph. 30 (6), 2011, section 5.
 const EPSILON: f64 = 0.01;
-/// Pixels that are looked at together. Sums are made in this order, so that they do not depend on threads.
+/// Pixels per work unit. Partial sums are added in order, so the result does not depend on the number of threads.
 const CHUNK: usize = 1 << 16;
 
-/// Channels that belong together, which both pictures have.
+/// A group of channels that both images have.
 #[derive(Clone, Debug)]
 pub struct Layer<'a> {
-    /// `color` of `R`, `G`, `B`, `A` and `Y`; `normal` of `normal.X`; the channel's own name of others.
+    /// `color` for `R`, `G`, `B`, `A` and `Y`; `normal` for `normal.X`; else the name of the channel.
     pub name: String,
-    /// The channels' names, and their values in both pictures.
+    /// Name and values in both images of each channel.
     pub channels: Vec<(&'a str, &'a Plane, &'a Plane)>,
     kind: Kind,
 }
 
-/// A pixel.
+/// Coordinates of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelCoord {
-    /// The column, from the left, 0 the first.
+    /// Column from the left, from 0.
     pub x: u32,
-    /// The row, from the top, 0 the first.
+    /// Row from the top, from 0.
     pub y: u32,
 }
 
-/// How many values are no finite numbers.
+/// Numbers of non-finite values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Values {
-    /// Values that are no number.
+    /// Number of NaNs.
     pub nan: u64,
-    /// Infinite ones, of either sign.
+    /// Number of infinities of either sign.
     pub infinite: u64,
 }
 
@@ -45,55 +45,55 @@ impl Values {
         self.infinite += u64::from(value.is_infinite());
     }
 
-    /// Both.
+    /// Returns the number of non-finite values.
     pub fn all(self) -> u64 {
         self.nan + self.infinite
     }
 }
 
-/// The largest difference.
+/// The largest difference of two values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Largest {
-    /// How large it is.
+    /// Absolute difference.
     pub difference: f64,
-    /// The pixel, the first in reading order if there are several.
+    /// Pixel, the first in reading order of several.
     pub pixel: PixelCoord,
-    /// The channel.
+    /// Name of the channel.
     pub channel: String,
-    /// The first picture's value.
+    /// Value in the first image.
     pub a: f64,
-    /// The second picture's.
+    /// Value in the second image.
     pub b: f64,
 }
 
-/// How far a layer is apart in two pictures. Values that are no finite number in either picture count as 0 in both, but for
+/// Differences of a layer of two images. Values that are not finite in either image count as 0 in both, except for
 /// `different` and `beyond`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// Pixels of which a value has not the same bits, signed zeros told apart.
+    /// Pixels with a value that is not bit-identical; signed zeros differ.
     pub different: u64,
-    /// The first of them.
+    /// The first of these pixels.
     pub first: Option<PixelCoord>,
-    /// Pixels of which a value differs by more than the threshold, or by no number.
+    /// Pixels with a value that differs by more than the threshold, or that is not finite and not bit-identical.
     pub beyond: u64,
     /// The largest difference, if it is above 0.
     pub largest: Option<Largest>,
-    /// The root of the mean of the squares of all differences.
+    /// Root mean square of all differences.
     pub rmse: f64,
-    /// The mean of d² / (b² + 0.01), where b is the second picture's value.
+    /// Mean of d² / (b² + 0.01), where b is the value in the second image.
     pub rel_mse: f64,
-    /// 20 log10(peak / rmse) in decibels; infinite where nothing differs. The peak is 1 for what a screen shows, else the largest
-    /// magnitude in the second picture, or 1 if that is 0.
+    /// 20 log10(peak / rmse) in decibels; infinite for equal images. The peak is 1 for display values, else the maximum
+    /// magnitude in the second image, or 1 if that is 0.
     pub psnr: f64,
-    /// Values of the first picture that are no finite numbers.
+    /// Non-finite values of the first image.
     pub a: Values,
-    /// Those of the second.
+    /// Non-finite values of the second image.
     pub b: Values,
-    /// The first pixel with such a value in either picture.
+    /// The first pixel with a non-finite value in either image.
     pub odd: Option<PixelCoord>,
 }
 
-/// The layers that both pictures have, colours first, and the channels that only the first or only the second has.
+/// Returns the layers that both images have, colors first, and the channels that only the first or only the second has.
 pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a str>, Vec<&'a str>) {
     let mut layers: Vec<Layer> = Vec::new();
     let mut only_a = Vec::new();
@@ -114,7 +114,7 @@ pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a st
         }
     }
     for layer in &mut layers {
-        // files have B, G, R
+        // EXR files store channels alphabetically: A, B, G, R.
         layer
             .channels
             .sort_by_key(|(name, ..)| ["R", "G", "B", "A"].iter().position(|known| known == name));
@@ -125,10 +125,10 @@ pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a st
     (layers, only_a, only_b)
 }
 
-/// The name of the layer of colours.
+/// Name of the color layer.
 pub const COLOR: &str = "color";
 
-/// The layer that a channel belongs to.
+/// Returns the name of the layer of a channel.
 pub fn layer_of(channel: &str) -> &str {
     match channel.rsplit_once('.') {
         Some((layer, _)) => layer,
@@ -137,13 +137,12 @@ pub fn layer_of(channel: &str) -> &str {
     }
 }
 
-/// What is found in a chunk.
 #[derive(Clone, Debug, Default)]
 struct Found {
     different: u64,
     first: Option<usize>,
     beyond: u64,
-    /// The difference, the pixel and the channel.
+    /// Difference, pixel and channel.
     largest: Option<(f64, usize, usize)>,
     squares: f64,
     relative: f64,
@@ -154,7 +153,6 @@ struct Found {
 }
 
 impl Found {
-    /// Adds what is found in the next chunk.
     fn join(&mut self, next: &Found) {
         self.different += next.different;
         self.first = self.first.or(next.first);
@@ -174,7 +172,7 @@ impl Found {
 }
 
 impl<'a> Layer<'a> {
-    /// Compares the layer. Pixels count as beyond that differ by more than the threshold.
+    /// Compares both images; `threshold` only affects [`Difference::beyond`].
     pub fn difference(&self, width: u32, height: u32, threshold: f64) -> Difference {
         let pixels = width as usize * height as usize;
         let chunks = (0..pixels.div_ceil(CHUNK)).into_par_iter();
@@ -216,7 +214,7 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Where pixels differ, and by which part of the largest difference.
+    /// Returns a mask of differing or non-finite pixels, and the differences relative to the largest one.
     pub(super) fn maps(&self, picture: &Picture, step: usize) -> (Map, Map) {
         let (mut differing, mut apart) = (Map::new(picture, step), Map::new(picture, step));
         let largest = self.difference(picture.width, picture.height, 0.0).largest;
@@ -243,7 +241,7 @@ impl<'a> Layer<'a> {
         (differing, apart)
     }
 
-    /// The first three channels without alpha in both pictures, with the least and the largest value of the second.
+    /// Returns the first three channels except alpha, with the value range of the second image.
     pub(super) fn ranges(&self, picture: &Picture) -> Vec<([&'a Plane; 2], f64, f64)> {
         let channels = self.channels.iter().filter(|(name, ..)| *name != "A").take(3);
         let range = |(_, a, b): &(&str, &'a Plane, &'a Plane)| {

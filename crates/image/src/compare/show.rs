@@ -1,4 +1,4 @@
-//! A picture of a difference: both pictures and where they differ, side by side, or one below the other where they are wide.
+//! Visualization of a comparison: both images and the error map as three panels, in a row or, if wide, in a column.
 
 use super::color_map;
 use super::colors::Colors;
@@ -6,43 +6,40 @@ use super::flip::Map;
 use super::picture::{Picture, Plane};
 use super::plain::{COLOR, Layer};
 
-/// The longest side that a picture is shown with; of larger ones every other pixel is shown, or one in three ...
+/// Maximum side of a displayed image. Larger images are subsampled by an integer step.
 const LONGEST: usize = 4096;
-/// Shorter pictures are magnified to such a side.
+/// Smaller images are magnified by an integer factor, up to this size.
 const SHORTEST: usize = 256;
-/// The shortest other side.
+/// Minimum width and height of a displayed image.
 const NARROWEST: usize = 16;
-/// Cells along the longer side, around which a line is drawn if a pixel in them differs.
+/// Cells along the longer side. Cells with a differing pixel are outlined.
 const CELLS: usize = 64;
-/// Between and around the panels.
 const GAP: usize = 8;
-/// Pixels along the side of a dot of a letter, and rows of a label with what is below it.
+/// Side of a dot of a letter in pixels, and height of a label with its margin.
 const DOT: usize = 2;
 const LABEL: usize = 7 * DOT + 6;
-/// Rows of the scale below the map.
+/// Height of the color scale below the map.
 const SCALE: usize = 10;
 
 const GROUND: [u8; 3] = [40, 40, 40];
 const INK: [u8; 3] = [230, 230, 230];
 const LINE: [u8; 3] = [0, 220, 220];
 
-/// What is shown, row by row.
+/// A visualization that is computed row by row.
 pub struct Shown<'a> {
-    /// Columns of the whole.
+    /// Width in pixels.
     pub width: usize,
-    /// Rows of the whole.
+    /// Height in pixels.
     pub height: usize,
     source: Source<'a>,
-    /// Columns of the pictures.
     columns: usize,
     error: Map,
-    /// Cells with a pixel that differs, row by row, and squares of the map along a cell's side.
+    /// Cells with a differing pixel by rows, cells per row, and side of a cell in squares of the map.
     marked: Vec<bool>,
     cells: usize,
     cell: usize,
-    /// How often a pixel that is shown is repeated across and down.
+    /// Integer magnification in x and y.
     zoom: (usize, usize),
-    /// The panels' own size.
     panel: (usize, usize),
     is_stacked: bool,
     names: [&'static str; 2],
@@ -50,17 +47,17 @@ pub struct Shown<'a> {
 
 enum Source<'a> {
     Colors(Colors<'a>),
-    /// Up to three channels, with their least and largest values.
+    /// Up to three channels, with their value ranges.
     Numbers(Vec<([&'a Plane; 2], f64, f64)>),
 }
 
-/// Pixels of one for each that is shown of pictures of this size.
+/// Returns the subsampling step for images of this size.
 pub fn step(picture: &Picture) -> usize {
     (picture.width.max(picture.height) as usize).div_ceil(LONGEST)
 }
 
-/// Shows a layer of two pictures. `error` has the step of [`step`], as [`flip`](super::flip()) makes it; if there is none,
-/// differences are shown in relation to the largest.
+/// Lays out a layer of two images. `error` is the map of [`flip`](super::flip()) with the step of [`step`]. Without it,
+/// the panel shows differences relative to the largest one.
 pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option<Map>) -> Shown<'a> {
     let step = step(b);
     let (differing, apart) = layer.maps(b, step);
@@ -87,7 +84,7 @@ pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option
     let zoom = (zoom(columns), zoom(rows));
     let panel = (columns * zoom.0, rows * zoom.1);
     let is_stacked = panel.0 > 2 * panel.1;
-    // the longest label has four letters of six dots
+    // The longest label has four letters, each six dots wide.
     let (across, down) = (panel.0.max(4 * 6 * DOT), LABEL + panel.1);
     let (width, height) = match is_stacked {
         true => (across, 3 * (down + GAP)),
@@ -114,7 +111,7 @@ pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option
 }
 
 impl Shown<'_> {
-    /// Red, green and blue of a row's pixels.
+    /// Returns a row of pixels as RGB bytes.
     pub fn row(&self, y: usize) -> Vec<u8> {
         let mut row = vec![GROUND; self.width];
         let across = self.panel.0.max(4 * 6 * DOT) + GAP;
@@ -144,7 +141,6 @@ impl Shown<'_> {
         row.into_flattened()
     }
 
-    /// The scale below the map, with its ends.
     fn scale(&self, to: &mut [[u8; 3]], y: usize) {
         let width = self.panel.0;
         if (2..SCALE).contains(&y) {
@@ -160,7 +156,6 @@ impl Shown<'_> {
         }
     }
 
-    /// A row of the map.
     fn map(&self, y: usize) -> Vec<[u8; 3]> {
         let square_y = y / self.zoom.1;
         let width = self.error.width;
@@ -176,7 +171,7 @@ impl Shown<'_> {
         (0..self.panel.0).map(pixel).collect()
     }
 
-    /// Whether a pixel of the map's panel is close to a marked cell, in one that is not marked.
+    /// Returns true if a pixel of the map panel is part of an outline: outside of the marked cells, but close to one.
     fn is_line(&self, x: usize, y: usize) -> bool {
         let (wide, high) = (self.cell * self.zoom.0, self.cell * self.zoom.1);
         let thick = (wide.min(high) / 16).max(1);
@@ -195,7 +190,6 @@ impl Shown<'_> {
                 .any(|x| [top, y + thick].iter().any(|y| is_marked(*x, *y)))
     }
 
-    /// A row of the first or the second picture.
     fn picture(&self, which: usize, y: usize) -> Vec<[u8; 3]> {
         let step = self.error.step;
         let y = y / self.zoom.1 * step;
@@ -225,7 +219,7 @@ impl Shown<'_> {
     }
 }
 
-/// Letters of 5 x 7 dots, a byte for a row.
+/// Glyphs of 5 x 7 dots, one byte per row.
 const LETTERS: [(char, [u8; 7]); 11] = [
     ('A', [0x0e, 0x11, 0x11, 0x1f, 0x11, 0x11, 0x11]),
     ('B', [0x1e, 0x11, 0x11, 0x1e, 0x11, 0x11, 0x1e]),
@@ -240,7 +234,6 @@ const LETTERS: [(char, [u8; 7]); 11] = [
     ('1', [0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e]),
 ];
 
-/// A row of a word's dots.
 fn letters(to: &mut [[u8; 3]], word: &str, y: usize) {
     for (i, letter) in word.chars().enumerate() {
         let known = LETTERS.iter().find(|(known, _)| *known == letter);

@@ -1,5 +1,5 @@
-//! Structural similarity: Wang, Bovik, Sheikh and Simoncelli, "Image quality assessment: from error visibility to structural
-//! similarity", IEEE Trans. Image Process. 13 (4), 2004, equation 13, with the window of section III.B.
+//! Structural similarity (SSIM): Wang, Bovik, Sheikh and Simoncelli, "Image quality assessment: from error visibility
+//! to structural similarity", IEEE Trans. Image Process. 13 (4), 2004, equation 13, with the window of section III.B.
 
 use std::ops::Range;
 
@@ -8,17 +8,17 @@ use rayon::prelude::*;
 use super::colors::Colors;
 use super::picture::Picture;
 
-/// Pixels on each side of a window's middle, and the Gaussian's standard deviation.
+/// Radius of a window in pixels, and standard deviation of its Gaussian.
 const RADIUS: usize = 5;
 const SIGMA: f64 = 1.5;
-/// (K1 L)² and (K2 L)² for values from 0 to L = 1.
+/// (K1 L)² and (K2 L)² for L = 1.
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
-/// Windows along a side that are computed together.
 const TILE: usize = 256;
 
-/// The mean over all windows and over red, green and blue, as a screen shows them: 1 where nothing differs. Windows lie inside
-/// of the picture; along a side that is shorter than one they are cut at its ends. None if either picture has no colours.
+/// Returns the mean SSIM over all windows and the channels red, green and blue, encoded for display; 1 for equal
+/// images. Windows lie inside the image, except along sides shorter than a window, where they are clipped. `None` if
+/// either image has no colors.
 pub fn ssim(a: &Picture, b: &Picture) -> Option<f64> {
     let colors = Colors::of(a, b)?;
     let (across, down) = (Axis::of(colors.width), Axis::of(colors.height));
@@ -34,12 +34,11 @@ pub fn ssim(a: &Picture, b: &Picture) -> Option<f64> {
     Some(sum / (3 * across.count * down.count) as f64)
 }
 
-/// The middles of windows along a side, or a part of them.
+/// A range of window centers along a side.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     first: usize,
     count: usize,
-    /// Pixels of the whole side.
     side: usize,
 }
 
@@ -60,13 +59,12 @@ impl Axis {
         }
     }
 
-    /// The pixels that the windows see.
     fn pixels(self) -> Range<usize> {
         self.first.saturating_sub(RADIUS)..self.side.min(self.first + self.count + RADIUS)
     }
 
-    /// The weights of the pixels that the windows see, each tap for all windows in turn: calls back with the windows' and the
-    /// pixels' range, counted in this part and in `pixels`, and the weight. Windows that are cut are called with one by one.
+    /// Calls `call` with a range of windows (relative to this axis), the pixels that one tap reads (relative to
+    /// `pixels`) and the weight of the tap. Clipped windows have their own weights and are passed one at a time.
     fn each(self, mut call: impl FnMut(Range<usize>, Range<usize>, f64)) {
         let kernel: [f64; 2 * RADIUS + 1] = std::array::from_fn(|i| {
             let x = i as f64 - RADIUS as f64;
@@ -93,7 +91,6 @@ impl Axis {
     }
 }
 
-/// The sum over a tile's windows and three channels.
 fn tile(colors: &Colors, across: &Axis, down: &Axis) -> f64 {
     let (columns, rows) = (across.pixels(), down.pixels());
     if rows.clone().all(|y| colors.is_plainly_same(y, columns.clone())) {
@@ -139,7 +136,6 @@ fn tile(colors: &Colors, across: &Axis, down: &Axis) -> f64 {
     sum
 }
 
-/// Adds weighted numbers.
 fn add(to: &mut [f64], from: &[f64], weight: f64) {
     for (to, from) in to.iter_mut().zip(from) {
         *to += weight * from;

@@ -1,7 +1,7 @@
-//! The binary tree that the wide one is made from: built top down by the surface area heuristic.
+//! Top-down construction of a binary BVH by the surface area heuristic (SAH), as input of the wide BVH.
 //!
-//! Splits are found by bins (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), in small nodes by
-//! trying all that there are along each axis.
+//! Splits are found by binning (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), in
+//! small nodes by an exhaustive sweep along each axis.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4, Vec4Swizzles as _};
@@ -10,18 +10,18 @@ use rayon::prelude::*;
 use super::Aabb;
 use super::wide::{SLOTS, costs};
 
-/// Nodes of so many items or more are split by several threads.
+/// Minimum number of items of a node that several threads split.
 const PARALLEL: usize = 1 << 16;
-/// Items that one thread looks at, at a time.
+/// Number of items per task of a parallel loop.
 const CHUNK: usize = 1 << 14;
-/// The two halves of a node of so many items or more are built by two threads.
+/// Minimum number of items of a node whose halves are built in parallel.
 const JOIN: usize = 1 << 11;
-/// Nodes of so many items or fewer are split the best way there is.
+/// Maximum number of items of a node that is split by exhaustive search.
 const SMALL: usize = 8;
-/// Bins along each axis: a power of two.
+/// Number of bins per axis, a power of two.
 const BINS: usize = 16;
 
-/// A box and its number. The number's bits are in `low.w`, which takes part in nothing; `high.w` is 1.
+/// A box and its index. The index is stored as the bits of `low.w`, which takes no part in arithmetic; `high.w` is 1.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct Item {
@@ -31,7 +31,7 @@ pub struct Item {
 
 impl Item {
     fn new(number: usize, bounds: &Aabb) -> Item {
-        let whole = bounds.low.cmple(bounds.high).all(); // no NaN among them
+        let whole = bounds.low.cmple(bounds.high).all(); // false if any bound is NaN
         let Aabb { low, high } = if whole {
             *bounds
         } else {
@@ -40,7 +40,7 @@ impl Item {
                 high: Vec3::ZERO,
             }
         };
-        // + 0: there is one zero, so that the least of several numbers has the same bits in any order.
+        // Adding 0 turns -0 into 0: otherwise the bits of a minimum would depend on the order of its operands.
         let finite = |v: Vec3| v.clamp(Vec3::MIN, Vec3::MAX) + Vec3::ZERO;
         Item {
             low: finite(low).extend(f32::from_bits(number as u32)),
@@ -59,33 +59,33 @@ impl Item {
         }
     }
 
-    /// Twice the middle.
+    /// Returns twice the centroid.
     fn middle(&self) -> Vec4 {
         self.low + self.high
     }
 }
 
-/// A node with two children. Those with one item are not stored.
+/// An inner node. Nodes of a single item are not stored.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct Inner {
     pub low: Vec3,
     pub high: Vec3,
-    /// Items in the first half.
+    /// Number of items in the first half.
     pub first: u32,
-    /// What the items cost that are below, in a wide tree, if they take at most 1, 2, .. 7 slots of a node above.
+    /// SAH cost of the items in a wide BVH if they may occupy up to 1, 2, .. 7 slots of the parent node.
     pub costs: [f32; SLOTS - 1],
 }
 
-/// A binary tree. A node of n items has n - 1 inner nodes from its own on: itself, those of its first half, those of its
-/// second half.
+/// A binary BVH in depth-first order. A node of n items owns n - 1 consecutive inner nodes: itself, those of its first
+/// half, those of its second half.
 pub struct Binary {
     pub items: Vec<Item>,
     pub inner: Vec<Inner>,
 }
 
 impl Binary {
-    /// A tree with at most so many levels of inner nodes, as long as 2^`levels` items are not exceeded.
+    /// Builds a tree of at most `levels` levels of inner nodes, provided that there are at most 2^`levels` boxes.
     pub fn build(boxes: &[Aabb], levels: u32, most_in_leaf: usize) -> Binary {
         let items = boxes.par_iter().enumerate().with_min_len(CHUNK);
         let mut items: Vec<Item> = items.map(|(i, bounds)| Item::new(i, bounds)).collect();
@@ -129,7 +129,7 @@ fn costs_of(items: &[Item], inner: &[Inner]) -> [f32; SLOTS - 1] {
     }
 }
 
-/// What a node's items, and the middles of these, are inside of.
+/// The bounds of a node's items and of their doubled centroids.
 #[derive(Clone, Copy)]
 struct Bounds {
     low: Vec4,
@@ -178,16 +178,16 @@ impl Bounds {
     }
 }
 
-/// What a box without a surface counts as, so that the number of nodes matters even there.
+/// Area added to every box, so that the number of nodes counts even among boxes without a surface.
 const LEAST_AREA: f32 = 1e-30;
 
-/// Half the surface, of a box that is cut where it is so large that costs would be infinite.
+/// Returns half the surface area. Sizes are clamped, so that costs are finite.
 pub fn area(low: Vec4, high: Vec4) -> f32 {
     let size = (high - low).min(Vec4::splat(1e15));
     size.x * size.y + size.y * size.z + size.z * size.x + LEAST_AREA
 }
 
-/// Sorts the items into two parts, none of them empty; says how many the first has.
+/// Partitions the items into two nonempty parts and returns the size of the first.
 fn split(items: &mut [Item], bounds: &Bounds, levels: u32) -> usize {
     let count = items.len();
     if count == 2 {
@@ -202,7 +202,7 @@ fn split(items: &mut [Item], bounds: &Bounds, levels: u32) -> usize {
     found.unwrap_or_else(|| split_in_half(items, bounds))
 }
 
-/// One half to the one side along the axis where the middles reach farthest.
+/// Splits at the median centroid along the axis of largest centroid extent.
 fn split_in_half(items: &mut [Item], bounds: &Bounds) -> usize {
     let half = items.len() / 2;
     let reach = (bounds.high_middle - bounds.low_middle).xyz();
@@ -217,7 +217,7 @@ fn split_in_half(items: &mut [Item], bounds: &Bounds) -> usize {
     half
 }
 
-/// The best of all splits along the axes, by the order of the middles.
+/// Returns the split of lowest SAH cost among all splits in the order of centroids along an axis.
 fn split_small(items: &mut [Item]) -> Option<usize> {
     let count = items.len();
     let mut best: Option<(f32, usize, [Item; SMALL])> = None;
@@ -253,7 +253,6 @@ fn split_small(items: &mut [Item]) -> Option<usize> {
     Some(first)
 }
 
-/// Items whose middles lie in the same part of an axis.
 #[derive(Clone, Copy)]
 struct Bin {
     low: Vec4,
@@ -269,11 +268,11 @@ const EMPTY_BINS: Bins = [[Bin {
     count: 0,
 }; BINS]; 3];
 
-/// The best split between bins; none if all items are in one.
+/// Returns the split of lowest SAH cost between bins, or `None` if all items share a bin.
 fn split_by_bins(items: &mut [Item], bounds: &Bounds) -> Option<usize> {
     let low = bounds.low_middle;
     let per_unit = (BINS - 1) as f32 / (bounds.high_middle - low);
-    // A number + 2^23 is rounded to a whole one, which its bits end with.
+    // Adding 2^23 rounds to an integer, which the low mantissa bits hold.
     let bins_of = |item: &Item| {
         let place = (item.middle() - low) * per_unit + 8_388_608.0;
         [place.x, place.y, place.z].map(|x| x.to_bits() as usize % BINS)
@@ -329,11 +328,11 @@ fn together(mut a: Bins, b: Bins) -> Bins {
     a
 }
 
-/// Brings those that the condition holds for to the front; says how many they are.
+/// Moves items that satisfy the predicate to the front and returns their number.
 fn partition(items: &mut [Item], is_first: impl Fn(&Item) -> bool) -> usize {
     let mut end = 0;
     for i in 0..items.len() {
-        // No branch that is guessed wrong half the time.
+        // Branchless: the branch would be mispredicted half the time.
         let first = is_first(&items[i]);
         items.swap(end, i);
         end += usize::from(first);

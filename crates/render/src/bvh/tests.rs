@@ -3,7 +3,7 @@ use glam::Vec3;
 use super::binary::{Binary, Inner};
 use super::{Aabb, MOST_IN_LEAF, MOST_LEVELS, Node, Tree, build};
 
-/// Numbers from 0 to 1.
+/// A generator of numbers from 0 to 1.
 struct Random(u64);
 
 impl Random {
@@ -34,17 +34,16 @@ fn soup(count: usize) -> Vec<Aabb> {
         .collect()
 }
 
-/// A bound as the kernels decode it.
 fn decoded(base: f32, q: u8, exponent: u8) -> f32 {
     base + q as f32 * f32::from_bits((exponent as u32) << 23)
 }
 
-/// Fails where a tree is not as it has to be; gives its number of levels.
+/// Asserts the invariants of a BVH and returns its number of levels.
 fn check(tree: &Tree, boxes: &[Aabb], most_in_leaf: u32) -> u32 {
     let mut nodes = vec![0; tree.nodes.len()];
     let mut items = vec![0; boxes.len()];
     let mut levels = 0;
-    // Each with its level, and the boxes that it has to lie in by its ancestors.
+    // Index, level, and the boxes of all ancestors.
     let mut waiting: Vec<(u32, u32, Vec<Aabb>)> = vec![(0, 1, Vec::new())];
     while let Some((number, level, outer)) = waiting.pop() {
         levels = levels.max(level);
@@ -170,7 +169,7 @@ fn equal_boxes() {
 #[test]
 fn boxes_in_geometric_progression() {
     for axis in [Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::ONE] {
-        // Equal, touching, nested, and points; down to denormal numbers.
+        // Equal, touching, nested and degenerate boxes, down to denormal numbers.
         let at = |i: i32| 2f32.powi(-i);
         let boxes = |reach: f32, offset: f32| -> Vec<Aabb> {
             (-120..150)
@@ -183,14 +182,13 @@ fn boxes_in_geometric_progression() {
             check_builds(&often);
         }
     }
-    // Slow growth makes a chain of the free binary tree.
+    // Slow growth degenerates the binary tree into a chain if its depth is not limited.
     let boxes: Vec<Aabb> = (0..2000)
         .map(|i| around(Vec3::X * 1.05f32.powi(-i), Vec3::splat(1e-25)))
         .collect();
     check_builds(&boxes);
 }
 
-/// The levels of inner nodes of a binary tree.
 fn binary_levels(inner: &[Inner]) -> u32 {
     inner.split_first().map_or(0, |(node, below)| {
         let (first, second) = below.split_at(node.first as usize - 1);
@@ -200,7 +198,7 @@ fn binary_levels(inner: &[Inner]) -> u32 {
 
 #[test]
 fn the_bound_of_levels_is_kept() {
-    // Each box twice as large as the next, with the middles apart.
+    // Each box is twice as large as the next one, with distinct centroids.
     let boxes: Vec<Aabb> = (0..240)
         .map(|i| around(Vec3::splat(2f32.powi(120 - i)), Vec3::splat(2f32.powi(120 - i))))
         .collect();
@@ -223,14 +221,14 @@ fn huge_tiny_and_infinite_boxes() {
             .collect();
         check_builds(&boxes);
     }
-    // Small ones far away, where the steps of the grid are below the digits.
+    // Small boxes far from the origin, where grid steps are below the float spacing.
     for far in [1e3, 1e6, 1e9, -1e9] {
         let boxes: Vec<Aabb> = (0..500)
             .map(|_| around(random.point() + far, random.point() * 1e-3))
             .collect();
         check_builds(&boxes);
     }
-    // Planes and half spaces among small ones.
+    // Planes and half-spaces among small boxes.
     let mut boxes = soup(1000);
     for i in 0..10 {
         let at = Vec3::splat(0.1 * i as f32);
@@ -258,7 +256,7 @@ fn empty_boxes_and_nan_do_no_harm() {
             .iter()
             .all(|node| (0..8).all(|c| !node.low(c).is_nan() && !node.high(c).is_nan()))
     );
-    // The point 0 stands for each of them.
+    // Each of them is replaced by the point 0.
     boxes[100..].fill(around(Vec3::ZERO, Vec3::ZERO));
     assert_eq!(build(&boxes, 4), tree);
     check(&tree, &boxes, 4);

@@ -1,4 +1,5 @@
-//! From a binary tree to one of 8 children a node, at the least cost there is (Ylitie, Karras and Laine, HPG 2017, section 3.1).
+//! Collapse of a binary BVH into one of 8 children per node with the lowest SAH cost (Ylitie, Karras and Laine, HPG
+//! 2017, section 3.1).
 
 use bytemuck::Zeroable as _;
 use glam::Vec3;
@@ -7,21 +8,21 @@ use rayon::prelude::*;
 use super::binary::{Binary, Inner, Item};
 use super::{Aabb, Node, Tree};
 
-/// Children of a node, at most.
+/// Maximum number of children per node.
 pub const SLOTS: usize = 8;
-/// What it costs to test the boxes of a node against a ray.
+/// SAH cost of testing a ray against the boxes of a node.
 const NODE_COST: f32 = 1.0;
-/// What it costs to test an item against a ray.
+/// SAH cost of testing a ray against an item.
 const ITEM_COST: f32 = 0.3;
-/// The children of a node above so many items are made by several threads.
+/// Minimum number of items of a node whose children are built in parallel.
 const PARALLEL: usize = 1 << 14;
 
-/// The cost of items in one leaf.
 pub fn leaf_cost(area: f32, count: usize) -> f32 {
     area * count as f32 * ITEM_COST
 }
 
-/// What a binary node costs that takes at most 1, 2, .. 7 slots of a wide node above, from what its halves cost.
+/// Returns the cost of a binary node that may occupy up to 1, 2, .. 7 slots of a wide parent, from the costs of its
+/// halves.
 pub fn costs(area: f32, count: usize, most_in_leaf: usize, sides: &[[f32; SLOTS - 1]; 2]) -> [f32; SLOTS - 1] {
     let shared = |slots: usize| share(slots, |k| sides[0][k - 1], |k| sides[1][k - 1]).0;
     let mut costs = [0.0; SLOTS - 1];
@@ -35,7 +36,8 @@ pub fn costs(area: f32, count: usize, most_in_leaf: usize, sides: &[[f32; SLOTS 
     costs
 }
 
-/// The cheapest way to give each of two sides at least one of the slots: its cost, and how many the first side gets.
+/// Distributes slots over two sides, at least one each, at the lowest cost. Returns the cost and the slots of the first
+/// side.
 fn share(slots: usize, first: impl Fn(usize) -> f32, second: impl Fn(usize) -> f32) -> (f32, usize) {
     let mut best = (first(1) + second(slots - 1), 1);
     for k in 2..slots {
@@ -47,7 +49,6 @@ fn share(slots: usize, first: impl Fn(usize) -> f32, second: impl Fn(usize) -> f
     best
 }
 
-/// Items that are below one node of the binary tree.
 #[derive(Clone, Copy)]
 struct Part<'a> {
     items: &'a [Item],
@@ -93,13 +94,13 @@ impl<'a> Part<'a> {
         ]
     }
 
-    /// Whether it is cheapest as a leaf, where it takes one slot.
+    /// Returns true if a leaf costs no more than an inner node.
     fn is_leaf(&self, most_in_leaf: usize) -> bool {
         let count = self.items.len();
         count == 1 || (count <= most_in_leaf && leaf_cost(self.area(), count) <= self.cost(1))
     }
 
-    /// Finds the parts that take the slots of a wide node, from a part of two items at least.
+    /// Collects the parts that occupy the slots of a wide node. The part must have at least two items.
     fn spread(&self, slots: usize, children: &mut Vec<Part<'a>>) {
         let halves = self.halves();
         let (_, first) = share(slots, |k| halves[0].cost(k), |k| halves[1].cost(k));
@@ -115,7 +116,6 @@ impl<'a> Part<'a> {
     }
 }
 
-/// The wide tree.
 pub fn collapse(binary: &Binary, most_in_leaf: usize) -> Tree {
     let root = Part {
         items: &binary.items,
@@ -132,14 +132,13 @@ pub fn collapse(binary: &Binary, most_in_leaf: usize) -> Tree {
     below.tree
 }
 
-/// What is below a node, as far as it has been made.
 struct Below {
     most_in_leaf: usize,
     tree: Tree,
 }
 
 impl Below {
-    /// Adds all that is below a part of the binary tree, and gives the part's own node.
+    /// Adds the descendants of a part and returns the node of the part.
     fn add(&mut self, part: Part) -> Node {
         if part.items.is_empty() {
             return Node::around(&Aabb {
@@ -193,7 +192,7 @@ impl Below {
         node
     }
 
-    /// Adds what was made below another node, in the same order as if it had been made here.
+    /// Appends nodes that were built separately, in the order in which `add` would have added them.
     fn append(&mut self, node: Node, below: Below) -> Node {
         let (nodes, items) = (self.tree.nodes.len() as u32, self.tree.order.len() as u32);
         let moved = |node: Node| Node {
@@ -207,10 +206,11 @@ impl Below {
     }
 }
 
-/// Which child is in which slot. Slot c is for what lies towards octant c of the node (bit 0: +x, bit 1: +y, bit 2: +z), so
-/// that a ray meets the slots nearly in the order c ^ octant. The child that lies farthest towards a free octant is first.
+/// Assigns children to slots. Slot c is meant for octant c of the node (bit 0: +x, bit 1: +y, bit 2: +z), so that c ^
+/// octant of a ray approximates front-to-back order. The child and free slot of largest projected distance are assigned
+/// first.
 fn slots_of(bounds: &Aabb, children: &[Part]) -> [Option<usize>; SLOTS] {
-    // Halves of both terms, so that nothing is infinite.
+    // Both terms are halved to avoid overflow.
     let middle = |bounds: &Aabb| bounds.low * 0.5 + bounds.high * 0.5;
     let center = middle(bounds);
     let mut towards = [[0.0; SLOTS]; SLOTS];

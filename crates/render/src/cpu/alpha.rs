@@ -1,4 +1,4 @@
-//! Twin of `shaders/alpha.wgsl`: surfaces that rays pass by their alpha.
+//! Twin of `shaders/alpha.wgsl`: alpha cutout and alpha blending of surfaces.
 
 use glam::{UVec2, UVec4, Vec2, Vec3};
 

@@ -1,4 +1,5 @@
-//! The trees: what `shaders/bvh.wgsl` finds, by walks of their own (`walk`).
+//! Closest-hit and occlusion queries of the scene's BVHs, with the results of `shaders/bvh.wgsl` by the traversals of
+//! [`traversal`].
 
 use bytemuck::cast_slice;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
@@ -21,14 +22,14 @@ use crate::records::{
     with_primitive_kind,
 };
 
-/// So few items are looked at one by one: a ray passes most of a small tree's nodes.
+/// Maximum number of items that are tested without the BVH: a ray hits most nodes of a small BVH.
 const FEW_ITEMS: usize = 4;
 
 fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
     scene.counts.room.x * (largest(origin) + scene.counts.room.y)
 }
 
-/// The nearest hit of the scene's tree, if it is nearer than `before`.
+/// Returns the closest hit among the items of the scene's BVH if it is nearer than `before`, else `before`.
 pub fn closest_in_tree(scene: &Packed, before: Hit, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {
     let mut hit = before;
     let pad = item_pad(scene, ray.origin);
@@ -93,7 +94,7 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
     let pad = mesh_pad(i, origin);
-    // At the same distance as what was found before, this instance's triangle counts only if the instance comes first.
+    // On equal distance, a triangle of this instance wins only over hits on instances with larger indices.
     let best = Nearest {
         t: before.t,
         number: if number + 1 < before.instance { NO_INDEX } else { 0 },
@@ -121,7 +122,6 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
     }
 }
 
-/// A mesh as walks want it.
 fn walked(mesh: &PackedMesh) -> traversal::Mesh<'_> {
     traversal::Mesh {
         nodes: cast_slice(&mesh.nodes),
@@ -130,13 +130,12 @@ fn walked(mesh: &PackedMesh) -> traversal::Mesh<'_> {
     }
 }
 
-/// The corners of a mesh's triangle.
 fn corners(mesh: &PackedMesh, slot: usize) -> [Vec3; 3] {
     let triangle = mesh.triangles[slot];
     [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].xyz())
 }
 
-/// The shadow rays from a surface to a block of a light's samples.
+/// The shadow rays from a surface to a block of samples of a light.
 struct Rays<'a> {
     surface: &'a Surface,
     light: &'a Light,
@@ -145,7 +144,6 @@ struct Rays<'a> {
     samples: Samples,
 }
 
-/// The numbers of the bits that are set.
 fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
     std::iter::from_fn(move || {
         let i = bits.trailing_zeros();
@@ -154,7 +152,8 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Bit i is set where an item of the tree hides sample i of the block from a surface, or the bit was set before.
+/// Returns a mask of the samples of the block that an item of the BVH occludes from the surface, or that are set in
+/// `before`.
 pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
     let all = u32::MAX >> (32 - block.count);
     let wanted = all & !before;
@@ -183,7 +182,7 @@ pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &L
     (before & all) | traversal::occluded_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, wanted, bounds, visit)
 }
 
-/// Of the samples in `wanted`, those that an item hides.
+/// Returns the mask of the samples in `wanted` that an item occludes.
 fn occluded_by_item(scene: &Packed, item: &Item, wanted: u32, rays: &Rays) -> u32 {
     let i = item.index;
     let kind = item.kind & 0xff;
@@ -225,7 +224,7 @@ fn occluded_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u3
     traversal::occluded(*LEVEL, &walked(mesh), &segments, wanted)
 }
 
-/// [`traversal::occluded`] where some groups of a mesh cast no shadow.
+/// Like [`traversal::occluded`], for meshes in which some groups cast no shadow.
 fn occluded_by_groups(
     scene: &Packed,
     i: &Instance,
@@ -259,7 +258,8 @@ fn occluded_by_groups(
     )
 }
 
-/// Whether an item of the tree lies between a surface and `t_max` times `to`, but for the primitive `target_prim`.
+/// Returns true if an item of the BVH, except the primitive `target_prim`, occludes the segment from the surface to
+/// `t_max * to`.
 pub fn is_occluded_by_bvh(scene: &Packed, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
     let pad = item_pad(scene, surface.ray_origin);
     let s = slabs(surface.ray_origin, to, pad);

@@ -1,4 +1,4 @@
-//! Twin of `shaders/bvh_node.wgsl`: a node of a tree of boxes, with eight children.
+//! Twin of `shaders/bvh_node.wgsl`: BVH nodes with eight children and quantized boxes.
 
 use glam::{UVec2, UVec3, Vec3, Vec4};
 

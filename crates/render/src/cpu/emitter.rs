@@ -1,4 +1,4 @@
-//! Twin of `shaders/emitter.wgsl`: what shines.
+//! Twin of `shaders/emitter.wgsl`: selection of emitters and samples of their light.
 
 use glam::{UVec2, Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/energy.wgsl`: what facets reflect, or let pass, at once, from tables.
+//! Twin of `shaders/energy.wgsl`: directional albedo of microfacet lobes by single scattering, from tables.
 
 use glam::{Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/geometry.wgsl` and `shaders/meshes.wgsl`: the scene's geometry, as integrators know it.
+//! Twin of `shaders/geometry.wgsl` and `shaders/meshes.wgsl`: closest hits, occlusion and surface properties.
 
 use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4Swizzles as _};
@@ -53,7 +53,7 @@ pub fn is_on_mesh(hit: Hit) -> bool {
     hit.instance != 0
 }
 
-/// The instance that a hit on a mesh is of.
+/// Returns the instance of a hit on a mesh.
 pub fn instance_of(scene: &Packed, hit: Hit) -> &Instance {
     &scene.bvh.instances[hit.instance as usize - 1]
 }

@@ -1,4 +1,4 @@
-//! Twin of `shaders/ggx.wgsl`: microfacets of the distribution GGX.
+//! Twin of `shaders/ggx.wgsl`: the GGX microfacet distribution.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
     use crate::cpu::rng::{hash4, unit_float};
 
-    /// Pairs of alpha over their range.
+    /// Roughness pairs (alpha_x, alpha_y).
     const ALPHAS: [(f64, f64); 8] = [
         (0.001, 0.001),
         (0.02, 0.02),
@@ -112,8 +112,8 @@ mod tests {
         DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
     }
 
-    /// The integral over the hemisphere of facets' normals. The slopes are x = ax tan(angle) cos(longitude) and so on, which spreads the
-    /// steps over the facets that there are.
+    /// Integrates over the hemisphere of microfacet normals. The slopes are x = ax tan(angle) cos(longitude) and y = ay
+    /// tan(angle) sin(longitude), which concentrates the steps where the distribution is large.
     fn over_normals((ax, ay): (f64, f64), mut f: impl FnMut(DVec3) -> f64) -> f64 {
         let (rings, spokes) = (400, 400);
         let mut sum = 0.0;
@@ -123,7 +123,7 @@ mod tests {
                 let longitude = (f64::from(j) + 0.5) / f64::from(spokes) * TAU;
                 let slope = DVec3::new(ax * longitude.cos(), ay * longitude.sin(), 0.0) * angle.tan() + DVec3::Z;
                 let m = slope.normalize();
-                // d(slopes) = ax ay tan / cos^2 of the angle; the solid angle is cos^3 of m's times that.
+                // d(slopes) = ax ay tan(angle) / cos(angle)^2 d(angle) d(longitude), d(solid angle) = m.z^3 d(slopes).
                 let step = ax * ay * angle.tan() / angle.cos().powi(2);
                 sum += f(m) * step * m.z.powi(3);
             }
@@ -145,7 +145,8 @@ mod tests {
         for alpha in ALPHAS {
             for (cosine, longitude) in [(1.0, 0.0), (0.7, 0.3), (0.3, 1.5), (0.05, 2.9)] {
                 let wo = unit(cosine, longitude);
-                // Of all facets that face the viewer the projected area is the surface's, of which the share G1 is seen.
+                // The visible fraction G1 of the projected area of all normals that face the viewer is the surface's
+                // projected area.
                 let facing = over_normals(alpha, |m| {
                     f64::from(ggx_d(pair(alpha), m.as_vec3())) * m.dot(wo.as_dvec3()).max(0.0)
                 });
@@ -165,7 +166,7 @@ mod tests {
                 let both = ggx_g2(alpha, wo, wi);
                 let (o, i) = (ggx_g1(alpha, wo), ggx_g1(alpha, wi));
                 assert!(both <= o.min(i) * 1.000_001 && both >= o * i * 0.999_999);
-                // Heitz, equation 99, by the two Lambda.
+                // Heitz, equation 99, from two values of Lambda.
                 let lambda = |g: f32| (1.0 - f64::from(g)) / f64::from(g);
                 let expected = 1.0 / (1.0 + lambda(o) + lambda(i));
                 assert!((f64::from(both) / expected - 1.0).abs() < 1e-5, "{both} {expected}");
@@ -173,8 +174,9 @@ mod tests {
         }
     }
 
-    /// Pearson's chi-square of sampled normals over cells of the angle and longitude of stretched slopes, in standard deviations
-    /// above what is expected, where `wrong` is a factor of the density on one half of the sphere.
+    /// Returns the chi-square statistic of sampled normals, in standard deviations above its expected value. Cells are
+    /// uniform in the angle and longitude of stretched slopes. `wrong` is a factor of the pdf on one half of the
+    /// hemisphere.
     fn chi_square(alpha: (f64, f64), wo: Vec3, wrong: f64) -> f64 {
         const CELLS: usize = 20;
         const SAMPLES: u32 = 100_000;
@@ -198,7 +200,7 @@ mod tests {
             let density =
                 f64::from(ggx_pdf(pair(alpha), wo, m.as_vec3())) * if m.x > 0.0 { wrong } else { 2.0 - wrong };
             let slope = (m.x / ax / m.z).hypot(m.y / ay / m.z);
-            // The same step as `over_normals` takes.
+            // The step of `over_normals`.
             let step = ax * ay * slope * (1.0 + slope * slope) * m.z.powi(3) * (PI / 2.0 / 400.0) * (TAU / 400.0);
             expected[cell(m)] += density * step * f64::from(SAMPLES);
             0.0
@@ -232,7 +234,8 @@ mod tests {
         }
     }
 
-    /// What facets reflect at once of light from everywhere, by Schlick's two terms: over facets, by Lambda as Heitz has it.
+    /// Returns the single-scattering directional albedo as factors of f0 and f90, integrated over normals with Heitz'
+    /// Lambda.
     fn albedo(alpha: (f64, f64), wo: DVec3) -> (f64, f64) {
         let lambda = |w: DVec3| {
             let tangent2 = ((alpha.0 * w.x).powi(2) + (alpha.1 * w.y).powi(2)) / w.z.powi(2);

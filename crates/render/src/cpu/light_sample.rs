@@ -1,4 +1,4 @@
-//! Twin of `shaders/light_sample.wgsl`: points of what shines, and how densely they lie.
+//! Twin of `shaders/light_sample.wgsl`: samples of points on emitters, and their pdfs.
 
 use std::f32::consts::FRAC_1_PI;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/light_tree.wgsl`: the tree over what shines.
+//! Twin of `shaders/light_tree.wgsl`: importance of the children of a light tree node.
 
 use glam::{BVec4A, Vec3, Vec4};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/mesh.wgsl`: triangles of meshes.
+//! Twin of `shaders/mesh.wgsl`: intersection and surface properties of mesh triangles.
 
 use glam::{UVec2, Vec2, Vec3, Vec4};
 

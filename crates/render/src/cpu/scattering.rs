@@ -1,4 +1,4 @@
-//! Twin of `shaders/scattering.wgsl`: what a surface does with light where it bounces, whatever it is made of.
+//! Twin of `shaders/scattering.wgsl`: evaluation and sampling of BSDFs, whatever the material.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -23,7 +23,7 @@ use crate::records::{
     Packed, ROUGH_GLASS, THIN,
 };
 
-/// What a material has that is none of that kind.
+/// The lobes of materials that are not [`PRINCIPLED`].
 pub static NO_MIXTURE: PrincipledLobes = PrincipledLobes {
     diffuse: Vec3::ZERO,
     alpha: Vec2::ZERO,

@@ -1,4 +1,4 @@
-//! Twin of `shaders/texture.wgsl`: colours from textures.
+//! Twin of `shaders/texture.wgsl`: colors of textures, and materials evaluated with them.
 
 use glam::{Vec2, Vec3};
 

@@ -1,4 +1,5 @@
-//! Kernels as text: each is the concatenation of a list of files, since WGSL's module scope has no order.
+//! Kernel sources: concatenated shader files, in any order since WGSL's module scope has none, and their locations in
+//! the text.
 
 use std::ops::Range;
 use std::{fs, io, path::Path};
@@ -15,18 +16,18 @@ use wgray_shaders::{
 };
 pub use wgray_shaders::{File, SHARED, built_in};
 
-/// The file of quotients and square roots by software.
+/// File of the software division and square roots.
 pub const ROUNDING: &str = "rounding.wgsl";
 
 /// A compute shader.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Kernel {
-    /// The entry point's name.
+    /// Name of the entry point.
     pub entry_point: &'static str,
-    /// What it is made of besides [`SHARED`], the scene and an integrator. The last file has the entry point, and declares
-    /// what it writes.
+    /// Files in addition to [`SHARED`], the scene and an integrator. The last one contains the entry point and declares
+    /// its outputs.
     pub files: &'static [&'static [File]],
-    /// Whether it asks an integrator for radiance.
+    /// True if the kernel needs an integrator.
     pub integrates: bool,
 }
 
@@ -36,22 +37,21 @@ pub static RENDER: Kernel = Kernel {
     files: &[KERNEL, SAMPLES, RENDER_FILE],
     integrates: true,
 };
-/// Accumulates samples as long as a pixel needs them.
+/// Accumulates samples until each pixel has converged.
 pub static ADAPTIVE: Kernel = Kernel {
     entry_point: "adaptive",
     files: &[KERNEL, SAMPLES, ADAPTIVE_FILE],
     integrates: true,
 };
-/// Writes what the ray through each pixel's centre meets first.
+/// Writes the first hit of the ray through each pixel center.
 pub static FIRST_HITS: Kernel = Kernel {
     entry_point: "first_hits",
     files: &[KERNEL, FIRST_HITS_FILE],
     integrates: false,
 };
-/// Every kernel.
+/// All kernels.
 pub static KERNELS: [&Kernel; 3] = [&RENDER, &ADAPTIVE, &FIRST_HITS];
 
-/// What an integrator is made of: what light a sample sees.
 fn integrator_files(integrator: Integrator) -> &'static [File] {
     match integrator {
         Integrator::Phong => PHONG,
@@ -60,19 +60,19 @@ fn integrator_files(integrator: Integrator) -> &'static [File] {
 }
 
 impl Kernel {
-    /// The file that has the entry point.
+    /// Returns the file that contains the entry point.
     pub fn file(&self) -> &'static str {
         self.files.iter().copied().flatten().last().map_or("", |(name, _)| name)
     }
 }
 
-/// The texts of all shader files.
+/// Contents of all shader files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shaders {
     files: Vec<(String, String)>,
 }
 
-/// A file's text with blanks in place of a byte-order mark, which WGSL does not have. What follows stays where it is.
+/// Replaces a byte-order mark, which WGSL does not allow, by as many spaces, so that offsets do not change.
 fn without_mark(text: String) -> String {
     match text.strip_prefix('\u{feff}') {
         Some(rest) => format!("   {rest}"),
@@ -81,7 +81,7 @@ fn without_mark(text: String) -> String {
 }
 
 impl Shaders {
-    /// The ones in the program.
+    /// Returns the built-in shaders.
     pub fn built_in() -> Shaders {
         Shaders {
             files: built_in()
@@ -90,7 +90,7 @@ impl Shaders {
         }
     }
 
-    /// The ones in a folder, which has the same files as the project's `shaders/`.
+    /// Reads the files of the project's `shaders/` from another folder.
     pub fn read(folder: &Path) -> io::Result<Shaders> {
         let read = |name: &str| {
             let path = folder.join(name);
@@ -103,17 +103,17 @@ impl Shaders {
         })
     }
 
-    /// Returns whether other shaders have the same code, and differ in comments and white space at most.
+    /// Returns true if the code is equal, except for comments and white space.
     pub fn has_same_code(&self, other: &Shaders) -> bool {
         self.files().all(|(name, text)| is_same_code(text, other.text(name)))
     }
 
-    /// All files: names and texts.
+    /// Returns the names and contents of all files.
     pub fn files(&self) -> impl Iterator<Item = (&str, &str)> {
         self.files.iter().map(|(name, text)| (name.as_str(), text.as_str()))
     }
 
-    /// Returns these shaders with another text of a file.
+    /// Replaces the contents of a file.
     #[must_use]
     pub fn with(mut self, name: &str, text: String) -> Shaders {
         self.files.retain(|(file, _)| file != name);
@@ -121,7 +121,7 @@ impl Shaders {
         self
     }
 
-    /// The shared mathematics by themselves: constants, records and pure functions.
+    /// Returns the shared mathematics only: constants, records and pure functions.
     pub fn shared(&self) -> Source {
         let mut source = Source::default();
         source.append(
@@ -133,13 +133,13 @@ impl Shaders {
         source
     }
 
-    /// A kernel that reads the scene from buffers, or, if `baked` is the text of the functions that know the scene, has
-    /// it as constants.
+    /// Composes a kernel. `baked` is the text of the functions that contain the scene as constants; without it, the
+    /// kernel reads the scene from buffers.
     pub fn compose(&self, kernel: &Kernel, integrator: Integrator, baked: Option<&str>) -> Source {
         self.compose_with_texels(kernel, integrator, baked, None)
     }
 
-    /// [`Shaders::compose`] where `texels` is the text of the function that reads texels from several buffers.
+    /// Like [`Shaders::compose`]. `texels` is the text of the function that reads texels from several buffers.
     pub fn compose_with_texels(
         &self,
         kernel: &Kernel,
@@ -183,7 +183,7 @@ impl Shaders {
         }
     }
 
-    /// The text of a file.
+    /// Returns the contents of a file; empty if it does not exist.
     pub fn text(&self, name: &str) -> &str {
         self.files
             .iter()
@@ -192,10 +192,10 @@ impl Shaders {
     }
 }
 
-/// A kernel's whole text, and where each part of it came from.
+/// Text of a kernel, and the origin of each part.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Source {
-    /// The WGSL.
+    /// WGSL text.
     pub text: String,
     parts: Vec<Part>,
 }
@@ -207,7 +207,7 @@ struct Part {
 }
 
 impl Source {
-    /// Adds a file at the end.
+    /// Appends a file.
     pub fn append(&mut self, file: &str, text: &str) {
         self.parts.push(Part {
             file: file.to_string(),
@@ -219,7 +219,6 @@ impl Source {
         }
     }
 
-    /// Adds all files of another text.
     fn extend(&mut self, other: &Source) {
         let start = self.text.len();
         self.parts.extend(other.parts.iter().map(|part| Part {
@@ -229,7 +228,7 @@ impl Source {
         self.text.push_str(&other.text);
     }
 
-    /// The text with a part of it replaced, and its lines where they were. What is replaced lies in one file.
+    /// Replaces a range inside one file. The line numbers after it do not change.
     pub fn replaced(&self, range: Range<usize>, with: &str) -> Source {
         let lines = self.text[range.clone()].matches('\n').count();
         let with = with.to_string() + &"\n".repeat(lines);
@@ -250,7 +249,7 @@ impl Source {
         }
     }
 
-    /// Where a file starts.
+    /// Returns the offset of a file.
     pub fn start_of(&self, file: &str) -> Option<usize> {
         self.parts.iter().find(|part| part.file == file).map(|part| part.start)
     }
@@ -264,7 +263,7 @@ impl Source {
         Some(format!("{file}:{line}:{column}"))
     }
 
-    /// The file that a byte of the text came from, its own text, and the byte's offset in it.
+    /// Returns the file that a byte of the text is from, its contents, and the offset in it.
     pub fn locate(&self, offset: usize) -> Option<(&str, &str, usize)> {
         let i = self.parts.partition_point(|part| part.start <= offset).checked_sub(1)?;
         let end = self.parts.get(i + 1).map_or(self.text.len(), |next| next.start);

@@ -1,39 +1,38 @@
-//! Float controls: what a Vulkan device keeps to in 32-bit arithmetic, if its SPIR-V asks for that.
+//! Vulkan float controls: guarantees for 32-bit arithmetic that SPIR-V can request.
 
-/// What a kernel asks of a device's 32-bit floats, or what a device can be asked for (Vulkan 1.2, "Float Controls").
-/// Where it is not asked for, Vulkan leaves it to the driver.
+/// Float controls that a kernel requests or a device supports (Vulkan 1.2, "Float Controls"). Without a request, the
+/// behavior depends on the driver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FloatControls {
-    /// Results are rounded to the nearest number, and to the even one of two: `RoundingModeRTE`. Without it Vulkan
-    /// allows either of the two numbers beside an exact result.
+    /// Rounding to nearest even: `RoundingModeRTE`. Otherwise Vulkan allows either neighbor of the exact result.
     pub rounding: bool,
-    /// Signs of zeros, infinities and NaN are kept: `SignedZeroInfNanPreserve`. Without it a driver may take infinities
-    /// and NaN to be absent, and one zero for the other.
+    /// Signed zeros, infinities and NaN: `SignedZeroInfNanPreserve`. Otherwise a driver may assume that infinities and
+    /// NaN do not occur, and that the sign of zero is irrelevant.
     pub signed_zeros: bool,
-    /// Denormal numbers are kept: `DenormPreserve`. Without it a driver may take zero for them.
+    /// Denormals: `DenormPreserve`. Otherwise a driver may flush them to zero.
     pub denormals: bool,
 }
 
 impl FloatControls {
-    /// None of them.
+    /// No float controls.
     pub const NONE: FloatControls = FloatControls {
         rounding: false,
         signed_zeros: false,
         denormals: false,
     };
-    /// All of them.
+    /// All float controls.
     pub const ALL: FloatControls = FloatControls {
         rounding: true,
         signed_zeros: true,
         denormals: true,
     };
 
-    /// What an adapter can be asked for: nothing where it is not reached by Vulkan 1.2 or later.
+    /// Returns the float controls that an adapter supports, which requires Vulkan 1.2.
     #[cfg(any(windows, target_os = "linux", target_os = "android", target_os = "freebsd"))]
     pub(super) fn of(adapter: &wgpu::Adapter) -> FloatControls {
         use ash::vk;
 
-        // SAFETY: the adapter is only asked for its properties, and nothing of it is destroyed.
+        // SAFETY: the properties of the adapter are queried; nothing is destroyed.
         let Some(vulkan) = (unsafe { adapter.as_hal::<wgpu::hal::api::Vulkan>() }) else {
             return FloatControls::NONE;
         };
@@ -44,18 +43,18 @@ impl FloatControls {
         }
         let mut found = vk::PhysicalDeviceFloatControlsProperties::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut found);
-        // SAFETY: the instance has this function since Vulkan 1.1, and the device the structure since 1.2.
+        // SAFETY: Vulkan 1.1 instances have this function, and Vulkan 1.2 devices support this structure.
         unsafe {
             instance
                 .raw_instance()
                 .get_physical_device_properties2(vulkan.raw_physical_device(), &mut properties);
         }
-        // Lavapipe of Mesa 22.3.6 makes finite numbers of infinities and NaN once it is asked to keep them, and keeps them
-        // unasked.
+        // Lavapipe of Mesa 22.3.6 converts infinities and NaN to finite numbers if asked to preserve them, and
+        // preserves them otherwise.
         let lavapipe = vulkan
             .physical_device_capabilities()
             .is_driver(vk::DriverId::MESA_LLVMPIPE);
-        // Without independence the widths of floats must all be asked for the same, and kernels ask for 32 bits alone.
+        // Without independence, all float widths need the same setting, but kernels only request it for 32 bits.
         let alone = |independence| independence != vk::ShaderFloatControlsIndependence::NONE;
         FloatControls {
             rounding: found.shader_rounding_mode_rte_float32 == vk::TRUE && alone(found.rounding_mode_independence),
@@ -64,7 +63,7 @@ impl FloatControls {
         }
     }
 
-    /// What an adapter can be asked for: nothing, as there is no Vulkan.
+    /// Returns no float controls on platforms without Vulkan.
     #[cfg(not(any(windows, target_os = "linux", target_os = "android", target_os = "freebsd")))]
     pub(super) fn of(_: &wgpu::Adapter) -> FloatControls {
         FloatControls::NONE

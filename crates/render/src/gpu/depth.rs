@@ -1,15 +1,15 @@
-//! How deep a shader's expressions go. naga follows them by calls of itself, and would use up its stack.
+//! Nesting limits of shaders. The recursion of naga would overflow the stack on deeper expressions.
 
 use std::ops::Range;
 
 use super::functions::without_comments;
 
-/// So many operators, brackets and members may build on each other in one expression.
+/// Maximum depth of operators, brackets and member accesses in an expression.
 const OPERATORS: usize = 1000;
-/// So many times may `else if` follow in all that is open at one place.
+/// Maximum number of `else if` in all enclosing blocks.
 const ALTERNATIVES: usize = 400;
 
-/// What goes too deep, and what the rule is.
+/// Returns the location of code that is nested too deeply, and the violated rule.
 pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
     let plain = without_comments(text);
     let bytes = plain.as_bytes();
@@ -93,7 +93,7 @@ mod tests {
         let of = |count: usize| format!("if a {{}} {} else {{}}", "else if b { x(); }\n ".repeat(count));
         assert_eq!(too_deep(&of(400)), None);
         assert!(too_deep(&of(401)).is_some());
-        // What is inside of others goes as deep as all of them.
+        // Nested chains add up.
         let inner = of(300);
         assert!(too_deep(&format!("{}if c {{ {inner} }}", "if a {} else if b { ".repeat(101))).is_some());
     }

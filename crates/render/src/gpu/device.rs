@@ -1,4 +1,4 @@
-//! Adapters, and the choice among them.
+//! GPU adapters: listing, selection and opening.
 
 use std::sync::mpsc;
 
@@ -10,87 +10,86 @@ use super::failure::{Failure, error_of_opening};
 use crate::error::RenderError;
 use wgray_image::contain::{DropContained, catch_panic};
 
-/// What to do where there is no adapter.
+/// Advice for systems without an adapter.
 pub const HOW_TO_GET_VULKAN: &str =
     "on Debian, 'apt-get install mesa-vulkan-drivers' installs software Vulkan (lavapipe)";
 
-/// Which device a render asks for.
+/// Requested device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// A real GPU, else software Vulkan.
+    /// A physical GPU, else software Vulkan.
     Auto,
     /// Any adapter.
     Gpu,
-    /// The adapter with this as part of its name, driver or type, or with this number in [`adapters`], counted from 1. A
-    /// number that is not in the list is a whole word of a name, such as 7900.
-    /// Several of one name are one choice, of which the first that can be opened is taken.
+    /// The adapter with this number in [`adapters`], from 1, or with this text in its name, driver or type. A number
+    /// outside the list must be a whole word of a name, such as 7900. Of several adapters with the same name, the first
+    /// that can be opened is used.
     Named(String),
 }
 
-/// What an adapter says of itself.
+/// Properties of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Info {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// The driver's name and version.
+    /// Name and version of the driver.
     pub driver: String,
-    /// The interface that it is reached by, such as `vulkan`.
+    /// Graphics API, such as `vulkan`.
     pub backend: String,
-    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
+    /// Type: `discrete`, `integrated`, `virtual`, `software` or `other`.
     pub kind: &'static str,
-    /// Whether shaders run on it exactly as they are written.
+    /// True if SPIR-V is passed through, so that shaders are executed as written.
     pub exact: bool,
-    /// What its arithmetic is asked to keep to where they do.
+    /// Supported float controls, requested if `exact`.
     pub float_controls: FloatControls,
-    /// The largest storage buffer that a shader can see, in bytes.
+    /// Maximum size of a storage buffer binding in bytes.
     pub largest_binding: u64,
-    /// The largest buffer, in bytes.
+    /// Maximum size of a buffer in bytes.
     pub largest_buffer: u64,
-    /// How many storage buffers a shader can see.
+    /// Maximum number of storage buffers in a shader.
     pub storage_buffers: u32,
 }
 
 impl Info {
-    /// Whether it computes on the CPU, as lavapipe and SwiftShader do.
+    /// Returns true if the adapter computes on the CPU, such as lavapipe and SwiftShader.
     pub fn is_software(&self) -> bool {
         self.kind == SOFTWARE
     }
 }
 
-/// The kind of adapters that compute on the CPU.
 const SOFTWARE: &str = "software";
 
-/// A device that is ready for work; a clone is another handle to it.
+/// An open device. Clones are handles to the same device.
 #[derive(Clone)]
 pub struct Device {
-    // Dropped in this order; wgpu may panic where the device is lost.
+    // Dropped in this order. wgpu may panic if the device is lost.
     pub(super) queue: DropContained<wgpu::Queue>,
     pub(super) device: DropContained<wgpu::Device>,
     failure: Failure,
-    /// What it says of itself.
+    /// Properties of its adapter.
     pub info: Info,
 }
 
-/// Every adapter that wgpu finds, in the order in which [`Choice::Auto`] prefers them.
+/// Returns all adapters that wgpu finds, in the order of preference.
 pub fn adapters() -> Vec<Info> {
     enumerate().iter().map(info).collect()
 }
 
-/// Opens the adapter that fits a choice best, of those that can be opened.
+/// Opens the best matching adapter that can be opened.
 ///
 /// # Errors
 ///
-/// [`RenderError::NoDevice`] if no adapter fits, or several of different names do, and that of the last one if none that
-/// fits can be opened.
+/// [`RenderError::NoDevice`] if no adapter matches, or if adapters of different names do. If no matching adapter can be
+/// opened, the error of the last one.
 pub fn choose(choice: &Choice) -> Result<Device, RenderError> {
     choose_among(choice, &|_| true)
 }
 
-/// As [`choose`], of the adapters that are wanted.
+/// Like [`choose`], but only among the adapters for which `wanted` is true.
 ///
 /// # Errors
 ///
-/// As those of [`choose`].
+/// The errors of [`choose`].
 pub fn choose_among(choice: &Choice, wanted: &dyn Fn(&Info) -> bool) -> Result<Device, RenderError> {
     let adapters = enumerate();
     let infos: Vec<Info> = adapters.iter().map(info).collect();
@@ -105,11 +104,11 @@ pub fn choose_among(choice: &Choice, wanted: &dyn Fn(&Info) -> bool) -> Result<D
     Err(failure.unwrap_or_else(|| RenderError::NoDevice(NONE_FOUND.to_owned() + HOW_TO_GET_VULKAN)))
 }
 
-/// The adapter that [`choose`] would open, unopened.
+/// Returns the adapter that [`choose`] would try first, without opening it.
 ///
 /// # Errors
 ///
-/// As those of [`choose`].
+/// The errors of [`choose`].
 pub fn preferred(choice: &Choice) -> Result<Info, RenderError> {
     let infos = adapters();
     let fitting = fitting(&infos, choice).map_err(RenderError::NoDevice)?;
@@ -119,7 +118,7 @@ pub fn preferred(choice: &Choice) -> Result<Info, RenderError> {
 
 const NONE_FOUND: &str = "no Vulkan, Metal or DX12 adapter found; ";
 
-/// Which adapters a choice means, the best first. The error is what to tell the user.
+/// Returns the indices of the matching adapters, best first. The error is a message for the user.
 fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
     let Choice::Named(name) = choice else {
         return Ok((0..infos.len()).collect());
@@ -133,7 +132,7 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
     let all = |fits: &dyn Fn(&Info) -> bool| -> Vec<usize> { (0..infos.len()).filter(|i| fits(&infos[*i])).collect() };
     let whole = all(&|info| info.name.to_lowercase() == name.to_lowercase());
     let found = match whole.is_empty() {
-        // No digit of some version is meant by a number that is not in the list.
+        // A number outside the list must not match a digit of a version.
         true if name.bytes().all(|byte| byte.is_ascii_digit()) => all(&|info| has_word(&info.name, name)),
         true => all(&|info| matches(info, name)),
         false => whole,
@@ -163,7 +162,7 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
 }
 
 fn enumerate() -> Vec<wgpu::Adapter> {
-    // A driver that is being reset may fail where wgpu does not expect it: then there is none.
+    // wgpu may panic while a driver is being reset. No adapter is listed then.
     let adapters = catch_panic(|| {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
@@ -173,8 +172,8 @@ fn enumerate() -> Vec<wgpu::Adapter> {
     adapters
 }
 
-/// The place of an adapter among others: the least is the best. Of software Vulkan lavapipe is the first, many times
-/// faster than SwiftShader. Other adapters of one type stay in the order that the system has them in.
+/// Sort key of an adapter; the minimum is the best. Lavapipe precedes SwiftShader, since it is many times faster. Other
+/// adapters of the same type keep the order of the system.
 fn preference(info: &wgpu::AdapterInfo) -> (u8, bool) {
     let kind = match info.device_type {
         DeviceType::DiscreteGpu => 0,
@@ -186,7 +185,7 @@ fn preference(info: &wgpu::AdapterInfo) -> (u8, bool) {
     (kind, !is_lavapipe(&info.name))
 }
 
-/// Mesa's software Vulkan calls itself llvmpipe.
+/// Mesa's software Vulkan reports the name llvmpipe.
 fn is_lavapipe(name: &str) -> bool {
     name.starts_with("llvmpipe")
 }
@@ -213,13 +212,14 @@ fn info(adapter: &wgpu::Adapter) -> Info {
     }
 }
 
-/// Whether a word of a text is this one: `7900` is one of "Radeon RX 7900 XT", `15` none of "llvmpipe (LLVM 15.0.6)".
+/// Returns true if a text contains a whole word: `7900` in "Radeon RX 7900 XT", but not `15` in "llvmpipe (LLVM
+/// 15.0.6)".
 fn has_word(text: &str, word: &str) -> bool {
     let mut words = text.split(|c: char| !c.is_alphanumeric() && c != '.');
     words.any(|known| known == word)
 }
 
-/// Whether a name that a person types means this adapter.
+/// Returns true if part of the name, driver or type matches, ignoring case.
 fn matches(info: &Info, name: &str) -> bool {
     let name = name.to_lowercase();
     let lavapipe = if is_lavapipe(&info.name) { "lavapipe" } else { "" };
@@ -231,7 +231,7 @@ fn matches(info: &Info, name: &str) -> bool {
 fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
     let info = info(adapter);
     let (features, experimental) = if info.exact {
-        // SAFETY: the one experimental feature is passing SPIR-V through, and all of it comes from naga.
+        // SAFETY: the only experimental feature is SPIR-V passthrough, and naga generates all SPIR-V.
         (wgpu::Features::PASSTHROUGH_SHADERS, unsafe {
             wgpu::ExperimentalFeatures::enabled()
         })
@@ -269,12 +269,12 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
 }
 
 impl Device {
-    /// What wgpu calls it, for kernels other than the renderer's.
+    /// Returns the wgpu handles, for other kernels than those of the renderer.
     pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.device, &self.queue)
     }
 
-    /// Runs calls to wgpu and returns the first error that they raise.
+    /// Makes wgpu calls and returns the first error that they raise.
     pub(super) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, RenderError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
@@ -282,27 +282,26 @@ impl Device {
         let value = catch_panic(calls);
         let errors = [validation.pop(), internal.pop(), memory.pop()].map(pollster::block_on);
         let [validation, internal, memory] = errors;
-        // A buffer that was refused for want of memory is refused again by whatever uses it: the cause is told.
+        // A failed allocation also invalidates later uses of the buffer. Report the cause.
         let first = [memory, validation, internal].into_iter().flatten().next();
         self.failure.judge(&self.info.name, value, first.as_ref())
     }
 
-    /// An error of the device: of its loss, if it is lost.
+    /// Returns an error with this message, or the device loss that caused it.
     pub(super) fn error(&self, error: impl std::fmt::Display) -> RenderError {
         self.failure.error(&self.info.name, &error)
     }
 
-    /// Lets wgpu notice what has ended. It does not wait.
+    /// Processes finished work without blocking.
     pub(super) fn poll(&self) -> Result<(), RenderError> {
         self.poll_for(wgpu::PollType::Poll)
     }
 
-    /// Waits until all submitted work has ended.
     pub(super) fn wait(&self) -> Result<(), RenderError> {
         self.poll_for(wgpu::PollType::wait_indefinitely())
     }
 
-    /// wgpu panics here where the device is lost.
+    /// wgpu panics here if the device is lost.
     fn poll_for(&self, what: wgpu::PollType) -> Result<(), RenderError> {
         match catch_panic(|| self.device.poll(what)) {
             Ok(Ok(_)) => Ok(()),
@@ -321,7 +320,7 @@ impl Device {
         self.device.create_buffer(&descriptor)
     }
 
-    /// A buffer with these records, or with one of zeros where there are none: a binding cannot be empty.
+    /// Creates a buffer with these records. An empty list becomes one zeroed record, since bindings cannot be empty.
     pub(super) fn upload<T: Pod>(&self, usage: BufferUsages, records: &[T]) -> wgpu::Buffer {
         let none = T::zeroed();
         let contents = if records.is_empty() {
@@ -336,7 +335,7 @@ impl Device {
             mapped_at_creation: true,
         };
         let buffer = self.device.create_buffer(&descriptor);
-        // One that was refused cannot be written to; whoever checks these calls is told why.
+        // A buffer without memory cannot be mapped. The enclosing `checked` reports the reason.
         if let Ok(mut view) = buffer.get_mapped_range_mut(..) {
             view.slice(..contents.len()).copy_from_slice(contents);
             drop(view);
@@ -345,7 +344,6 @@ impl Device {
         buffer
     }
 
-    /// What a buffer holds.
     pub(super) fn download<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let staging = self.checked(|| {
             let staging = self.buffer(buffer.size(), BufferUsages::COPY_DST | BufferUsages::MAP_READ);
@@ -357,31 +355,30 @@ impl Device {
         self.read(&staging)
     }
 
-    /// What a buffer that can be mapped holds, once all submitted work has ended.
+    /// Returns the contents of a mappable buffer after all submitted work.
     pub(super) fn read<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let mapping = self.checked(|| self.map(staging))?;
         self.wait_for(&mapping)?;
         self.mapped(staging)
     }
 
-    /// Asks for a buffer's contents, which are there once the work that was submitted so far has ended.
+    /// Starts mapping a buffer, which completes after the work submitted so far.
     pub(super) fn map(&self, staging: &wgpu::Buffer) -> Mapping {
         let (sender, receiver) = mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            let _ = sender.send(result); // nobody waits any more if the wait has failed
+            let _ = sender.send(result); // fails if the wait has failed and dropped the receiver
         });
         Mapping(receiver)
     }
 
-    /// Waits until a buffer's contents are there.
     pub(super) fn wait_for(&self, mapping: &Mapping) -> Result<(), RenderError> {
         self.wait()?;
-        // Another thread that waits for the same device may be the one that is told, a little later.
+        // Another thread that waits for the same device may run the callback a little later.
         let told = mapping.0.recv().map_err(|error| self.error(error))?;
         told.map_err(|error| self.error(error))
     }
 
-    /// What a buffer holds whose contents are there. They are given back.
+    /// Returns the contents of a mapped buffer, and unmaps it.
     pub(super) fn mapped<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let view = staging.get_mapped_range(..).map_err(|error| self.error(error))?;
         let records = bytemuck::pod_collect_to_vec(&view);
@@ -391,11 +388,10 @@ impl Device {
     }
 }
 
-/// A buffer's contents that were asked for.
 pub(super) struct Mapping(mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>);
 
 impl Mapping {
-    /// Whether they are there; `None` as long as nothing is known. It is told once.
+    /// Returns the result of the mapping once; `None` while it is pending.
     pub(super) fn done(&self) -> Option<Result<(), String>> {
         match self.0.try_recv() {
             Ok(result) => Some(result.map_err(|error| error.to_string())),

@@ -1,5 +1,5 @@
-//! What goes wrong on a device: an error, want of memory, or its loss. wgpu tells of these in many ways: scopes, callbacks,
-//! panics; and of a loss nothing at all but by one callback.
+//! Device failures: errors, out-of-memory and device loss. wgpu reports them by error scopes, callbacks and panics, and
+//! a loss by one callback only.
 
 use std::error::Error;
 use std::fmt::Display;
@@ -7,19 +7,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::RenderError;
 
-/// What a device is known to suffer from; a clone is another handle to it.
+/// Recorded failures of a device. Clones share them.
 #[derive(Clone, Default)]
 pub struct Failure(Arc<Mutex<Known>>);
 
 #[derive(Default)]
 struct Known {
-    /// Why the device is gone, for good.
+    /// Reason of the device loss, which is permanent.
     lost: Option<Fault>,
-    /// What went wrong while nobody could be told, until somebody is.
+    /// First error outside of error scopes, until it is reported.
     untold: Option<Fault>,
 }
 
-/// What went wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Fault {
     Lost(String),
@@ -27,11 +26,11 @@ enum Fault {
     Other(String),
 }
 
-/// What wgpu says where a driver has lost the device, and where memory ran out in a call that may not fail.
+/// Messages of wgpu for a device that the driver lost, and for out-of-memory in an infallible call.
 const LOST: &str = "Device is lost";
 const NO_MEMORY: &str = "Out of memory";
 
-/// What it says where a device cannot be opened: because its driver is being reset, or for want of memory.
+/// Messages of wgpu for a device that cannot be opened: its driver is being reset, or out of memory.
 const LOST_AT_OPENING: &str = "Parent device is lost";
 const NO_MEMORY_AT_OPENING: &str = "Not enough memory left.";
 
@@ -65,7 +64,7 @@ impl Fault {
 }
 
 impl Failure {
-    /// Hears what a device tells outside of error scopes; wgpu would panic.
+    /// Records device loss, and errors outside of error scopes, for which wgpu would panic.
     pub fn listen(&self, device: &wgpu::Device) {
         let (errors, losses) = (self.clone(), self.clone());
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| errors.keep(Fault::of(&error))));
@@ -88,8 +87,8 @@ impl Failure {
         });
     }
 
-    /// What came of calls: their value or their panic, and the first error that they raised. A loss goes before what follows
-    /// from it.
+    /// Returns the value of wgpu calls, or an error: a device loss, the first error of the error scopes, an error
+    /// recorded outside of them, or a panic, in this order.
     pub fn judge<T>(
         &self,
         device: &str,
@@ -105,7 +104,7 @@ impl Failure {
         }
     }
 
-    /// An error with this message; or the loss that it follows from.
+    /// Returns an error with this message, or the device loss that caused it.
     pub fn error(&self, device: &str, message: &dyn Display) -> RenderError {
         let lost = self.known(|known| known.lost.clone());
         lost.unwrap_or_else(|| Fault::Other(message.to_string()))
@@ -113,7 +112,7 @@ impl Failure {
     }
 }
 
-/// Why a device could not be opened.
+/// Returns the error for a device that could not be opened.
 pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
     let says = |text: &str| {
         let mut causes = std::iter::successors(Some(error), |error| (*error).source());

@@ -1,5 +1,5 @@
-//! What the program and a kernel must agree on: entry point, workgroup size, bindings, layouts, constants. The built-in
-//! kernel says what is right; a device would take anything, and show garbage.
+//! Checks of the interface between the program and a kernel: entry point, workgroup size, bindings, layouts and
+//! overrides. The built-in kernel is the reference. Devices accept mismatches and render garbage.
 
 use naga::{
     AddressSpace, ArraySize, GlobalVariable, Handle, Module, ShaderStage, Span, StorageAccess, Type, TypeInner,
@@ -12,8 +12,8 @@ use super::wording::type_name;
 use crate::error::ShaderError;
 use wgray_scene::Integrator;
 
-/// What is wrong with the interface of a kernel that naga accepts. What it writes is looked at if it is `whole`, with the
-/// bodies of all its functions.
+/// Returns the interface errors of a kernel that naga accepts. Outputs are only checked if `whole`, which requires all
+/// function bodies.
 pub fn mistakes(
     kernel: &Kernel,
     integrator: Integrator,
@@ -54,7 +54,7 @@ impl Sides<'_> {
         self.found
     }
 
-    /// What the program reads after a call must have been written.
+    /// Checks that the kernel writes all buffers that the program reads back.
     fn results(&mut self, own: &Checked, right: &Checked) {
         let entry = self.kernel.entry_point;
         let at = |module: &Module, binding| {
@@ -82,7 +82,6 @@ impl Sides<'_> {
         }
     }
 
-    /// A function's head.
     fn place_of_function(&self, name: &str) -> Option<Span> {
         let texts = functions(&self.source.text);
         let text = texts.iter().find(|text| text.name == name)?;
@@ -95,7 +94,7 @@ impl Sides<'_> {
         self.found.push(error);
     }
 
-    /// The first line of the file that has a part of the built-in kernel.
+    /// Returns the first character of the file that contains a span of the built-in kernel.
     fn file_with(&self, span: Span) -> Option<Span> {
         let (file, ..) = self.built_in.locate(span.to_range()?.start)?;
         self.source.start_of(file).map(|start| Span::from(start..start + 1))
@@ -162,13 +161,13 @@ impl Sides<'_> {
                 self.tell(Some(own.global_variables.get_span(handle)), message);
             }
         }
-        // A kernel that writes nothing into a buffer that the program reads leaves it black.
+        // Without a buffer that the program reads back, the image would be black.
         for (handle, known) in right.global_variables.iter() {
             let stores = AddressSpace::Storage {
                 access: StorageAccess::LOAD | StorageAccess::STORE,
             };
             let there = |variable: &GlobalVariable| {
-                let bound = variable.binding.is_some(); // one of that name may be private
+                let bound = variable.binding.is_some(); // a private variable may have the same name
                 variable.binding == known.binding || (bound && variable.name == known.name)
             };
             if known.space == stores && !own.global_variables.iter().any(|(_, variable)| there(variable)) {
@@ -181,7 +180,7 @@ impl Sides<'_> {
         }
     }
 
-    /// How a variable differs from what the program binds there.
+    /// Returns how a variable differs from the binding of the program.
     fn difference(&self, variable: &GlobalVariable, known: &GlobalVariable) -> Option<String> {
         let name = variable.name.as_deref().unwrap_or_default();
         if variable.space != known.space {
@@ -246,15 +245,14 @@ fn space_name(space: AddressSpace) -> &'static str {
     }
 }
 
-/// A kernel's types and the right ones.
 struct Layouts<'a> {
     own: &'a Module,
     right: &'a Module,
 }
 
 impl Layouts<'_> {
-    /// The first difference between the bytes of two types. What members are called does not matter, unless one stands
-    /// where another of the right ones should.
+    /// Returns the first difference of two memory layouts. Members may have any names, except that of a reference
+    /// member at another offset.
     fn difference(&self, own: Handle<Type>, right: Handle<Type>, path: &str) -> Option<String> {
         match (&self.own.types[own].inner, &self.right.types[right].inner) {
             (

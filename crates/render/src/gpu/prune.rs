@@ -1,10 +1,9 @@
-//! Drops what a kernel's constants rule out. Drivers do so as well, but later than they inline functions and at far
-//! greater cost.
+//! Dead code elimination by the constants of a kernel. Drivers do this too, but after inlining, at far greater cost.
 
 use naga::compact::{KeepUnused, compact};
 use naga::{Arena, Block, Expression, Literal, Module, Statement};
 
-/// Replaces every branch whose condition is a constant by the block that is taken, and removes what is unused then.
+/// Replaces branches on constants by the block taken, then removes unused items.
 pub fn prune(module: &mut Module) {
     let functions = module.functions.iter_mut().map(|(_, function)| function);
     let entry_points = module
@@ -13,13 +12,13 @@ pub fn prune(module: &mut Module) {
         .map(|entry_point| &mut entry_point.function);
     for function in functions.chain(entry_points) {
         let body = std::mem::take(&mut function.body);
-        function.named_expressions.clear(); // they count as used, those of dropped blocks too
+        function.named_expressions.clear(); // named expressions count as used, even in removed blocks
         function.body = taken(body, &function.expressions).0;
     }
     compact(module, KeepUnused::No);
 }
 
-/// A block without the branches that are not taken, and whether it ends in a statement that leaves it.
+/// Returns a block without dead branches, and true if it ends in a jump.
 fn taken(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
     let mut out = Block::new();
     for (statement, span) in block.span_into_iter() {

@@ -1,4 +1,4 @@
-//! A scene on a device: its buffers, its kernels, and the film that it accumulates.
+//! A scene on a GPU: its buffers, kernels and film.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -26,17 +26,18 @@ use crate::records::{Camera, DispatchParams, FirstHit, Packed, Specialization};
 use wgray_image::Region;
 use wgray_scene::Integrator;
 
-/// How a scene is put on a device.
+/// Compilation options of the kernels of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// SPIR-V that is computed as written, with quotients and square roots of whom; else plain WGSL through wgpu.
+    /// Passthrough of SPIR-V that is executed as written, with this rounding of quotients and square roots. `None` lets
+    /// wgpu compile the WGSL.
     pub exact: Option<Rounding>,
-    /// The scene as constants of the kernel, if it is small.
+    /// Embeds a small scene in the kernel as constants.
     pub baked: bool,
 }
 
 impl Options {
-    /// What is fastest on a device.
+    /// Returns the fastest options for a device.
     pub fn best(device: &Device) -> Options {
         Options {
             exact: device.info.exact.then_some(Rounding::Device),
@@ -45,77 +46,74 @@ impl Options {
     }
 }
 
-/// A scene on a device.
+/// A scene on a GPU.
 pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
-    /// The kernel of first hits, once requested.
+    /// Compiled on first use.
     first_hits: Option<wgpu::ComputePipeline>,
     scene: SceneBuffers,
     work: wgpu::Buffer,
-    /// The kernel's receipt of a call: as the kernel writes it, and as the host reads it.
+    /// Completion record of a dispatch: the kernel's buffer, and the mappable copy.
     completion: [wgpu::Buffer; 2],
-    /// What the last dispatch of a call has changed, as it was before.
+    /// Film rows before the last dispatch, for `undo`.
     before: Option<wgpu::Buffer>,
     film: Option<(Target, Started)>,
     pending: Option<Pending>,
     rules: Rules,
-    /// The most samples of a dispatch that the driver is thought to run whole.
+    /// Estimated maximum number of samples per dispatch without truncated loops.
     samples_per_call: u32,
-    /// The values of the sliders, if there are any.
     slider_values: Option<wgpu::Buffer>,
-    /// Of calls, where these are timed.
     timer: Option<Timer>,
     calls: Vec<Call>,
 }
 
-/// How long a dispatch has taken.
+/// Duration of a dispatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Call {
-    /// The kernel's entry point.
+    /// Entry point of the kernel.
     pub kernel: &'static str,
-    /// From its start to its end.
+    /// Duration.
     pub took: Duration,
-    /// Whether the device has told; else it is from the call to the news of its end.
+    /// True if measured by the device, else the time from submission to the observed completion.
     pub by_device: bool,
-    /// Samples of pixels, or pixels where it takes no samples.
+    /// Number of pixel samples, or of pixels for kernels without samples.
     pub samples: u64,
 }
 
-/// A call that was submitted: one dispatch of it is under way.
+/// Submitted work, of which one dispatch is running.
 struct Pending {
     tile: Region,
-    /// The samples that are not known to be added.
+    /// Samples that are not known to be in the film.
     samples: Range<u32>,
-    /// Where those of the dispatch end.
+    /// End of the samples of the running dispatch.
     end: u32,
     start: Instant,
-    /// Tells when the dispatch has ended.
+    /// Mapping that completes when the dispatch has ended.
     completion: Mapping,
 }
 
-/// What it takes to compile another kernel for the same scene.
+/// Inputs to compile further kernels for the same scene.
 struct Kernels {
     shaders: Shaders,
     integrator: Integrator,
     baked: Option<String>,
     constants: Specialization,
-    /// Of the groups of bindings.
     layouts: Vec<wgpu::BindGroupLayout>,
     exact: Option<Rounding>,
     texels: TexelParts,
     sliders: Vec<Slider>,
 }
 
-/// A buffer with a record for each pixel of a region, and the group of bindings of the kernel that writes it.
+/// A buffer with a record per pixel of a region, and the bind group of the kernel that writes it.
 struct Target {
     region: Region,
     buffer: wgpu::Buffer,
     group: wgpu::BindGroup,
 }
 
-/// The rows of a film that a tile lies in: a piece of each of the film's lists of pixels, in bytes.
+/// Film rows that contain a tile: a piece of each of the film's lists, in bytes.
 struct Rows {
     lists: u64,
     list: u64,
@@ -139,26 +137,25 @@ impl Rows {
         self.lists * self.size
     }
 
-    /// Where each piece starts in the film, and in a copy of all of them.
+    /// Returns the offset of each piece in the film, and in a copy of all pieces.
     fn pieces(&self) -> impl Iterator<Item = (u64, u64)> {
         (0..self.lists).map(|i| (i * self.list + self.start, i * self.size))
     }
 }
 
-/// The size in bytes of a first hit.
 const FIRST_HITS_RECORD: usize = size_of::<FirstHit>();
 
-/// Rounds of the loop that proves a pixel whole: more than the single one of a loop that is cut short.
+/// Range of the loop by which each pixel detects truncation. A truncated loop runs once.
 const PROOF: UVec2 = UVec2::new(0, 4);
 
 impl Gpu {
-    /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
-    /// returns: drivers compile at the first dispatch.
+    /// Compiles the kernel for a scene, uploads the scene and dispatches the kernel once with no samples, since drivers
+    /// compile at the first dispatch.
     pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
         Gpu::with_sliders(device, packed, shaders, options, Vec::new())
     }
 
-    /// As [`Gpu::new`], with overrides that are read from a buffer. They are 0 until [`Gpu::set_sliders`].
+    /// Like [`Gpu::new`], with overrides that are read from a buffer. They are 0 until [`Gpu::set_sliders`].
     pub fn with_sliders(
         device: &Device,
         packed: &Packed,
@@ -217,16 +214,16 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// Returns the overrides that are read from a buffer, in its order.
+    /// Returns the overrides that are read from a buffer, in buffer order.
     pub fn sliders(&self) -> &[Slider] {
         &self.kernels.sliders
     }
 
-    /// Sets the values of the sliders, as bits. The film is lost.
+    /// Sets the values of the sliders as bits, and discards the film.
     ///
     /// # Errors
     ///
-    /// [`RenderError::Pending`] while a call is pending.
+    /// [`RenderError::Pending`] while work is pending.
     pub fn set_sliders(&mut self, values: &[u32]) -> Result<(), RenderError> {
         self.idle()?;
         self.film = None;
@@ -238,28 +235,28 @@ impl Gpu {
         }
     }
 
-    /// Times every call from now on; [`Gpu::calls`] has them.
+    /// Enables timing of dispatches; see [`Gpu::calls`].
     pub fn time_calls(&mut self) -> Result<(), RenderError> {
         self.timer = Some(self.device.checked(|| Timer::new(&self.device))?);
         Ok(())
     }
 
-    /// The calls that have ended since this was asked last.
+    /// Returns the dispatches that have ended since the previous query.
     pub fn calls(&mut self) -> Vec<Call> {
         std::mem::take(&mut self.calls)
     }
 
-    /// The device that it is on.
+    /// Returns the device.
     pub fn device(&self) -> &Device {
         &self.device
     }
 
-    /// Uploads a changed scene that needs no other kernel. Returns whether it does not; if it does, nothing is done.
-    /// The film is lost.
+    /// Uploads a changed scene and discards the film. Returns false, without changes, if the scene needs another
+    /// kernel.
     ///
     /// # Errors
     ///
-    /// [`RenderError::Pending`] while a call is pending.
+    /// [`RenderError::Pending`] while work is pending.
     pub fn update(&mut self, packed: &Packed) -> Result<bool, RenderError> {
         self.idle()?;
         let texels = TexelParts::of(&self.device.info, packed)?;
@@ -275,11 +272,11 @@ impl Gpu {
         Ok(same_kernel)
     }
 
-    /// Changes the camera. The film is lost.
+    /// Changes the camera and discards the film.
     ///
     /// # Errors
     ///
-    /// [`RenderError::Pending`] while a call is pending.
+    /// [`RenderError::Pending`] while work is pending.
     pub fn set_camera(&mut self, camera: &Camera) -> Result<(), RenderError> {
         self.idle()?;
         self.film = None;
@@ -302,12 +299,10 @@ impl Gpu {
         self.explained(target, Some((what, size)))
     }
 
-    /// The kernel that adds samples.
     fn kernel(&self) -> &'static Kernel {
         kernel_of(self.rules.form().adaptive)
     }
 
-    /// What there is on the device.
     fn held(&self) -> Held {
         Held {
             scene: self.scene.bytes,
@@ -316,12 +311,11 @@ impl Gpu {
         }
     }
 
-    /// An error for want of memory tells the sizes.
     fn explained<T>(&self, result: Result<T, RenderError>, asked: Option<Asked>) -> Result<T, RenderError> {
         result.map_err(|error| self.held().explain(error, asked.as_ref()))
     }
 
-    /// Runs a kernel over a tile of a target, after these copies. Its receipt is asked for.
+    /// Dispatches a kernel over a tile of a target after `copies`, and starts mapping its completion record.
     fn dispatch(
         &self,
         pipeline: &wgpu::ComputePipeline,
@@ -366,8 +360,8 @@ impl Gpu {
         })
     }
 
-    /// Whether a dispatch that has ended ran whole for every pixel of its tile: the driver has cut none of its loops short.
-    /// How long it took is noted where that is asked for.
+    /// Returns true if a finished dispatch is complete: the driver truncated no loop of any pixel. Records its duration
+    /// if timing is enabled.
     fn ran_whole(
         &mut self,
         kernel: &'static str,
@@ -398,7 +392,7 @@ impl Gpu {
         }
     }
 
-    /// Submits as much of a call as is thought to run whole, and keeps what it changes as it was before.
+    /// Saves the film rows of a tile, and dispatches as many samples as are expected to be complete.
     fn dispatch_part(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
         let rows = Rows::of(film, tile);
@@ -431,8 +425,8 @@ impl Gpu {
         Ok(())
     }
 
-    /// Brings a dispatch that has ended to its end, and submits the next one of the call, if there is any. One that was cut
-    /// short is undone, and the next ones have fewer samples.
+    /// Ends a finished dispatch and submits the next one, if any. A truncated dispatch is undone and repeated with half
+    /// the samples.
     fn end_part(&mut self, pending: Pending) -> Result<(), RenderError> {
         let Pending {
             tile,
@@ -474,7 +468,7 @@ impl Gpu {
         })
     }
 
-    /// The pending call's next step, if its dispatch has ended.
+    /// Advances the pending work if its dispatch has ended.
     fn step(&mut self) -> Result<(), RenderError> {
         let Some(pending) = self.pending.take() else {
             return Ok(());
@@ -489,7 +483,8 @@ impl Gpu {
         }
     }
 
-    /// After an error there is no film. The receipt may still be mapped then, and takes no copy: there is a new one.
+    /// Discards the film after an error. The completion buffer is replaced, since it may still be mapped, and copies to
+    /// it would fail.
     fn or_lost<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
         let result = self.explained(result, None);
         if result.is_err() {
@@ -516,7 +511,7 @@ impl Gpu {
         }
     }
 
-    /// A single sample is too long for the driver.
+    /// Returns the error for a single sample that exceeds the loop limit of the driver.
     fn cut_short(&self) -> RenderError {
         RenderError::LoopTruncated {
             device: self.device.info.name.clone(),
@@ -524,20 +519,18 @@ impl Gpu {
     }
 }
 
-/// The kernel that adds samples.
 fn kernel_of(adaptive: bool) -> &'static Kernel {
     if adaptive { &ADAPTIVE } else { &RENDER }
 }
 
-/// The size of a receipt in bytes.
 const RECEIPT: u64 = size_of::<[u32; 2]>() as u64;
 
-/// A buffer for a receipt that the host reads, and for the times of its call.
+/// Creates the mappable buffer for a completion record and the timestamps of its dispatch.
 fn receipt_to_read(device: &Device) -> wgpu::Buffer {
     device.buffer(RECEIPT + TIMES, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }
 
-/// A film of the records that a kernel has written: its lists, one after the other, but for those that it does not have.
+/// Converts the records of a kernel to a film. They contain its non-empty lists in order.
 fn film_of(region: Region, form: Form, records: &[Vec4]) -> Film {
     let mut film = Film::of(region, form);
     let lists = film.lists_mut().filter(|list| !list.is_empty());
@@ -547,7 +540,6 @@ fn film_of(region: Region, form: Form, records: &[Vec4]) -> Film {
     film
 }
 
-/// The workgroups of a tile, along each side.
 fn groups(tile: Region) -> [u32; 2] {
     [tile.width(), tile.height()].map(|pixels| pixels.div_ceil(WORKGROUP))
 }
@@ -556,7 +548,7 @@ impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.idle()?;
         let started = self.rules.begin(region)?;
-        self.film = None; // before the next one: the two together may not fit
+        self.film = None; // freed first, since both may not fit into memory
         let film = self.target(self.rules.form().bytes(), region)?;
         self.film = Some((film, started));
         Ok(())
@@ -650,7 +642,7 @@ impl Backend for Gpu {
         let beside = 2 * (u64::from(picture.width()) + u64::from(picture.height())) + 4;
         match picture.pixels() <= most {
             true => most,
-            false => most.saturating_sub(beside), // a part of it comes with the pixels around
+            false => most.saturating_sub(beside), // a region comes with the pixels around it
         }
     }
 }

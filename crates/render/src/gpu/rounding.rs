@@ -1,4 +1,5 @@
-//! Quotients and square roots that are rounded correctly on devices whose own are not.
+//! Correctly rounded quotients and square roots on devices whose own are not: naga modules with the operations replaced
+//! by calls.
 
 use std::collections::HashMap;
 
@@ -8,21 +9,20 @@ use naga::{
     TypeInner,
 };
 
-/// Who rounds quotients and square roots.
+/// Implementation of quotients and square roots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
-    /// The device: lavapipe correctly, GPUs within 2.5 units in the last place (WGSL, section 15.7.4).
+    /// Operations of the device: correctly rounded on lavapipe, within 2.5 ULP on GPUs (WGSL, section 15.7.4).
     Device,
-    /// The functions of `shaders/rounding.wgsl`, correctly everywhere, at some cost.
+    /// Functions of `shaders/rounding.wgsl`: correctly rounded everywhere, but slower.
     Software,
 }
 
-/// Calls that take the place of expressions, by the expression.
+/// Calls by the expression that they replace.
 type Calls = HashMap<Handle<Expression>, (Handle<Function>, Vec<Handle<Expression>>)>;
 
-/// What takes the place of a quotient, by the number of components.
+/// Replacements by number of components.
 const QUOTIENTS: [&str; 4] = ["quotient", "quotient2", "quotient3", "quotient4"];
-/// What takes the place of a square root, by the number of components.
 const SQUARE_ROOTS: [&str; 4] = ["square_root", "square_root2", "square_root3", "square_root4"];
 
 /// A function that `shaders/rounding.wgsl` lacks.
@@ -30,9 +30,9 @@ const SQUARE_ROOTS: [&str; 4] = ["square_root", "square_root2", "square_root3", 
 #[error("there is no function '{0}'")]
 pub struct Missing(&'static str);
 
-/// Puts calls of the functions of `shaders/rounding.wgsl` in the place of all quotients and square roots of floats.
+/// Replaces all float quotients and square roots by calls of the functions of `shaders/rounding.wgsl`.
 pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), Missing> {
-    // the two that divide and take roots themselves
+    // These functions use the operations of the device.
     let own = [named(module, QUOTIENTS[0])?, named(module, SQUARE_ROOTS[0])?];
     let mut in_functions = Vec::new();
     for (handle, function) in module.functions.iter() {
@@ -60,7 +60,6 @@ fn named(module: &Module, name: &'static str) -> Result<Handle<Function>, Missin
     found.map(|(handle, _)| handle).ok_or(Missing(name))
 }
 
-/// What is to be called in a function.
 fn calls_of(module: &Module, function: &Function, info: &FunctionInfo) -> Result<Calls, Missing> {
     let mut calls = Calls::new();
     for (handle, expression) in function.expressions.iter() {
@@ -80,14 +79,14 @@ fn calls_of(module: &Module, function: &Function, info: &FunctionInfo) -> Result
         let components = match info[handle].ty.inner_with(&module.types) {
             TypeInner::Scalar(s) if s.kind == ScalarKind::Float => 1,
             TypeInner::Vector { size, scalar } if scalar.kind == ScalarKind::Float => *size as usize,
-            _ => continue, // of integers
+            _ => continue, // integers
         };
         calls.insert(handle, (named(module, names[components - 1])?, arguments));
     }
     Ok(calls)
 }
 
-/// Evaluates expressions up to each that a call replaces, then calls.
+/// Splits the evaluation of expressions at each replaced one, and inserts its call.
 fn call(block: &mut Block, expressions: &mut Arena<Expression>, calls: &Calls) {
     for (statement, span) in std::mem::take(block).span_into_iter() {
         let Statement::Emit(range) = statement else {
@@ -121,7 +120,6 @@ fn call(block: &mut Block, expressions: &mut Arena<Expression>, calls: &Calls) {
     }
 }
 
-/// A statement whose inner blocks call.
 fn with_calls(mut statement: Statement, expressions: &mut Arena<Expression>, calls: &Calls) -> Statement {
     match &mut statement {
         Statement::Block(block) => call(block, expressions, calls),

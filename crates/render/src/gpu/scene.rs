@@ -1,4 +1,4 @@
-//! A scene's buffers on a device.
+//! GPU buffers of a scene.
 
 use bytemuck::bytes_of;
 use glam::{UVec4, Vec4};
@@ -12,7 +12,7 @@ use super::texels::TexelParts;
 use crate::error::RenderError;
 use crate::records::{Camera, FILTER_BINS_MAX, Packed};
 
-/// What a scene takes on a device, in bytes.
+/// Returns the memory that a scene needs on a device, in bytes.
 pub fn bytes_of_scene(packed: &Packed) -> u64 {
     let of_rows = rows(packed).len() + node_rows_count(packed) + mesh_rows_count(packed);
     let sizes = [
@@ -25,17 +25,17 @@ pub fn bytes_of_scene(packed: &Packed) -> u64 {
     sizes.iter().map(|size| *size as u64).sum()
 }
 
-/// What kernels read of a scene.
+/// Buffers and bind groups of a scene.
 pub struct SceneBuffers {
     camera: wgpu::Buffer,
-    /// The groups of `shaders/bindings.wgsl` behind the first: what changes with the scene, and with its shapes.
+    /// Groups 1 and 2 of `shaders/bindings.wgsl`: the scene, and its shapes.
     pub groups: [wgpu::BindGroup; 2],
-    /// What they take, in bytes.
+    /// Memory in bytes.
     pub bytes: u64,
 }
 
 impl SceneBuffers {
-    /// Uploads a scene whose texels lie in these parts.
+    /// Uploads a scene, with its texels in these parts.
     pub fn upload(
         device: &Device,
         packed: &Packed,
@@ -74,7 +74,6 @@ impl SceneBuffers {
         uploaded().map_err(|error| Held::default().explain(error, Some(&("the scene".to_string(), bytes))))
     }
 
-    /// Changes the camera.
     pub fn set_camera(&self, device: &Device, camera: &Camera) {
         device.queue.write_buffer(&self.camera, 0, bytes_of(camera));
     }

@@ -1,8 +1,8 @@
-//! SPIR-V whose floating-point arithmetic no driver may fuse or reorder, nor round as it likes.
+//! SPIR-V transformations that forbid drivers to fuse or reorder float operations, and request float controls.
 
 use super::controls::FloatControls;
 
-/// Opcodes of float arithmetic that naga writes: negate, add, subtract, multiply, divide, vector times scalar, dot.
+/// Opcodes of float arithmetic that naga emits: negate, add, subtract, multiply, divide, vector times scalar, dot.
 pub const ARITHMETIC: [u16; 7] = [127, 129, 131, 133, 136, 142, 148];
 
 /// Opcodes of conversions between floats and integers.
@@ -14,7 +14,7 @@ const FIRST_TYPE: u16 = 19; // OpTypeVoid
 const LAST_TYPE: u16 = 39; // OpTypeForwardPointer
 const HEADER: usize = 5;
 
-// The opcodes of the first sections of a module, in their order (SPIR-V 1.6, section 2.4).
+// Opcodes of the first sections of a module, in their order (SPIR-V 1.6, section 2.4).
 const OP_CAPABILITY: u16 = 17;
 const OP_EXTENSION: u16 = 10;
 const OP_EXT_INST_IMPORT: u16 = 11;
@@ -22,12 +22,12 @@ const OP_MEMORY_MODEL: u16 = 14;
 const OP_ENTRY_POINT: u16 = 15;
 const OP_EXECUTION_MODE: u16 = 16;
 
-/// The extension that float controls are of below SPIR-V 1.4.
+/// Extension of the float controls before SPIR-V 1.4.
 const FLOAT_CONTROLS: &[u8] = b"SPV_KHR_float_controls";
-/// Width of the floats that are asked about, in bits.
+/// Float width of the controls in bits.
 const WIDTH: u32 = 32;
 
-/// The instructions of a module: opcode and words, the first of which holds opcode and length.
+/// Returns the instructions of a module: opcode and words. The first word contains opcode and length.
 pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     let mut rest = module.get(HEADER..).unwrap_or(&[]);
     std::iter::from_fn(move || {
@@ -38,15 +38,14 @@ pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     })
 }
 
-/// Where the instructions that a module starts with, as long as they are of these kinds, come to their end.
+/// Returns the end of the leading instructions whose opcodes match.
 fn end_of(module: &[u32], kind: impl Fn(u16) -> bool) -> usize {
     let first = instructions(module).take_while(|(opcode, _)| kind(*opcode));
     HEADER + first.map(|(_, words)| words.len()).sum::<usize>()
 }
 
-/// Decorates the result of every float operation with `NoContraction` (SPIR-V 1.6, section 3.20): it is then computed
-/// as written, each operation rounded by itself. So with conversions: Mesa would make f32(i32(x)) a truncation, which
-/// keeps the sign of -0.
+/// Decorates all float operations with `NoContraction` (SPIR-V 1.6, section 3.20), so that each is rounded separately.
+/// Conversions too: Mesa would turn f32(i32(x)) into a truncation, which keeps the sign of -0.
 pub fn forbid_contraction(module: &[u32]) -> Vec<u32> {
     let decorations = instructions(module)
         .filter(|(opcode, _)| ARITHMETIC.contains(opcode) || CONVERSIONS.contains(opcode))
@@ -60,8 +59,8 @@ pub fn forbid_contraction(module: &[u32]) -> Vec<u32> {
         .collect()
 }
 
-/// Asks for float controls of 32 bits in every entry point of a module: for each its capability and its execution mode
-/// (SPIR-V 1.6, sections 3.31 and 3.6), and for all of them the extension.
+/// Requests 32-bit float controls in all entry points: capabilities and execution modes (SPIR-V 1.6, sections 3.31 and
+/// 3.6), and the extension.
 pub fn ask_for(controls: FloatControls, module: &[u32]) -> Vec<u32> {
     let wanted: Vec<(u32, u32)> = [
         (controls.denormals, (4464, 4459)),
@@ -102,12 +101,11 @@ pub fn ask_for(controls: FloatControls, module: &[u32]) -> Vec<u32> {
     out
 }
 
-/// The first word of an instruction of so many words.
 fn instruction(opcode: u16, words: usize) -> u32 {
     (words as u32) << 16 | u32::from(opcode)
 }
 
-/// `OpExtension` with a name, which ends with a zero byte and is filled up to whole words with more of them.
+/// Returns `OpExtension` with a name, which is zero-terminated and padded with zeros to whole words.
 fn extension(name: &[u8]) -> Vec<u32> {
     let mut bytes = name.to_vec();
     bytes.resize((name.len() / 4 + 1) * 4, 0);
@@ -138,8 +136,7 @@ mod tests {
         checked.exact_entry("half", &[], Rounding::Device, controls).unwrap()
     }
 
-    /// The place of an instruction's section in a module, as SPIR-V orders them; `None` for those of functions, and for
-    /// what stands among types.
+    /// Returns the index of an instruction's section; `None` inside functions and for opcodes among the types.
     fn section(opcode: u16) -> Option<usize> {
         let sections: [&[u16]; 9] = [
             &[17],
@@ -160,8 +157,8 @@ mod tests {
         before_functions.map(|(opcode, _)| section(opcode)).is_sorted()
     }
 
-    /// What a module asks for: its capabilities and its execution modes with their operands, of those that are of float
-    /// controls; and whether it names the extension.
+    /// Returns the float-control capabilities, the execution modes with operands, and true if the extension is
+    /// declared.
     fn asked(module: &[u32]) -> (Vec<u32>, Vec<Vec<u32>>, bool) {
         let of = |wanted: u16| instructions(module).filter(move |(opcode, _)| *opcode == wanted);
         let controls = 4459..=4468;

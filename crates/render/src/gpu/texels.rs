@@ -1,4 +1,4 @@
-//! What a device may see of a scene: buffers of a largest size, and texels in as many of them as they take.
+//! Buffer limits of a device: scenes that exceed them are rejected, and texels are split across several buffers.
 
 use std::fmt::Write as _;
 
@@ -10,16 +10,16 @@ use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
 use crate::error::RenderError;
 use crate::records::Packed;
 
-/// How a scene's texels lie in buffers: all but the last have 2^shift words.
+/// Distribution of texels to buffers. All but the last have 2^shift words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TexelParts {
-    /// How many buffers there are, at least 1.
+    /// Number of buffers, at least 1.
     pub count: usize,
     shift: u32,
 }
 
 impl TexelParts {
-    /// What a device needs for a scene, if the device has it.
+    /// Returns the distribution for a scene, or an error if the scene exceeds the limits of the device.
     pub fn of(info: &Info, packed: &Packed) -> Result<TexelParts, RenderError> {
         let largest = info.largest_binding.min(info.largest_buffer);
         let too_large = |message: String| RenderError::TooLarge {
@@ -57,7 +57,7 @@ impl TexelParts {
         Ok(TexelParts { count, shift })
     }
 
-    /// The texels of each buffer.
+    /// Returns the texels of each buffer.
     pub fn split<'a>(&self, texels: &'a [u32]) -> impl Iterator<Item = &'a [u32]> + use<'a> {
         let size = 1 << self.shift;
         (0..self.count)
@@ -65,8 +65,8 @@ impl TexelParts {
             .map(move |rest| &rest[..rest.len().min(size)])
     }
 
-    /// The function of `shaders/texels.wgsl` over these buffers, and those that are not bound otherwise; `None` if there is
-    /// only one.
+    /// Returns WGSL with the function of `shaders/texels.wgsl` for several buffers, and their bindings except the
+    /// first. `None` for one buffer.
     pub fn wgsl(&self) -> Option<String> {
         if self.count == 1 {
             return None;

@@ -1,4 +1,4 @@
-//! How long a device takes for a call, as it tells itself.
+//! Durations of dispatches by GPU timestamps.
 
 use std::time::Duration;
 
@@ -6,10 +6,10 @@ use wgpu::BufferUsages;
 
 use super::device::Device;
 
-/// What a call's times take, in bytes: its start and its end.
+/// Size in bytes of the timestamps of a dispatch: start and end.
 pub const TIMES: u64 = 2 * size_of::<u64>() as u64;
 
-/// Notes the start and the end of each call, where the device has a clock.
+/// Timestamps of dispatches, on devices that support them.
 pub struct Timer {
     clock: Option<Clock>,
 }
@@ -17,12 +17,12 @@ pub struct Timer {
 struct Clock {
     queries: wgpu::QuerySet,
     ticks: wgpu::Buffer,
-    /// Nanoseconds of a tick.
+    /// Nanoseconds per tick.
     period: f64,
 }
 
 impl Timer {
-    /// One for a device; it tells nothing if that has no clock.
+    /// Creates a timer, which returns no durations if the device has no clock.
     pub fn new(device: &Device) -> Timer {
         let has_clock = device.device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         Timer {
@@ -38,7 +38,7 @@ impl Timer {
         }
     }
 
-    /// What a pass notes.
+    /// Returns the timestamp queries of a compute pass.
     pub fn writes(&self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         self.clock.as_ref().map(|clock| wgpu::ComputePassTimestampWrites {
             query_set: &clock.queries,
@@ -47,7 +47,7 @@ impl Timer {
         })
     }
 
-    /// Copies what a pass has noted into a buffer.
+    /// Copies the timestamps of a pass to a buffer.
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, offset: u64) {
         if let Some(Clock { queries, ticks, .. }) = &self.clock {
             encoder.resolve_query_set(queries, 0..2, ticks, 0);
@@ -55,13 +55,13 @@ impl Timer {
         }
     }
 
-    /// The time between two counts of ticks, each in two words.
+    /// Returns the duration between two timestamps of two words each.
     pub fn took(&self, words: &[u32]) -> Option<Duration> {
         let clock = self.clock.as_ref()?;
         let [a, b, c, d] = *words else { return None };
         let ticks = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
         let between = ticks(c, d).checked_sub(ticks(a, b)).filter(|ticks| *ticks > 0)?;
         let nanoseconds = between as f64 * clock.period;
-        (nanoseconds < 3.6e12).then(|| Duration::from_nanos(nanoseconds as u64)) // an hour is no call's time
+        (nanoseconds < 3.6e12).then(|| Duration::from_nanos(nanoseconds as u64)) // longer durations are invalid
     }
 }

@@ -1,4 +1,4 @@
-//! The bands of a picture, one after the other, or all of them little by little.
+//! Rendering of an image in bands of rows: one after the other, or all together in passes.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -14,57 +14,56 @@ use crate::film::{Film, Form};
 use wgray_image::Region;
 use wgray_image::memory::fallible;
 
-/// What follows a call.
+/// Action after a dispatch, as decided by the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
-    /// The next call.
+    /// Continue with the next dispatch.
     GoOn,
-    /// Of a picture that grows as a whole, nothing more; of another one, the next call. Every pixel gets a sample all the same.
+    /// Stop a render of all bands together as soon as every pixel has a sample; otherwise continue.
     TimeIsUp,
-    /// Nothing more: the work is cancelled.
+    /// Cancel the work.
     Cancel,
 }
 
 impl From<bool> for Flow {
-    /// Whether to go on.
+    /// Maps true to [`Flow::GoOn`] and false to [`Flow::Cancel`].
     fn from(goes_on: bool) -> Flow {
         if goes_on { Flow::GoOn } else { Flow::Cancel }
     }
 }
 
-/// What is told of a band that is being rendered, and of the share of all bands' work that is done, from 0 to 1. Returns
-/// what follows.
+/// Callback after each dispatch, with the region of the band and the fraction of all work that is done, 0 to 1.
 pub type Watch<'a> = dyn FnMut(&mut dyn Backend, Region, f64) -> Result<Flow, RenderError> + 'a;
 
-/// The bands of a region, rendered from the top at the pace that was learnt so far. What is kept of them is not rendered
-/// again.
+/// Renders the bands of a region from the top, and adapts the size of dispatches to the measured speed. Pieces from a
+/// checkpoint are not rendered again.
 pub struct Bands<'a> {
     store: &'a mut dyn CheckpointStore,
     bands: VecDeque<Band>,
     samples: u32,
-    /// Whether all bands grow together, and whether they have done so.
+    /// True once bands that are rendered together are complete; `None` if they are rendered one after the other.
     whole: Option<bool>,
-    /// The samples at the end of the current pass over all bands, if whole passes are kept.
+    /// Number of samples at the end of the current pass, under [`Bands::in_passes`].
     pass: Option<u32>,
     steps: Steps,
-    /// Samples of pixels, in the bands that were handed out and in all.
+    /// Samples over all pixels, in finished bands and in total.
     done: f64,
     total: f64,
-    /// When a piece was kept last, and how long that took.
+    /// Time and duration of the last checkpoint.
     kept: (Instant, Duration),
-    /// The samples of pixels that were rendered, and not read.
+    /// Samples over all pixels that were rendered, not loaded.
     rendered: f64,
 }
 
-/// A band that is handed out.
+/// A rendered band.
 pub struct Finished {
-    /// Its pixels.
+    /// The pixels.
     pub film: Film,
-    /// The fewest samples of a pixel.
+    /// Minimum number of samples of a pixel.
     pub min_samples: u32,
-    /// The samples that each pixel was to have by now: under adaptive sampling the maximum of one.
+    /// Number of samples requested per pixel so far; under adaptive sampling a maximum.
     pub requested_samples: u32,
-    /// Rays from the camera that they have got.
+    /// Number of camera rays.
     pub camera_rays: u64,
 }
 
@@ -97,38 +96,35 @@ impl Finished {
     }
 }
 
-/// Some rows, and how far they are.
 struct Band {
     region: Region,
     state: State,
-    /// The piece after the last whole pass over all bands, if the current pass has changed it.
+    /// The piece after the last whole pass, if the current pass has changed it.
     passed: Option<Piece>,
 }
 
 enum State {
-    /// Nothing is rendered.
     New,
-    /// The store has what is rendered.
+    /// In the checkpoint store.
     Stored(StoredPiece),
-    /// This is rendered.
+    /// In memory.
     Here(Piece),
 }
 
-/// Why the work on a band ended.
 #[derive(PartialEq, Eq)]
 enum End {
     Done,
     TimeIsUp,
 }
 
-/// Duration of a pass over a film on the device. After it the film is copied.
+/// Target duration of a pass over a film, after which it is copied.
 const PASS: Duration = Duration::from_secs(1);
 
-/// The fewest rows of a band that is made small: under adaptive sampling each has two more for its neighbours.
+/// Minimum rows of a shortened band, without and with adaptive sampling, which adds two rows for the neighbors.
 const LEAST_ROWS: [u32; 2] = [16, 64];
 
 impl<'a> Bands<'a> {
-    /// The bands of a region, as far as a store has them. A region without pixels has none. The store's pieces lie in the region.
+    /// Splits a region into bands, and takes over the pieces of a store, which must lie in the region.
     pub fn new(
         region: Region,
         samples: u32,
@@ -167,20 +163,18 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// The same bands, but all pixels of all of them get a few samples before any gets more. They are in memory together, in
-    /// films of this form.
+    /// Renders all bands together, with all films in memory: every pixel gets a few samples before any gets more.
     ///
     /// # Errors
     ///
-    /// [`RenderError::Memory`] where there is no room for them.
+    /// [`RenderError::Memory`] if the films do not fit.
     pub fn as_a_whole(mut self, form: Form) -> Result<Bands<'a>, RenderError> {
         there_is_memory(self.pixels().saturating_mul(form.bytes() as u64))?;
         self.whole = Some(false);
         Ok(self)
     }
 
-    /// Like [`Bands::as_a_whole`], for [`Bands::next_pass`]: the films of the last whole pass are kept while the next pass is
-    /// rendered.
+    /// Like [`Bands::as_a_whole`], for [`Bands::next_pass`]: also keeps the films of the last whole pass.
     ///
     /// # Errors
     ///
@@ -196,13 +190,12 @@ impl<'a> Bands<'a> {
         self.bands.iter().map(|band| band.region.pixels()).sum()
     }
 
-    /// Renders the next band and hands it out; `None` once all are. After an error it is the same band again, from where it was
-    /// kept last, which another backend may render. `made` is told whenever the work has come further for good.
+    /// Renders and returns the next band; `None` after the last one. After an error, the next call resumes the same
+    /// band from its last checkpoint, possibly on another backend. Calls `made` whenever progress is stored.
     ///
     /// # Errors
     ///
-    /// The errors of the backend and of `watch`, and [`RenderError::Cancelled`] if `watch` says not to go on; the band is
-    /// kept then.
+    /// Errors of the backend and of `watch`. [`RenderError::Cancelled`] if `watch` cancels; the band is stored first.
     pub fn render_next(
         &mut self,
         backend: &mut dyn Backend,
@@ -227,13 +220,13 @@ impl<'a> Bands<'a> {
         match band.state {
             State::Here(piece) => Ok(Some(Finished::of(piece))),
             State::Stored(kept) => Ok(Some(Finished::of(self.store.load(kept.number)?))),
-            State::New => Err(RenderError::NoFilm), // the work has made a piece of it
+            State::New => Err(RenderError::NoFilm), // not possible: `work` has created a piece
         }
     }
 
-    /// Renders one more pass over all bands, of one or several samples per pixel, and returns how many samples every pixel
-    /// has. Returns `None` once they have all samples or the time is up; then [`Bands::render_next`] hands the bands out.
-    /// After an error the pass can be continued, and [`Bands::last_pass`] has the pass before it.
+    /// Renders one more pass over all bands, of one or several samples per pixel. Returns the number of samples of
+    /// every pixel; `None` if they are complete or the time is up, after which [`Bands::render_next`] returns the
+    /// bands. After an error the pass can be continued, and [`Bands::last_pass`] returns the pass before it.
     ///
     /// # Errors
     ///
@@ -263,7 +256,7 @@ impl<'a> Bands<'a> {
         Ok(Some(self.passed_samples()))
     }
 
-    /// Returns the samples that every pixel had after the last whole pass, 0 if there was none.
+    /// Returns the number of samples of every pixel after the last whole pass.
     pub fn passed_samples(&self) -> u32 {
         let samples = |band: &Band| match &band.passed {
             Some(piece) => piece.reached.pass.start,
@@ -272,11 +265,11 @@ impl<'a> Bands<'a> {
         self.bands.iter().map(samples).min().unwrap_or(self.samples)
     }
 
-    /// Hands out copies of all bands after the last whole pass, from the top.
+    /// Passes copies of all bands after the last whole pass to `output`, from the top.
     ///
     /// # Errors
     ///
-    /// The errors of `output`, and of a store that cannot load a piece.
+    /// Errors of `output`, and of a store that cannot load a piece.
     pub fn last_pass(
         &mut self,
         output: &mut dyn FnMut(Finished) -> Result<(), RenderError>,
@@ -292,8 +285,8 @@ impl<'a> Bands<'a> {
         Ok(())
     }
 
-    /// Returns the samples at the end of the pass that follows `have` samples. A pass is long enough to make the cost of copying
-    /// films small. Every power of two is the end of a pass.
+    /// Returns the number of samples at the end of the pass that follows `have` samples. A pass is long enough to
+    /// amortize the copies of films. Every power of two ends a pass.
     fn end_of_pass(&self, have: u32) -> u32 {
         let count = match self.bands.len() {
             1 => (self.steps.speed().unwrap_or(0.0) * PASS.as_secs_f64() / self.pixels() as f64) as u32,
@@ -303,7 +296,7 @@ impl<'a> Bands<'a> {
         have.saturating_add(count.max(1)).min(power).min(self.samples)
     }
 
-    /// The share of the samples of all bands handed out that were rendered, and not found where they were kept: 0 to 1.
+    /// Returns the fraction of the samples in finished bands that were rendered, not loaded: 0 to 1.
     pub fn fraction_rendered(&self) -> f64 {
         if self.done > 0.0 {
             (self.rendered / self.done).min(1.0)
@@ -312,7 +305,7 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// Gives all bands their samples, some at a time, until they have them or the time is up.
+    /// Renders all bands together until they are complete or the time is up.
     fn grow(
         &mut self,
         backend: &mut dyn Backend,
@@ -327,12 +320,12 @@ impl<'a> Bands<'a> {
             if self.work_on_all(until, backend, watch, made)? == End::TimeIsUp || until >= self.samples {
                 return Ok(());
             }
-            // The films are copied to and fro for every round: a fourth more, when there are many.
+            // Each round copies the films of all bands: with many samples a round adds a quarter.
             until = (until + (until / 4).max(1)).min(self.samples);
         }
     }
 
-    /// Renders all bands until their pixels have so many samples, or the time is up.
+    /// Renders all bands until their pixels have `until` samples, or the time is up.
     fn work_on_all(
         &mut self,
         until: u32,
@@ -352,7 +345,7 @@ impl<'a> Bands<'a> {
         Ok(End::Done)
     }
 
-    /// Cuts the first band so that it takes about as long as a piece should.
+    /// Shortens the first band to about one checkpoint interval.
     fn make_first_small(&mut self, backend: &dyn Backend) {
         let Some(Band {
             region,
@@ -382,7 +375,6 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// Renders a band until all of its pixels have so many samples.
     fn work(
         &mut self,
         i: usize,
@@ -451,12 +443,12 @@ impl<'a> Bands<'a> {
     }
 
     fn is_time_to_keep(&self) -> bool {
-        // Keeping should take no more than a tenth of the time.
+        // Checkpoints take at most a tenth of the time.
         let (last, took) = self.kept;
         last.elapsed() >= self.store.interval().max(9 * took)
     }
 
-    /// Takes what the backend has of a band, and keeps it where it is finished, or it is time to.
+    /// Copies a band from the backend, and stores it if it is complete or a checkpoint is due.
     fn take(&mut self, i: usize, backend: &mut dyn Backend, at_the_end: bool) -> Result<(), RenderError> {
         let start = Instant::now();
         let region = self.bands[i].region;
@@ -487,7 +479,7 @@ impl<'a> Bands<'a> {
         Ok(())
     }
 
-    /// Keeps the other bands of a picture that grows as a whole, as far as they have grown since they were kept.
+    /// Stores the other bands in memory that have changed since they were stored.
     fn keep_others(&mut self, i: usize) {
         let kept = self.store.pieces();
         for (k, band) in self.bands.iter().enumerate() {
@@ -517,23 +509,23 @@ impl Band {
         }
     }
 
-    /// The samples that all of its pixels have, of so many.
+    /// Number of samples that every pixel has.
     fn samples(&self, all: u32) -> u32 {
         self.reached().map_or(0, |reached| reached.pass.start.min(all))
     }
 
-    /// The samples of its pixels, of so many each; those of a pass that is under way do not count.
+    /// Samples over all pixels, without those of an incomplete pass.
     fn work(&self, all: u32) -> f64 {
         self.region.pixels() as f64 * f64::from(self.samples(all))
     }
 }
 
-/// Checks that so many bytes can be allocated, by an allocation that is freed at once: a failure is an error here, and would
-/// end the program later.
+/// Checks that an amount of memory is available, by an allocation that is freed at once. A later failure would abort
+/// the program.
 ///
 /// # Errors
 ///
-/// [`RenderError::Memory`] if not.
+/// [`RenderError::Memory`] if it is not.
 pub fn there_is_memory(bytes: u64) -> Result<(), RenderError> {
     match usize::try_from(bytes).is_ok_and(|bytes| fallible(|| Vec::<u8>::new().try_reserve_exact(bytes)).is_ok()) {
         true => Ok(()),

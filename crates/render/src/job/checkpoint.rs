@@ -56,11 +56,11 @@ pub enum CheckpointError {
 pub struct Opening<'a> {
     /// Path of the file, or of a folder in which each job has its own file.
     pub path: PathBuf,
-    /// Whether to resume from an existing file.
+    /// Resume from an existing file.
     pub resume: bool,
     /// Interval at which the unfinished piece is written.
     pub interval: Duration,
-    /// Called at intervals while another process writes the file; returns whether to keep waiting.
+    /// Called at intervals while another process writes the file; returns true to keep waiting.
     pub wait: Box<dyn FnMut() -> bool + 'a>,
     /// Reports problems that do not end the work.
     pub tell: Box<dyn FnMut(&str) + 'a>,
@@ -84,7 +84,7 @@ pub struct Checkpoint<'a> {
     tell: Box<dyn FnMut(&str) + 'a>,
     /// Length below which rewriting the file is not tried again after a failure.
     untidy: u64,
-    /// Whether a failed write and a lost file have been reported.
+    /// Flags of problems that were reported: a failed write, a lost file.
     reported: [bool; 2],
 }
 

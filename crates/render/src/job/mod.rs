@@ -1,5 +1,5 @@
-//! The schedule of work, above both backends: bands that fit memory, dispatches that end in time, progress and
-//! cancelling. Sums go on from the film's own values, so that every cut gives the same picture.
+//! Scheduling of work on any backend: bands that fit memory, dispatches of bounded duration, progress, cancellation,
+//! checkpoints and parts. Sums continue from the film's own values, so that every partition gives the same bits.
 
 mod bands;
 pub mod checkpoint;
@@ -24,23 +24,22 @@ pub use part::{PartError, PartHeader, Parts, Tile, read_part, write_part};
 pub use piece::{CheckpointStore, INTERVAL, NoCheckpoint, Piece, StoredPiece};
 pub use steps::{Order, Reached, Steps};
 
-/// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
-/// watchdogs, progress and cancelling.
+/// Target duration of a dispatch: long enough to hide its overhead, short enough for watchdogs and cancellation.
 const CALL: Duration = Duration::from_millis(60);
 
-/// How work is cut.
+/// Partition of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// The largest film, in pixels.
+    /// Maximum size of a film in pixels.
     pub band_pixels: u64,
-    /// The samples of one call, if not as many as time allows.
+    /// Samples per dispatch; `None` adapts to the speed.
     pub samples_per_call: Option<u32>,
-    /// The rows of one call, if not as many as time allows.
+    /// Rows per dispatch; `None` adapts to the speed.
     pub rows_per_call: Option<u32>,
 }
 
 impl Default for Cut {
-    /// Bands of 64 MiB, of 192 MiB under adaptive sampling.
+    /// Films of at most 64 MiB, 192 MiB under adaptive sampling.
     fn default() -> Cut {
         Cut {
             band_pixels: 4 << 20,
@@ -51,7 +50,7 @@ impl Default for Cut {
 }
 
 impl Cut {
-    /// [`Cut::default`], and with layers so few pixels that a band is no larger than one under adaptive sampling.
+    /// Returns [`Cut::default`], with smaller bands for layers: a film takes no more memory than an adaptive one.
     pub fn of(form: Form) -> Cut {
         const LISTS: u64 = 3;
         let cut = Cut::default();
@@ -62,8 +61,7 @@ impl Cut {
     }
 }
 
-/// The bands that a region is rendered in, from the top: whole rows, as many as a film has room for. A region without
-/// pixels has none.
+/// Splits a region into bands of whole rows that fit a film, from the top. A region without pixels has none.
 pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
     let [width, height] = [region.width(), region.height()].map(|n| u64::from(n.max(1)));
     let rows = (cut.band_pixels.min(largest_film) / width).clamp(1, height) as u32;
@@ -75,7 +73,8 @@ pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item
     })
 }
 
-/// What the rays through the centres of a region's pixels meet first, row by row from the top; in calls of bounded size.
+/// Returns the first hits of the rays through the pixel centers of a region, row by row from the top, in dispatches of
+/// bounded size.
 pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<FirstHit>, RenderError> {
     const CALL_PIXELS: u64 = 1 << 18;
     let cut = Cut {
@@ -89,8 +88,8 @@ pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<First
     Ok(hits)
 }
 
-/// Renders a region band by band, from the top, and hands each finished band to `output`. `progress` is told the share
-/// of the work that is done, from 0 to 1, and returns whether to go on.
+/// Renders a region band by band, from the top, and passes each band to `output`. `progress` receives the fraction of
+/// the work that is done, 0 to 1, and returns true to continue.
 pub fn render(
     backend: &mut dyn Backend,
     region: Region,
@@ -121,7 +120,7 @@ mod tests {
 
     use super::*;
 
-    /// Notes what it is asked for.
+    /// A backend that records its dispatches.
     struct Notes(Vec<(Region, Range<u32>)>);
 
     impl Backend for Notes {
@@ -175,7 +174,7 @@ mod tests {
             steps.start(&notes, region, 16);
             while steps.step(&mut notes).unwrap().is_some() {}
             assert_eq!(notes.0[0].1, first, "{order:?}");
-            // every sample of every pixel once, those of a pixel in their order
+            // Every pixel gets each sample once, in ascending order.
             let mut samples = [0; 64];
             for (tile, range) in notes.0 {
                 assert_eq!((tile.x0, tile.x1), (0, 64));
@@ -188,7 +187,7 @@ mod tests {
         }
     }
 
-    /// Notes what it is asked for; four samples of a pixel decide on those of its neighbours.
+    /// Like `Notes`, with adaptive sampling and four pilot samples.
     #[derive(Default)]
     struct Looks {
         film: Option<Region>,

@@ -1,29 +1,27 @@
-//! How much work a call is given, so that it ends in time.
+//! Adaptive size of dispatches, from the measured speed.
 
 use std::time::Duration;
 
-/// How fast work goes, learnt from the calls so far.
+/// The measured speed. Work counts samples over all pixels; speed is work per second.
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
-    /// How long a call should take.
+    /// Target duration of a dispatch.
     call: Duration,
-    /// Samples of pixels per second.
     speed: Option<f64>,
-    /// Samples of pixels per second, where no pixel leaves samples out.
+    /// Speed of dispatches in which no pixel skips samples.
     speed_of_all: f64,
-    /// The most samples of pixels in a call, once a larger one has failed.
+    /// Maximum work of a dispatch, after a larger one has failed.
     most: f64,
 }
 
 impl Pace {
-    /// A first call is small enough for the slowest device and scene.
+    /// Small enough for the slowest device and scene.
     const FIRST_CALL: f64 = 16384.0;
-    /// How much faster work may seem where pixels leave samples out: the next tile may have none that does.
+    /// Maximum speedup from pixels that skip samples under adaptive sampling. In the next tile none may skip.
     const MOST_LEFT_OUT: f64 = 8.0;
-    /// The fewest samples of pixels in a call: a workgroup's.
+    /// Minimum work of a dispatch: one workgroup.
     const LEAST: f64 = 64.0;
 
-    /// Nothing is known yet. A call aims to take `call`.
     pub fn new(call: Duration) -> Pace {
         Pace {
             call,
@@ -33,7 +31,7 @@ impl Pace {
         }
     }
 
-    /// A call has ended.
+    /// Records a finished dispatch. `of_all` means that no pixel skipped samples.
     pub fn took(&mut self, work: f64, time: Duration, of_all: bool) {
         let speed = work / time.as_secs_f64().max(1e-6);
         let speed = self.speed.map_or(speed, |known| speed.min(2.0 * known));
@@ -43,27 +41,26 @@ impl Pace {
         self.speed = Some(speed.min(Self::MOST_LEFT_OUT * self.speed_of_all));
     }
 
-    /// A call has failed, which may be because it took too long: the next ones are half as large at most.
+    /// Halves the maximum after a failed dispatch, which may have taken too long.
     pub fn failed(&mut self, work: f64) {
         self.most = self.most.min(work / 2.0);
     }
 
-    /// Other work comes, or another device does it.
+    /// Discards the speed, as the work or the device changes.
     pub fn forget(&mut self) {
         self.speed = None;
     }
 
-    /// No pixel of a new film leaves samples out at first.
+    /// Prepares for a new film, in which no pixel skips samples at first.
     pub fn start_film(&mut self) {
         self.speed = self.speed.map(|speed| speed.min(self.speed_of_all));
     }
 
-    /// Samples of pixels per second, once a call has been made.
     pub fn speed(&self) -> Option<f64> {
         self.speed
     }
 
-    /// The samples of pixels that fit a call.
+    /// Returns the work of the next dispatch.
     pub fn work(&self) -> f64 {
         let work = self
             .speed

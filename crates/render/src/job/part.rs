@@ -1,4 +1,5 @@
-//! Parts of a picture, rendered apart and joined: files of finished pieces, with the first hits where layers need them.
+//! Parts of an image that are rendered by separate processes and merged: files of finished pieces, with first hits if
+//! layers need them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -20,28 +21,28 @@ use wgray_image::Region;
 use wgray_image::waiting;
 use wgray_scene::{Integrator, ViewSettings, ViewTransform};
 
-/// What a picture needs besides the films of its parts.
+/// The contents of a part's header that the merged image needs besides the films.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartHeader {
-    /// Which part it is.
+    /// Number of the part.
     pub tile: Tile,
-    /// The layers, by their names.
+    /// Names of the layers.
     pub aovs: Vec<String>,
-    /// Whether the picture has alpha.
+    /// True if the image has alpha.
     pub alpha: bool,
-    /// The bits of the distance that is half bright in a PNG of the depth, as an f32.
+    /// Bits (f32) of the distance that a PNG of the depth maps to half brightness.
     pub middle_depth: u32,
-    /// How the picture is shown.
+    /// Name of the view transform.
     pub view_transform: String,
-    /// The bits of the exposure in stops, as an f64.
+    /// Bits (f64) of the exposure in stops.
     pub exposure: u64,
-    /// What is told in the picture about how it came to be, but for what rendered it: names and texts.
+    /// Metadata of the image as names and texts, except those of the renderer.
     pub told: Vec<(String, String)>,
 }
 
 impl PartHeader {
-    /// Describes why another part does not belong to the same image, or returns `None` if it does.
+    /// Returns the reason why another part does not belong to the same image, if any.
     fn difference(&self, other: &PartHeader, view_is_given: bool) -> Option<&'static str> {
         let view = |header: &PartHeader| (header.view_transform.clone(), header.exposure);
         if (&self.aovs, self.alpha) != (&other.aovs, other.alpha) {
@@ -55,8 +56,8 @@ impl PartHeader {
         }
     }
 
-    /// Refuses what this program never writes: pieces that are not finished, layers that nothing is there for, and numbers that show
-    /// nothing.
+    /// Rejects headers that this program never writes: unfinished pieces, layers without data, and invalid depths and
+    /// exposures.
     fn check(&self, identity: &Identity, entries: &[Entry]) -> Result<(), String> {
         let samples = identity.pixel_samples;
         for Entry {
@@ -88,7 +89,7 @@ impl PartHeader {
         exposure.map(drop).map_err(|rule| format!("its exposure {rule}"))
     }
 
-    /// That of a part of a picture.
+    /// Header of a part.
     pub fn of(tile: Tile, layout: &Layout, told: Metadata) -> PartHeader {
         PartHeader {
             tile,
@@ -102,18 +103,18 @@ impl PartHeader {
     }
 }
 
-/// One of so many parts of a picture.
+/// One of the parts of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tile {
-    /// Which one, counted from 1.
+    /// Number of the part, from 1.
     pub number: u32,
-    /// How many there are.
+    /// Number of parts.
     pub of: u32,
 }
 
 impl Tile {
-    /// Its rows of a region: as many as those of the others, or one more. `None` where there are more parts than rows.
+    /// Returns the part's rows of a region, balanced to one row; `None` if the region has fewer rows than parts.
     pub fn rows(self, region: Region) -> Option<Region> {
         let Tile { number, of } = self;
         let height = u64::from(region.height());
@@ -133,11 +134,11 @@ impl std::fmt::Display for Tile {
     }
 }
 
-/// Writes a part: what `render` hands to the sink, which are finished bands.
+/// Writes a part: the finished bands that `render` passes to the sink.
 ///
 /// # Errors
 ///
-/// The errors of `render`, and [`RenderError::Output`] if the file cannot be written.
+/// Errors of `render`, and [`RenderError::Output`] if the file cannot be written.
 pub fn write_part(
     mut file: Pending,
     identity: &Identity,
@@ -168,49 +169,48 @@ pub fn write_part(
     Ok(file.finish()?)
 }
 
-/// Returns what a file is a part of, and which one.
+/// Returns the job and the header of a part.
 ///
 /// # Errors
 ///
-/// Files that cannot be read, are not parts, or are damaged or truncated.
+/// Files that are unreadable, damaged, truncated or not parts.
 pub fn read_part(path: &Path) -> Result<(Identity, PartHeader), PartError> {
     let (_, header, part, _) = open(path)?;
     Ok((header.identity, part))
 }
 
-/// Why parts cannot be joined.
+/// Reasons why parts cannot be merged.
 #[derive(Debug, Error)]
 pub enum PartError {
-    /// A file that is no part, or a damaged one.
+    /// A damaged file, or one that is not a part of this image.
     #[error("{}: {what}", path.display())]
     Bad {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the error.
         what: String,
     },
-    /// Rows that no part has.
+    /// Missing rows.
     #[error("{0}")]
     Gap(String),
 }
 
-/// All parts of a picture.
+/// All parts of an image.
 #[derive(Debug)]
 pub struct Parts {
-    /// What they are of.
+    /// The job.
     pub identity: Identity,
-    /// What the picture needs besides, the same of all of them but for the tile.
+    /// The header, equal in all parts except for the tile.
     pub header: PartHeader,
-    /// The files: where they are, and the keys of their hashes. They are opened when they are read: there may be more than can be
-    /// open.
+    /// Paths and hash keys. Files are opened for each read, as the number of open files is limited.
     files: Vec<(PathBuf, Key)>,
-    /// The pieces by their first rows: the file, and where they are in it.
+    /// The file and the entry of each piece, by its first row.
     pieces: BTreeMap<u32, (usize, Entry)>,
 }
 
 impl Parts {
-    /// Looks at all parts of a picture, in any order: they are whole, of one job, and have every row once. They are shown in one
-    /// way, unless another one is given.
+    /// Opens the parts of an image in any order. Checks that they are complete, of one job, and cover every row once.
+    /// Their view settings must agree unless `view_is_given`.
     ///
     /// # Errors
     ///
@@ -257,7 +257,7 @@ impl Parts {
         }
     }
 
-    /// The first rows that no part has, the last of them with them.
+    /// Returns the first and the last row of the first gap.
     fn gap(&self) -> Option<(u32, u32)> {
         let Region { y0, y1, .. } = self.identity.region();
         let mut next = y0;
@@ -270,8 +270,7 @@ impl Parts {
         (next < y1).then(|| (next, y1 - 1))
     }
 
-    /// What a picture of all parts holds. Names that another version of the program has written, and this one does not know,
-    /// are left out; that of a part is the same version's.
+    /// Returns the layout of the merged image, without names that this version of the program does not know.
     pub fn layout(&self) -> Layout {
         let Identity {
             picture, pixel_samples, ..
@@ -294,18 +293,18 @@ impl Parts {
         }
     }
 
-    /// What is told in a picture of all parts.
+    /// Returns the metadata of the merged image.
     pub fn told(&self) -> Metadata {
         Metadata {
             pairs: self.header.told.clone(),
         }
     }
 
-    /// Hands all pieces to a sink, from the top.
+    /// Passes all pieces to a sink, from the top.
     ///
     /// # Errors
     ///
-    /// Those of the sink, and files that cannot be read any more.
+    /// Errors of the sink, and files that can no longer be read.
     pub fn read(&self, sink: &mut Sink) -> Result<(), RenderError> {
         let Identity { adaptive, layers, .. } = self.identity;
         for (number, entry) in self.pieces.values() {
@@ -327,7 +326,7 @@ impl Parts {
     }
 }
 
-/// Which parts rows are missing of, where that can be told.
+/// Describes missing rows, with the missing parts if all parts have the same count.
 fn missing(from: u32, to: u32, tiles: &[Tile]) -> String {
     let rows = match from == to {
         true => format!("row {from} is missing"),
@@ -400,7 +399,7 @@ mod tests {
     use super::*;
     use crate::film::Film;
 
-    /// What is told of a part of 4 x 3 pixels whose header and piece were changed; nothing if it is good.
+    /// Returns the error of a part of 4 x 3 pixels with a modified header and piece; empty if it is valid.
     fn told(change: impl Fn(&mut Header, &mut Piece)) -> String {
         let region = Region::whole(4, 3);
         let mut header = Header {
@@ -452,7 +451,7 @@ mod tests {
         header.part.as_mut().unwrap()
     }
 
-    /// Files with the right hashes that no program wrote. Fuzzing found the panic that the first made.
+    /// Files with correct hashes that the program never writes. Fuzzing found that the first case panicked.
     #[test]
     fn what_no_program_writes_is_refused() {
         assert_eq!(told(|_, _| ()), "");

@@ -1,4 +1,4 @@
-//! A piece of a picture: whole rows of it, as far as they are rendered, and what keeps pieces safe meanwhile.
+//! Pieces of an image, finished or not, and the interface of checkpoint stores.
 
 use std::time::Duration;
 
@@ -7,60 +7,60 @@ use crate::error::RenderError;
 use crate::film::Film;
 use wgray_image::Region;
 
-/// Some rows of a picture, as far as they are rendered. It can be gone on from, on any backend, to the same bits.
+/// Rows of an image with the samples that they have so far. Any backend can continue it, with the same bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Piece {
-    /// Whole rows of the pixels that the job is for.
+    /// Whole rows of the region of the job.
     pub region: Region,
-    /// Which samples they have.
+    /// Samples of the film's pixels.
     pub reached: Reached,
-    /// They, and as long as it is not finished the pixels around them that decide on their samples.
+    /// Film of the region. If the piece is unfinished, includes the neighbors that determine its sample counts.
     pub film: Film,
 }
 
-/// A piece that is kept somewhere.
+/// A piece in a store.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StoredPiece {
-    /// What the store knows it by.
+    /// Key for [`CheckpointStore::load`].
     pub number: usize,
-    /// Its pixels.
+    /// Rows of the piece.
     pub region: Region,
-    /// The pixels of its film.
+    /// Region of its film.
     pub film: Region,
-    /// Which samples they have.
+    /// Samples of the film's pixels.
     pub reached: Reached,
 }
 
-/// What keeps pieces while others are rendered.
+/// Storage of pieces while others are rendered.
 pub trait CheckpointStore {
-    /// The pieces that it has, from the top. No two have a row in common.
+    /// Returns the pieces from the top. No two of them share a row.
     fn pieces(&self) -> Vec<StoredPiece>;
 
-    /// One of its pieces.
+    /// Loads a piece.
     ///
     /// # Errors
     ///
-    /// What cannot be read.
+    /// Unreadable pieces.
     fn load(&mut self, number: usize) -> Result<Piece, RenderError>;
 
-    /// Keeps a piece, in place of one of the same rows. Where that fails the work goes on, and somebody is told.
+    /// Stores a piece, and replaces one of the same rows. A failure is reported and does not stop the work.
     fn keep(&mut self, piece: &Piece);
 
-    /// Makes sure that all kept so far outlives the machine.
+    /// Flushes all stored pieces to the disk.
     fn sync(&mut self);
 
-    /// How often unfinished pieces are kept.
+    /// Interval between checkpoints of unfinished pieces.
     fn interval(&self) -> Duration;
 
-    /// Whether pieces should be small enough to be finished about as often.
+    /// Returns true if pieces should take about one interval each.
     fn small_pieces(&self) -> bool;
 }
 
-/// Keeps nothing: what was rendered outlives a lost device, and not the program.
+/// A store that drops everything: the work survives a lost device, but not the process.
 #[derive(Debug)]
 pub struct NoCheckpoint;
 
-/// How often unfinished pieces are kept, if nothing else is said.
+/// Default interval between checkpoints.
 pub const INTERVAL: Duration = Duration::from_secs(30);
 
 impl CheckpointStore for NoCheckpoint {

@@ -1,11 +1,13 @@
-//! Files of pieces: a header that says what they are of, then one piece after the other, each with its hash. Numbers are
-//! little-endian. A file is only ever gone on with at its end, so that what was whole stays whole.
+//! File format of checkpoints and parts: a header that identifies the job, then pieces, each with a hash. Numbers are
+//! little-endian. Files are only appended to, so that complete pieces stay intact.
 //!
 //! | part | bytes |
 //! | --- | --- |
 //! | file | [`MAGIC`], header, pieces |
 //! | header | length (u32), JSON of a [`Header`], BLAKE3 hash of both |
-//! | piece | head (14 words: see `Head`), hash of it, the film's lists, first hits, hash of all these: BLAKE3 keyed with the header's, so that a piece of another file is none of this one |
+//! | piece | 14 words (see `Head`), hash of them, lists of the film, first hits, hash of all preceding bytes |
+//!
+//! The hashes of pieces are keyed with the hash of the header, so that pieces of other files are rejected.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -22,16 +24,16 @@ use crate::film::{Film, Form};
 use crate::records::FirstHit;
 use wgray_image::Region;
 
-/// The first bytes of such a file, which no program that moves text leaves as they are.
+/// First bytes of the file. Text conversions damage them.
 pub const MAGIC: &[u8; 16] = b"\x89wgray pieces\r\n\x1a";
 
-/// The version of the format.
+/// Version of the format.
 pub const FORMAT: u32 = 1;
 
-/// The largest header in bytes.
+/// Maximum length of the header in bytes.
 const LARGEST_HEADER: u32 = 1 << 20;
 
-/// What a file of pieces is of.
+/// Header of a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
@@ -39,29 +41,25 @@ pub struct Header {
     pub format: u32,
     /// The job.
     pub identity: Identity,
-    /// Of a part of a picture what else a picture of it needs; nothing in a checkpoint.
+    /// Data for the merged image; `None` in a checkpoint.
     pub part: Option<PartHeader>,
 }
 
-/// Where a piece is in a file, and what it is.
+/// Location and contents of a piece in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// Its rows.
     pub region: Region,
-    /// The pixels of its film.
     pub film: Region,
-    /// Which samples they have.
+    /// Samples of the film's pixels.
     pub reached: Reached,
-    /// Whether the first hits of its rows are there too.
+    /// True if the first hits of its rows follow the film.
     pub has_hits: bool,
-    /// Its first byte.
     pub start: u64,
-    /// One past its last byte.
     pub end: u64,
 }
 
 impl Entry {
-    /// Where a piece without first hits was written to.
+    /// Creates the entry of a piece without first hits.
     pub fn of(piece: &Piece, start: u64, bytes: u64) -> Entry {
         Entry {
             region: piece.region,
@@ -74,29 +72,28 @@ impl Entry {
     }
 }
 
-/// What a file turned out to hold.
+/// Result of scanning a file.
 pub struct Contents {
-    /// All whole pieces, in their order.
+    /// All complete pieces, in file order.
     pub entries: Vec<Entry>,
-    /// One past the last byte of the last of them, or of the header.
+    /// Offset after the last complete piece, or after the header.
     pub end: u64,
-    /// Bytes after that, which are no whole pieces.
+    /// Number of damaged or incomplete bytes after `end`.
     pub damaged: u64,
 }
 
-/// The words of a piece's head.
 const WORDS: usize = 14;
 const HASH: usize = blake3::OUT_LEN;
 const HEAD: u64 = (4 * WORDS + HASH) as u64;
 
-/// Counts and hashes what goes through it.
+/// A reader or writer that counts and hashes its bytes.
 struct Hashed<T> {
     inner: T,
     hasher: blake3::Hasher,
     bytes: u64,
 }
 
-/// The hash of a file's header, with which its pieces are hashed.
+/// Hash of a file's header, which keys the hashes of its pieces.
 pub type Key = [u8; HASH];
 
 impl<T> Hashed<T> {
@@ -128,7 +125,7 @@ impl<W: Write> Hashed<W> {
         Ok(())
     }
 
-    /// The hash of all so far, which counts among the bytes that follow.
+    /// Writes the hash of all bytes so far. Later hashes include it.
     fn put_hash(&mut self) -> io::Result<()> {
         let hash = self.hash();
         self.put(&hash)
@@ -163,7 +160,7 @@ impl<R: Read> Hashed<R> {
         Ok(())
     }
 
-    /// Whether what was read so far has the hash that follows.
+    /// Reads a hash. Returns true if it is that of all bytes so far.
     fn is_whole(&mut self) -> io::Result<bool> {
         let (hash, mut found) = (self.hash(), [0; HASH]);
         self.get(&mut found)?;
@@ -171,7 +168,7 @@ impl<R: Read> Hashed<R> {
     }
 }
 
-/// Writes the start of a file, and tells its hash and its length.
+/// Writes the magic and the header. Returns the hash and the number of bytes.
 pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u64)> {
     let text = serde_json::to_vec(header)?;
     let mut out = Hashed::new(out);
@@ -183,7 +180,7 @@ pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u
     Ok((key, MAGIC.len() as u64 + out.bytes))
 }
 
-/// Reads the start of a file, and tells its hash and its length. Of what is no such file, or a damaged one, the error says so.
+/// Inverse of [`write_header`]. Errors distinguish damaged headers from other files.
 pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
     let bad = |what: &str| io::Error::new(io::ErrorKind::InvalidData, what.to_owned());
     let none = |_| bad("it is not a part or checkpoint that wgray wrote");
@@ -205,7 +202,7 @@ pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
     if !input.is_whole().map_err(cut)? {
         return Err(cut(io::ErrorKind::InvalidData.into()));
     }
-    // The program's version is told even where another one has written a header of other fields.
+    // The message names the program version even if that version has other header fields.
     let header: Header = serde_json::from_slice(&text).map_err(|_| {
         let version = serde_json::from_slice(&text).ok().and_then(|value: serde_json::Value| {
             let version = value.get("identity")?.get("version")?.as_str()?;
@@ -224,7 +221,6 @@ pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
     Ok((header, key, MAGIC.len() as u64 + input.bytes))
 }
 
-/// The first words of a piece.
 struct Head {
     region: Region,
     film: Region,
@@ -251,7 +247,7 @@ impl Head {
         })
     }
 
-    /// The head of these words, if a piece of this job may have it.
+    /// Decodes a head; `None` if it is not valid for the job.
     fn of(words: &[u32; WORDS], identity: &Identity) -> Option<Head> {
         let &[x0, y0, x1, y1, fx0, fy0, fx1, fy1, start, end, x, y, flags, _] = words;
         let region = |x0, y0, x1, y1| Region { x0, y0, x1, y1 };
@@ -289,14 +285,13 @@ impl Head {
         is_good.then_some(head)
     }
 
-    /// The bytes of the film and the first hits.
     fn data(&self) -> u64 {
         let hits = if self.has_hits { self.region.pixels() } else { 0 };
         self.film.pixels() * self.form.bytes() as u64 + hits * size_of::<FirstHit>() as u64
     }
 }
 
-/// Writes a piece, with the first hits of its rows if there are any, and tells how many bytes it took.
+/// Writes a piece, with the first hits of its rows if `hits` is not empty. Returns the number of bytes.
 pub fn write_piece(out: &mut impl Write, key: &Key, piece: &Piece, hits: &[FirstHit]) -> io::Result<u64> {
     let lists: Vec<_> = piece.film.lists().collect();
     let head = Head {
@@ -317,7 +312,7 @@ pub fn write_piece(out: &mut impl Write, key: &Key, piece: &Piece, hits: &[First
     Ok(out.bytes)
 }
 
-/// Looks through a file whose header was read, up to the first piece that is not whole.
+/// Scans the pieces of a file, up to the first one that is incomplete or damaged. `header` is the end of the header.
 pub fn scan(file: &File, identity: &Identity, key: &Key, header: u64) -> io::Result<Contents> {
     let length = file.metadata()?.len();
     let mut input = BufReader::with_capacity(1 << 20, file);
@@ -379,7 +374,7 @@ fn next_entry(
     }))
 }
 
-/// Reads a piece, and the first hits of its rows if they are there.
+/// Reads a piece and its first hits, if it has any.
 pub fn read_piece(file: &File, key: &Key, entry: &Entry, form: Form) -> io::Result<(Piece, Vec<FirstHit>)> {
     let mut input = BufReader::with_capacity(1 << 20, file);
     input.seek(SeekFrom::Start(entry.start))?;
@@ -411,7 +406,7 @@ pub fn read_piece(file: &File, key: &Key, entry: &Entry, form: Form) -> io::Resu
     Ok((piece, hits))
 }
 
-/// Of pieces in the order in which they were written, those that no later one stands in for: numbers, from the top.
+/// Returns the numbers of the pieces that no later one replaces, from the top. `entries` are in file order.
 pub fn latest(entries: &[Entry]) -> Vec<usize> {
     let mut rows = std::collections::BTreeMap::<u32, usize>::new();
     for (number, entry) in entries.iter().enumerate() {
@@ -420,9 +415,9 @@ pub fn latest(entries: &[Entry]) -> Vec<usize> {
     rows.into_values().collect()
 }
 
-/// Puts a piece among those that are known by their first rows, in place of all that it shares rows with.
+/// Adds a piece to a map from first rows to numbers, and removes all pieces that share rows with it.
 pub fn replace(rows: &mut std::collections::BTreeMap<u32, usize>, entries: &[Entry], number: usize, region: Region) {
-    // They have no rows in common, so only the last one that starts above can reach into it.
+    // The pieces are disjoint, so only the last one that starts above can overlap.
     let above = rows
         .range(..region.y0)
         .next_back()

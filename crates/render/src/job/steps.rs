@@ -1,4 +1,4 @@
-//! The calls that render a film.
+//! The sequence of dispatches that render a film.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -11,47 +11,44 @@ use crate::backend::Backend;
 use crate::error::RenderError;
 use wgray_image::Region;
 
-/// What comes first in a film. The picture is the same.
+/// Order of the samples of a film. The result does not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// A row's samples, as many as fit a call of a few rows: a kernel that adds more samples at once is faster.
+    /// Fills a dispatch with samples of a few rows. A kernel that adds more samples at once is faster.
     Rows,
-    /// All pixels: each gets a few samples before any gets more, for a picture that is looked at meanwhile.
+    /// A few samples of all pixels at a time, for progressive display.
     Pixels,
 }
 
-/// The fewest rows of a call where a pixel's samples come first: two rows of workgroups on a GPU.
+/// Minimum number of rows of a dispatch under [`Order::Rows`]: two rows of workgroups on a GPU.
 const ROWS: u32 = 16;
 
-/// Which samples the pixels of a film have.
+/// Samples of the pixels of a film.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reached {
-    /// The samples that are being added: all before them are there. Empty once all are.
+    /// Range of samples in progress; all earlier ones are complete. Empty when all samples are.
     pub pass: Range<u32>,
-    /// The first pixel that does not have them, in the order of reading: column and row.
+    /// Column and row of the first pixel without them, in row order.
     pub next: [u32; 2],
 }
 
-/// The calls that render a film, one after the other.
+/// The sequence of dispatches that render a film.
 #[derive(Clone, Debug)]
 pub struct Steps {
     cut: Cut,
     order: Order,
     pace: Pace,
     region: Region,
-    /// The region, and the pixels around it that get the samples of all.
+    /// The region, and the neighbors that need pilot samples.
     film: Region,
     samples: u32,
-    /// How many samples all pixels get.
+    /// Number of samples that all pixels get.
     of_all: u32,
-    /// The samples to stop at.
     until: u32,
     reached: Reached,
-    /// The call that is under way.
     call: Option<Call>,
 }
 
-/// A call that was submitted.
 #[derive(Clone, Copy, Debug)]
 struct Call {
     tile: Region,
@@ -66,7 +63,7 @@ impl Call {
 }
 
 impl Steps {
-    /// No work yet. A call aims to take `call`.
+    /// Creates an empty sequence. A dispatch aims to take `call`.
     pub fn new(cut: &Cut, call: Duration, order: Order) -> Steps {
         Steps {
             cut: *cut,
@@ -85,7 +82,7 @@ impl Steps {
         }
     }
 
-    /// Starts a film of a region, at the pace learnt so far. Its pixels are those of [`Steps::film`].
+    /// Starts a film of a region, with the speed measured so far. The film has the pixels of [`Steps::film`].
     pub fn start(&mut self, backend: &dyn Backend, region: Region, samples: u32) {
         self.region = region;
         self.samples = samples;
@@ -97,14 +94,14 @@ impl Steps {
         self.begin_pass(0);
     }
 
-    /// Goes on with a film of a region that was begun before, perhaps on another backend.
+    /// Continues a film of a region, possibly on another backend.
     pub fn go_on(&mut self, backend: &dyn Backend, region: Region, samples: u32, reached: &Reached) {
         self.start(backend, region, samples);
         self.reached = reached.clone();
         self.next_pass_if_ended();
     }
 
-    /// Ends once all pixels have so many samples. A pass that is under way is brought to its end.
+    /// Stops when all pixels have this number of samples. A pass in progress is completed first.
     pub fn stop_at(&mut self, samples: u32) {
         self.until = samples.min(self.samples);
         let Reached { pass, next } = &self.reached;
@@ -113,22 +110,22 @@ impl Steps {
         }
     }
 
-    /// The pixels of the film.
+    /// Returns the region of the film.
     pub fn film(&self) -> Region {
         self.film
     }
 
-    /// Which samples the film has, between two calls.
+    /// Returns the samples of the film's pixels, between two dispatches.
     pub fn reached(&self) -> &Reached {
         &self.reached
     }
 
-    /// Forgets the pace: other work comes, or another backend.
+    /// Discards the measured speed, when the work or the backend changes.
     pub fn forget_pace(&mut self) {
         self.pace.forget();
     }
 
-    /// A call has failed: what it did is lost, and the next ones are smaller.
+    /// Drops a failed dispatch. The next ones are smaller.
     pub fn failed(&mut self) {
         self.pace.forget();
         if let Some(call) = self.call.take() {
@@ -136,7 +133,7 @@ impl Steps {
         }
     }
 
-    /// Makes the next call, and returns how many samples of pixels it was; `None` once the film has them all.
+    /// Makes the next dispatch, and returns its samples over all pixels; `None` once the film is complete.
     pub fn step(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
         if !self.submit(backend)? {
             return Ok(None);
@@ -145,7 +142,7 @@ impl Steps {
         Ok(self.end_call())
     }
 
-    /// Submits the next call and does not wait for it; [`Steps::poll`] tells when it has ended. Returns whether there is one.
+    /// Submits the next dispatch without waiting; [`Steps::poll`] completes it. Returns false if the film is complete.
     pub fn submit(&mut self, backend: &mut dyn Backend) -> Result<bool, RenderError> {
         if self.is_done() {
             return Ok(false);
@@ -161,7 +158,7 @@ impl Steps {
         Ok(true)
     }
 
-    /// Whole rows, or where not even one fits a call a part of one.
+    /// Returns whole rows, or a part of a row if a whole one does not fit a dispatch.
     fn next_tile(&self) -> Region {
         let region = self.region_of_pass();
         let width = u64::from(region.width().max(1));
@@ -185,7 +182,7 @@ impl Steps {
         }
     }
 
-    /// How many samples of pixels the submitted call was, if it has ended; `None` if it has not, or if there is none.
+    /// Returns the samples over all pixels of the submitted dispatch if it has ended.
     pub fn poll(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
         Ok(if backend.poll()? { self.end_call() } else { None })
     }
@@ -210,7 +207,6 @@ impl Steps {
         }
     }
 
-    /// The pixels that the pass is for.
     fn region_of_pass(&self) -> Region {
         if self.reached.pass.start < self.of_all {
             self.film
@@ -219,23 +215,23 @@ impl Steps {
         }
     }
 
-    /// Whether every pixel has all its samples, or those that it was told to stop at.
+    /// Returns true if every pixel has all samples, or those of [`Steps::stop_at`].
     pub fn is_done(&self) -> bool {
         self.reached.pass.is_empty()
     }
 
-    /// The samples that every pixel has.
+    /// Returns the number of samples of every pixel.
     pub fn samples(&self) -> u32 {
         self.reached.pass.start
     }
 
-    /// The samples that all pixels of a row have.
+    /// Returns the number of samples of every pixel of a row.
     pub fn samples_of_row(&self, y: u32) -> u32 {
         let Reached { pass, next } = &self.reached;
         if y < next[1] { pass.end } else { pass.start }
     }
 
-    /// Samples of pixels per second, once a call has been made.
+    /// Returns the samples over all pixels per second, after the first dispatch.
     pub fn speed(&self) -> Option<f64> {
         self.pace.speed()
     }
@@ -255,7 +251,7 @@ impl Steps {
     }
 }
 
-/// The film that a region is rendered in: where pixels decide on their neighbours' samples, with the pixels around it.
+/// Returns the region of the film for a region: with its neighbors under adaptive sampling.
 pub(super) fn film_of(backend: &dyn Backend, region: Region, samples: u32) -> Region {
     match backend.samples_of_all() < samples {
         true => backend.around(region),

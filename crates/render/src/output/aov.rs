@@ -1,5 +1,5 @@
-//! What a picture can show besides radiance ("arbitrary output variables"): the first hit through each pixel's centre, what
-//! adaptive sampling knows of the pixel, and means over its samples.
+//! Arbitrary output variables (AOVs): values of the first hit through each pixel's center, statistics of adaptive
+//! sampling, and means over the samples.
 
 use glam::Vec3;
 
@@ -8,67 +8,67 @@ use crate::film::Layer;
 use crate::records::{FirstHit, NO_INDEX};
 use wgray_scene::Integrator;
 
-/// A value of a pixel.
+/// An output variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aov {
-    /// The outward normal.
+    /// Outward geometric normal.
     Normal,
-    /// The normal that it is shaded by, outwards: without normal maps that of the first hit; under the integrator `path` the
-    /// mean over the samples, with normal maps, which is shorter than 1 where they differ.
+    /// Outward shading normal: of the first hit, without normal maps; under the path integrator the mean over the
+    /// samples, with normal maps. The mean of different normals is shorter than 1.
     ShadingNormal,
-    /// The distance along the ray.
+    /// Distance along the ray.
     Depth,
-    /// The texture coordinates.
+    /// Texture coordinates.
     Uv,
-    /// The number of the shape in the scene file; of a mesh's triangle its number in the mesh.
+    /// Index of the shape in the scene file; in a mesh, index of the triangle.
     Primitive,
-    /// The number of the shape in the scene file: `[[shapes]]`, then `[[instances]]`, then lights.
+    /// Index of the shape in the scene file: `[[shapes]]`, then `[[instances]]`, then lights.
     Instance,
-    /// The barycentric coordinates, of its second and third vertex, in a mesh's triangle.
+    /// Barycentric coordinates of the second and third vertex in a triangle of a mesh.
     Barycentric,
-    /// The share of light that the surfaces reflect, those seen in mirrors and through glass too.
+    /// Albedo of the surfaces, including those behind mirrors and glass.
     Albedo,
-    /// Light that was reflected once.
+    /// Radiance that was scattered once.
     Direct,
-    /// Light that was reflected more often. Emission, direct and indirect light together are the picture.
+    /// Radiance that was scattered more often. The sum of emission, direct and indirect is the image.
     Indirect,
-    /// Light that was not reflected: of what shines itself, and of the environment.
+    /// Unscattered radiance of emitters and the environment.
     Emission,
-    /// The number of samples.
+    /// Number of samples.
     SampleCount,
-    /// The variance of the pixel's value, as [`Film::variance`](crate::film::Film::variance) estimates it.
+    /// Variance estimated by [`Film::variance`](crate::film::Film::variance).
     Variance,
 }
 
-/// Where a value of a pixel comes from.
+/// Source of an output variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AovSource {
-    /// The first hit of the ray through the pixel's centre.
+    /// First hit of the ray through the pixel's center.
     FirstHit,
-    /// The mean over the pixel's samples, weighted as the picture is; there under the integrator `path` alone.
+    /// Mean over the pixel's samples, with the weights of the radiance. Only under the path integrator.
     Samples,
-    /// What adaptive sampling knows of the pixel; there under adaptive sampling alone.
+    /// Statistics of adaptive sampling. Only under adaptive sampling.
     Adaptive,
 }
 
-/// One channel of a layer.
+/// A channel of an AOV.
 pub enum Channel {
-    /// A number for each first hit.
+    /// A float of the first hit.
     Float(&'static str, fn(&FirstHit) -> f32),
-    /// A whole number for each first hit.
+    /// An integer of the first hit.
     Whole(&'static str, fn(&FirstHit) -> u32),
-    /// A part of the mean of the film's layer.
+    /// A component of the mean of a film's layer.
     Mean(&'static str, Layer, usize),
-    /// A part of the shading normal: of its mean where the film has layers, else of each first hit.
+    /// A component of the shading normal: of the mean if the film has layers, else of the first hit.
     ShadingNormal(&'static str, usize),
-    /// The number of samples.
+    /// Number of samples.
     Count(&'static str),
-    /// The variance of a colour channel.
+    /// Variance of a color channel.
     Variance(&'static str, usize),
 }
 
 impl Channel {
-    /// Its name in OpenEXR files.
+    /// Returns the name in OpenEXR files.
     pub fn name(&self) -> &'static str {
         match self {
             Channel::Float(name, _) | Channel::Whole(name, _) | Channel::Count(name) => name,
@@ -76,12 +76,12 @@ impl Channel {
         }
     }
 
-    /// Whether its values are integers.
+    /// Returns true if the values are integers.
     pub fn is_whole(&self) -> bool {
         matches!(self, Channel::Whole(..) | Channel::Count(_))
     }
 
-    /// The bytes of pixel `i` of a band.
+    /// Returns the bytes of pixel `i` of a band.
     pub fn bytes(&self, band: Band, i: usize) -> [u8; 4] {
         match self {
             Channel::Float(_, value) => value(&band.hits[i]).to_ne_bytes(),
@@ -97,7 +97,6 @@ impl Channel {
     }
 }
 
-/// The properties of a value.
 struct Row {
     name: &'static str,
     source: AovSource,
@@ -105,7 +104,7 @@ struct Row {
 }
 
 impl Aov {
-    /// All of them.
+    /// All output variables.
     pub const ALL: [Aov; 13] = [
         Aov::Normal,
         Aov::ShadingNormal,
@@ -122,7 +121,7 @@ impl Aov {
         Aov::Variance,
     ];
 
-    /// Returns the source of its values in images by an integrator. By another one there may be none.
+    /// Returns the source under an integrator, which may lack it: see [`Aov::missing`].
     pub fn source(self, integrator: Integrator) -> AovSource {
         match self {
             Aov::ShadingNormal if integrator.has_layers() => AovSource::Samples,
@@ -130,7 +129,7 @@ impl Aov {
         }
     }
 
-    /// Why pictures by an integrator, under adaptive sampling or not, do not have it; `None` if they do.
+    /// Returns the reason why renders with these settings lack the variable, if they do.
     pub fn missing(self, integrator: Integrator, adaptive: bool) -> Option<&'static str> {
         match self.source(integrator) {
             AovSource::Adaptive if !adaptive => Some("needs adaptive sampling"),
@@ -139,7 +138,7 @@ impl Aov {
         }
     }
 
-    /// Returns the layer of the film that it shows as an image of light.
+    /// Returns the layer of the film that it displays as a radiance image.
     pub fn light(self) -> Option<Layer> {
         self.channels().iter().find_map(|channel| match channel {
             Channel::Mean(_, layer, _) => Some(*layer),
@@ -228,18 +227,22 @@ impl Aov {
         }
     }
 
-    /// The colour of pixel `i` of a band in a PNG, before rounding to 8 bits; black where nothing is hit. Albedo and light are
-    /// linear: they take the display's curve, as the picture does; all else is shown as it is. The normal is
-    /// moved from [-1, 1] to [0, 1]; the depth d is `1 / (1 + (d / middle)^4)`, near is bright; of texture coordinates the
-    /// fraction is shown in red and green; a shape has a colour by its number. Sample counts are
-    /// `log(count) / log(most)`, variances the standard error to the power 1/2.2.
+    /// Returns the color of pixel `i` of a band in a PNG, before quantization to 8 bits; black without a hit.
+    ///
+    /// - Albedo and radiance: linear; the view transform is applied later.
+    /// - Normals: mapped from [-1, 1] to [0, 1].
+    /// - Depth d: `1 / (1 + (d / middle)^4)`.
+    /// - Texture coordinates: fractional parts in red and green.
+    /// - Indices: a color per index.
+    /// - Sample counts: `log(count) / log(most)`.
+    /// - Variance: standard error to the power 1/2.2.
     pub fn color(self, band: Band, i: usize, layout: &Layout) -> Vec3 {
         let film = band.film;
         if let Some(layer) = self.light() {
             return film.layer(layer, i).into();
         }
         match self {
-            // The mean of the samples' colours: where some of them hit nothing it is darker.
+            // The mean color over the samples: those without a hit count as black.
             Aov::ShadingNormal if film.has_layers() => {
                 Vec3::from(film.layer(Layer::Normal, i)) * 0.5 + 0.5 * film.alpha(i)
             }
@@ -252,8 +255,7 @@ impl Aov {
         }
     }
 
-    /// The colour of a first hit in a PNG, before rounding to 8 bits, as [`Aov::color`] gives it. A layer of another source has that
-    /// of [`Aov::Primitive`].
+    /// Returns [`Aov::color`] for a first hit. Variables of other sources have the color of [`Aov::Instance`].
     pub fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
         if hit.shape == NO_INDEX {
             return Vec3::ZERO;
@@ -270,8 +272,8 @@ impl Aov {
     }
 }
 
-/// A colour for each number: hues a golden section of the circle apart, so that no few numbers in a row look alike, in
-/// three lightnesses. None is as dark as nothing is.
+/// Returns a color for an index: hues a golden section of the circle apart, so that consecutive indices differ clearly,
+/// in three lightnesses. None of them is black.
 fn number_color(number: u32) -> Vec3 {
     const GOLDEN_SECTION: u32 = 0x9e37_79b9; // of 2^32
     let hue = number.wrapping_mul(GOLDEN_SECTION) as f32 / u32::MAX as f32 * 6.0;

@@ -19,8 +19,9 @@ use super::{Band, ExrType, Layout, Metadata, Pending, Pixels, SaveOptions, Sink}
 use crate::error::RenderError;
 use crate::film::mean;
 
-/// Writes the radiance as R, G, B, its alpha as A, by which the colours are weighted as the format has it, and the AOVs as further channels of the same part. The display window is the whole
-/// picture, the data window the region. Returns how many finite values became infinite.
+/// Writes the radiance as R, G, B, premultiplied by alpha, the alpha as A, and the AOVs as further channels of the same
+/// part. The display window is the whole image, the data window the region. Returns the number of finite values that
+/// became infinite.
 pub fn write(
     files: &mut [Pending],
     layout: &Layout,
@@ -28,12 +29,12 @@ pub fn write(
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<u64, RenderError> {
     let [file] = files else {
-        return Err(io::Error::other("an EXR is one file").into()); // and so it is: `target::files` has no more for it
+        return Err(io::Error::other("an EXR is one file").into()); // unreachable: see `target::files`
     };
     let columns = columns(layout);
     let header = header(layout, options, &columns);
     let mut too_large = 0;
-    // The library calls us back, so an error of the render goes around it.
+    // The library calls the closure, so errors of the render bypass it.
     let mut failed = None;
     let written = write_blocks(file, [header].into_iter().collect(), true, |meta, writer| {
         let mut rows = Rows {
@@ -60,14 +61,14 @@ pub fn write(
     }
 }
 
-/// Where a channel's samples come from.
+/// Source of a channel.
 enum Column {
     Radiance(usize),
     Alpha,
     Aov(&'static Channel),
 }
 
-/// The channels by name, in the order of the file, which is that of the alphabet.
+/// Returns the channels in the order of the file, which is alphabetical.
 fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
     let mut columns: Vec<_> = ["R", "G", "B"].into_iter().zip((0..).map(Column::Radiance)).collect();
     if layout.alpha {
@@ -113,30 +114,29 @@ fn header(layout: &Layout, options: &SaveOptions, columns: &[(&str, Column)]) ->
         width as usize,
         height as usize,
     ))));
-    // Attributes of other names would come in another order each time, as the library keeps them in a hash map.
+    // The library keeps attributes of other names in a hash map and would write them in a random order.
     header.own_attributes.software_name = options.metadata.software().map(text);
     header.own_attributes.comments = options.metadata.lines().as_deref().map(text);
     header
 }
 
-/// A text as the format has it, which knows bytes alone: UTF-8.
+/// Encodes text as UTF-8; the format does not define an encoding.
 fn text(text: &str) -> Text {
     Text::from_bytes_unchecked(text.as_bytes().iter().copied().collect())
 }
 
-/// Gathers rows to blocks.
+/// Collects rows into blocks.
 struct Rows<'a, W: Write + Seek> {
     columns: &'a [(&'static str, Column)],
     layout: &'a Layout,
     meta: MetaData,
     writer: &'a mut ChunkWriter<W>,
-    /// Whether measures have 16 bits.
+    /// 16-bit floats.
     half: bool,
-    /// Rows that are compressed together.
+    /// Rows per compressed block.
     block_rows: usize,
-    /// Rows that wait for the rest of their block.
+    /// Rows of an incomplete block.
     lines: Vec<Vec<u8>>,
-    /// The number of the next block.
     next: usize,
     /// Finite values that became infinite.
     too_large: u64,
@@ -182,8 +182,7 @@ impl<W: Write + Seek> Rows<'_, W> {
     }
 }
 
-/// A row's bytes: all samples of the first channel, then all of the second ... With them the finite values that 16 bits made
-/// infinite.
+/// Returns the bytes of a row, channel by channel, and the number of finite values that became infinite in 16 bits.
 fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, half: bool) -> (Vec<u8>, u64) {
     let mut bytes = Vec::with_capacity(4 * columns.len() * pixels.len());
     let mut too_large = 0;
@@ -196,7 +195,7 @@ fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, 
             };
             if half && !column.is_whole() {
                 let value = f32::from_ne_bytes(sample);
-                let rounded = f16::from_f32(value); // to the nearest, halves to even
+                let rounded = f16::from_f32(value); // to nearest, ties to even
                 too_large += u64::from(value.is_finite() && rounded.is_infinite());
                 bytes.extend(rounded.to_ne_bytes());
             } else {
@@ -214,7 +213,7 @@ fn plain(error: Error) -> io::Error {
     }
 }
 
-/// Reads the metadata of an EXR file from its header.
+/// Reads the metadata in the header of an EXR file.
 pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     let meta = MetaData::read_from_buffered(file, false).ok()?;
     let attributes = &meta.headers.first()?.own_attributes;
@@ -223,11 +222,11 @@ pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     Some(Metadata::from_lines(software, &comments.unwrap_or_default()))
 }
 
-/// Reads the channels R, G and B of an EXR file's first layer. Others are left out: colours with alpha are those over black.
+/// Reads the channels R, G and B of an EXR file's first layer. Colors with alpha are premultiplied, hence over black.
 ///
 /// # Errors
 ///
-/// Files that cannot be read, are no EXR files or have no such channels.
+/// Unreadable files, files of other formats, and files without these channels.
 pub fn read_exr(path: &Path) -> io::Result<Pixels> {
     let create = |size: Vec2<usize>, _: &_| Pixels {
         width: size.x() as u32,

@@ -1,5 +1,4 @@
-//! JPEG and WebP files, for thumbnails: pictures of 8 bits a channel that are in memory until they are whole, as their encoders
-//! take them.
+//! JPEG and WebP files, for thumbnails: 8 bits per channel. The encoders require the whole image in memory.
 
 use std::fs::File;
 use std::io::{self, BufReader, Cursor};
@@ -16,11 +15,11 @@ use crate::error::RenderError;
 use crate::film::mean;
 use wgray_image::memory::fallible;
 
-/// Bytes of a pixel that the encoder of WebP takes beside the picture: another copy, of four channels, and the file, whose room is
-/// doubled as it grows.
+/// Bytes per pixel that the WebP encoder allocates besides the image: a copy of four channels, and the file in a buffer
+/// that doubles as it grows.
 const WEBP_BESIDE: u64 = 12;
 
-/// Writes the radiance. A JPEG of a picture with alpha has it over black.
+/// Writes the radiance. A JPEG of an image with alpha is composited over black.
 pub fn write(
     files: &mut [Pending],
     format: Format,
@@ -43,7 +42,7 @@ pub fn write(
         Format::WebP => layout.region.pixels() * WEBP_BESIDE,
         _ => 0,
     };
-    // Before anything is rendered, and an error where the process would be ended later. What the encoder takes is given back.
+    // Allocated before rendering, as a later failure would abort the process. The encoder's part is freed at once.
     let mut pixels: Vec<u8> = room(bytes).ok_or(RenderError::Memory(bytes + beside))?;
     room(beside).ok_or(RenderError::Memory(bytes + beside))?;
     render(&mut |band| {
@@ -72,7 +71,6 @@ pub fn write(
     })
 }
 
-/// Memory for so many bytes, if there is any.
 fn room(bytes: u64) -> Option<Vec<u8>> {
     let mut room = Vec::new();
     let bytes = usize::try_from(bytes).ok()?;
@@ -97,7 +95,7 @@ fn told(encoder: &mut impl ImageEncoder, exif: Option<Vec<u8>>) -> io::Result<()
     }
 }
 
-/// Reads the metadata of a JPEG or WebP file from its Exif tags.
+/// Reads the metadata in the Exif tags of a JPEG or WebP file.
 pub(super) fn read_metadata(mut file: BufReader<File>) -> Option<Metadata> {
     let exif = exif::Reader::new().read_from_container(&mut file).ok()?;
     let text = |tag| match &exif.get_field(tag, In::PRIMARY)?.value {
@@ -108,7 +106,7 @@ pub(super) fn read_metadata(mut file: BufReader<File>) -> Option<Metadata> {
     Some(Metadata::from_lines(text(Tag::Software), &lines))
 }
 
-/// What is told, as Exif has it: the program under its own tag, all else as the picture's description, a line each.
+/// Encodes metadata as Exif: the program as Software, all else as lines of ImageDescription.
 fn exif(metadata: &Metadata) -> io::Result<Option<Vec<u8>>> {
     let tags = [
         (Tag::Software, metadata.software().map(str::to_owned)),

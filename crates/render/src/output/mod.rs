@@ -1,6 +1,5 @@
-//! Pictures as files: PNG, JPEG and WebP as a screen shows them, OpenEXR with the linear values. Rows of PNG and OpenEXR are
-//! written as they come, so that a picture need not fit memory, and all under another name until they are whole, so that no
-//! half file is ever seen.
+//! Image files: PNG, JPEG and WebP with display values, OpenEXR with linear values. PNG and OpenEXR are written row by
+//! row, so that an image need not fit memory. Files have temporary names until they are complete.
 
 mod aov;
 mod exr;
@@ -24,33 +23,33 @@ pub use png::in_memory;
 pub use save_options::{BitDepth, ExrCompression, ExrType, Metadata, SaveOptions};
 pub use target::{Format, Layers, Saved, Target, files, save};
 
-/// What a picture file holds.
+/// Contents of an image file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// Width and height of the whole picture in pixels.
+    /// Width and height of the whole image in pixels.
     pub picture: (u32, u32),
-    /// The pixels that are written.
+    /// Pixels to write.
     pub region: Region,
-    /// What is written besides the radiance.
+    /// Layers besides the radiance.
     pub aovs: Vec<Aov>,
-    /// Whether the picture has alpha, by which its colours are weighted. The film has layers then.
+    /// True if the image has alpha, which requires layers in the film. Colors are premultiplied.
     pub alpha: bool,
-    /// The distance that is half bright in a PNG of the depth.
+    /// Distance of half brightness in a PNG of the depth.
     pub middle_depth: f32,
-    /// The number of samples that is bright in a PNG of their counts.
+    /// Number of samples of full brightness in a PNG of the sample counts.
     pub max_samples: u32,
-    /// How it is shown, but in an EXR.
+    /// View transform and exposure, except in an EXR.
     pub view: ViewSettings,
 }
 
-/// Some whole rows of a region, in full width.
+/// Whole rows of a region.
 #[derive(Clone, Copy, Debug)]
 pub struct Band<'a> {
     /// The radiance.
     pub film: &'a Film,
-    /// The first hits of the same pixels; empty where the layout has no [`Aov`] of them ([`AovSource::FirstHit`]).
+    /// First hits of the same pixels; empty if no [`Aov`] of the layout needs them ([`AovSource::FirstHit`]).
     pub hits: &'a [FirstHit],
 }
 
-/// Takes the bands of a region one after the other, from the top.
+/// Receives the bands of a region in order, from the top.
 pub type Sink<'a> = dyn FnMut(Band) -> Result<(), RenderError> + 'a;

@@ -1,21 +1,21 @@
-//! How pictures become bytes, whatever they show: depth, precision, compression, and what is told about them.
+//! Encoding of image files: bit depth, precision, compression, quality and metadata.
 
 use ::exr::compression::Compression;
 
 use wgray_scene::ViewSettings;
 
-/// How picture files are written. Each setting is of one format, and without effect on the others.
+/// Encoding of image files. Settings of other formats have no effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SaveOptions {
-    /// Of PNG files.
+    /// PNG.
     pub bit_depth: BitDepth,
-    /// Of OpenEXR files.
+    /// OpenEXR.
     pub exr_type: ExrType,
-    /// Of OpenEXR files.
+    /// OpenEXR.
     pub exr_compression: ExrCompression,
-    /// Of JPEG files, 1 to 100.
+    /// JPEG, 1 to 100.
     pub quality: u8,
-    /// What is told in all of them.
+    /// All formats.
     pub metadata: Metadata,
 }
 
@@ -32,10 +32,10 @@ impl Default for SaveOptions {
 }
 
 impl SaveOptions {
-    /// The quality of JPEG files, if nothing else is said: of pictures without text or sharp edges nobody sees a loss.
+    /// Default quality of JPEG files. Losses are invisible in images without text or sharp edges.
     pub const QUALITY: u8 = 90;
 
-    /// The same for files that show light, which tell how, if they tell anything.
+    /// Returns the options for files with display values, whose metadata (if any) include the view settings.
     pub(super) fn of(&self, view: ViewSettings) -> SaveOptions {
         let mut shown = self.clone();
         let pairs = &mut shown.metadata.pairs;
@@ -47,7 +47,7 @@ impl SaveOptions {
     }
 }
 
-/// Bits of a channel of a PNG file.
+/// Bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BitDepth {
     /// 256 steps.
@@ -57,21 +57,21 @@ pub enum BitDepth {
     Sixteen,
 }
 
-/// The numbers of an OpenEXR file's measures. Whole numbers are 32 bits without sign whatever these are.
+/// Type of the float channels of an OpenEXR file. Integer channels are always u32.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ExrType {
-    /// 32 bits: what was computed.
+    /// 32 bits, as computed.
     #[default]
     Float,
-    /// 16 bits: eleven binary digits, up to 65,504; half the size.
+    /// 16 bits: 11 bits of precision, at most 65,504.
     Half,
 }
 
 impl ExrType {
-    /// All of them.
+    /// All types.
     pub const ALL: [ExrType; 2] = [ExrType::Float, ExrType::Half];
 
-    /// The name in options.
+    /// Returns the name in options.
     pub const fn name(self) -> &'static str {
         match self {
             ExrType::Float => "float",
@@ -80,24 +80,24 @@ impl ExrType {
     }
 }
 
-/// How an OpenEXR file is compressed: all of these without loss.
+/// Compression of an OpenEXR file, always lossless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ExrCompression {
-    /// Not at all.
+    /// Uncompressed.
     None,
-    /// Runs of equal bytes, row by row.
+    /// Run-length encoding, row by row.
     Rle,
     /// Deflate, row by row.
     Zips,
-    /// Deflate, 16 rows at a time.
+    /// Deflate, in blocks of 16 rows.
     #[default]
     Zip,
-    /// Wavelets, 32 rows at a time: small where there is noise.
+    /// Wavelets, in blocks of 32 rows. Efficient for noise.
     Piz,
 }
 
 impl ExrCompression {
-    /// All of them.
+    /// All methods.
     pub const ALL: [ExrCompression; 5] = [
         ExrCompression::None,
         ExrCompression::Rle,
@@ -106,7 +106,7 @@ impl ExrCompression {
         ExrCompression::Piz,
     ];
 
-    /// The name in options, which is the format's own.
+    /// Returns the name in options, which is that of the format.
     pub const fn name(self) -> &'static str {
         match self {
             ExrCompression::None => "none",
@@ -117,7 +117,6 @@ impl ExrCompression {
         }
     }
 
-    /// What the library calls it.
     pub(super) fn method(self) -> Compression {
         match self {
             ExrCompression::None => Compression::Uncompressed,
@@ -129,25 +128,24 @@ impl ExrCompression {
     }
 }
 
-/// What is told in a picture file about how it came to be: names and texts, in order.
+/// Metadata of an image file: names and texts, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Metadata {
-    /// The name of the program that wrote it is under [`Metadata::SOFTWARE`], all else under names of one's own: 1 to 79
-    /// letters of ASCII, without spaces at the ends.
+    /// The name of the program is under [`Metadata::SOFTWARE`]. Other names are 1 to 79 ASCII characters, without
+    /// leading or trailing spaces.
     pub pairs: Vec<(String, String)>,
 }
 
 impl Metadata {
-    /// The name that PNG and others have for the program.
+    /// Key of the program's name, as in PNG.
     pub const SOFTWARE: &'static str = "Software";
 
-    /// Returns the text under a name.
+    /// Returns the text of a name.
     pub fn get(&self, name: &str) -> Option<&str> {
         let pair = self.pairs.iter().find(|(known, _)| known == name);
         pair.map(|(_, text)| text.as_str())
     }
 
-    /// The program's name.
     pub(super) fn software(&self) -> Option<&str> {
         self.get(Metadata::SOFTWARE)
     }
@@ -162,7 +160,7 @@ impl Metadata {
         }
     }
 
-    /// All else, a line each: `seed: 0`.
+    /// Returns all pairs except the software, one per line: `seed: 0`.
     pub(super) fn lines(&self) -> Option<String> {
         let others = self.pairs.iter().filter(|(name, _)| name != Metadata::SOFTWARE);
         let lines: Vec<String> = others.map(|(name, text)| format!("{name}: {text}")).collect();

@@ -1,30 +1,28 @@
-//! Pictures on their way to files: several of one render, which all get the same rows.
+//! Output of one render to several image files, which receive the same rows.
 
 use std::path::{Path, PathBuf};
 
 use super::{Aov, Band, Layout, Pending, SaveOptions, Sink, exr, flat, png};
 use crate::error::RenderError;
 
-/// A kind of picture file.
+/// A format of image files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// RGB of 8 or 16 bits a channel, as a display shows it, and alpha where the picture has it, which is
-    /// linear. Every [`Aov`] is a file of its own.
+    /// Display RGB of 8 or 16 bits per channel, with linear alpha if the image has it. [`Aov`]s are separate files.
     Png,
-    /// RGB of floats, linear, and alpha where the picture has it; [`Aov`]s are further layers.
+    /// Linear float RGB, with alpha if the image has it. [`Aov`]s are further layers.
     Exr,
-    /// RGB of 8 bits a channel, with loss, as a display shows it. It has neither alpha nor [`Aov`]s, and is in memory until it is whole.
+    /// Display RGB of 8 bits per channel, lossy. No alpha and no [`Aov`]s. Kept in memory until complete.
     Jpeg,
-    /// RGB of 8 bits a channel, without loss, as a display shows it, and alpha where the picture has it. It has no [`Aov`]s, and
-    /// is in memory until it is whole.
+    /// Like [`Format::Jpeg`], but lossless, and with alpha if the image has it.
     WebP,
 }
 
 impl Format {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Format; 4] = [Format::Png, Format::Exr, Format::Jpeg, Format::WebP];
 
-    /// The name in options.
+    /// Returns the name in options.
     pub const fn name(self) -> &'static str {
         match self {
             Format::Png => "png",
@@ -34,14 +32,14 @@ impl Format {
         }
     }
 
-    /// The format that a file's name asks for by its end: `.png`, `.exr`, `.jpg`, `.jpeg` or `.webp`.
+    /// Returns the format of a file by its extension: `.png`, `.exr`, `.jpg`, `.jpeg` or `.webp`.
     pub fn of(path: &Path) -> Option<Format> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         let known = |format: &Format| extension == format.name() || (*format == Format::Jpeg && extension == "jpg");
         Format::ALL.into_iter().find(known)
     }
 
-    /// What it makes of layers.
+    /// Returns the location of layers.
     pub fn layers(self) -> Layers {
         match self {
             Format::Exr => Layers::Inside,
@@ -50,7 +48,7 @@ impl Format {
         }
     }
 
-    /// The most pixels along a side, where fewer than a scene may have.
+    /// Returns the maximum side in pixels if it is below that of scenes.
     pub const fn longest_side(self) -> Option<u32> {
         match self {
             Format::Png | Format::Exr => None,
@@ -59,11 +57,11 @@ impl Format {
         }
     }
 
-    /// Refuses a size that the format does not have.
+    /// Checks a size against the limit of the format.
     ///
     /// # Errors
     ///
-    /// The rule that it breaks.
+    /// The violated rule.
     pub fn check_size(self, width: u32, height: u32) -> Result<(), String> {
         match self.longest_side() {
             Some(most) if width.max(height) > most => Err(format!(
@@ -74,7 +72,7 @@ impl Format {
         }
     }
 
-    /// The name in messages.
+    /// Returns the name in messages.
     pub const fn title(self) -> &'static str {
         match self {
             Format::Png => "a PNG",
@@ -85,34 +83,34 @@ impl Format {
     }
 }
 
-/// Where the [`Aov`]s of a picture are.
+/// Location of the [`Aov`]s of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layers {
-    /// In the picture's file.
+    /// In the file of the image.
     Inside,
-    /// In files of their own.
+    /// In separate files.
     Beside,
     /// Unsupported.
     Unsupported,
 }
 
-/// A picture's files.
+/// The files of an image.
 #[derive(Debug)]
 pub struct Target {
-    /// What they are.
+    /// Their format.
     pub format: Format,
-    /// In the order of [`files`].
+    /// The files in the order of [`files`].
     pub files: Vec<Pending>,
 }
 
-/// What was noticed when pictures were written.
+/// Result of writing images.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Saved {
-    /// The files with finite values that became infinite, as 16 bits hold none above 65,504, and how many.
+    /// Files in which finite values became infinite, as 16-bit floats end at 65,504, and the number of these values.
     pub too_large: Vec<(String, u64)>,
 }
 
-/// The files that a picture is written to: the path itself, and `NAME.normal.png` and the like for a PNG's [`Aov`]s.
+/// Returns the files of an image: the path itself, and `NAME.normal.png` etc. for the [`Aov`]s of a PNG.
 pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
     let mut files = vec![path.to_owned()];
     if format.layers() == Layers::Beside {
@@ -124,12 +122,12 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
     files
 }
 
-/// Writes what `render` hands to the sink to all targets. The files have their names when all rows are written; if anything
-/// fails they are as they were before.
+/// Writes the bands that `render` passes to the sink to all targets. Files are renamed into place when all are
+/// complete. On failure existing files are unchanged.
 ///
 /// # Errors
 ///
-/// The errors of `render`, and [`RenderError::Output`] if a file cannot be written.
+/// Errors of `render`, and [`RenderError::Output`] if a file cannot be written.
 pub fn save(
     mut targets: Vec<Target>,
     layout: &Layout,
@@ -144,7 +142,7 @@ pub fn save(
     Ok(saved)
 }
 
-/// Hands every band to `before` and then to the targets. Each writer calls what fills it, so that they lie in each other.
+/// Passes every band to `before` and then to the targets. Writers pull bands from a callback, so they are nested.
 fn write(
     targets: &mut [Target],
     layout: &Layout,

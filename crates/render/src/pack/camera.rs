@@ -1,4 +1,4 @@
-//! A camera's record.
+//! Packs a camera into its record.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{Camera, ORTHOGRAPHIC, PANORAMA, PERSPECTIVE};
 use wgray_scene::{self as scene, Projection};
 
-/// A camera for a picture of `width` x `height` pixels, by coordinates from `origin`.
+/// Packs a camera, with coordinates relative to `origin`.
 pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u32, seed: u32) -> Camera {
     let aspect = match camera.projection {
         Projection::Panorama => 1.0, // right and up are unit vectors
@@ -19,7 +19,7 @@ pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u3
         Projection::Panorama => (PANORAMA, 1.0),
     };
     let lens = camera.lens;
-    // A polygon's first corner is at its top.
+    // The first corner of the aperture polygon is at the top.
     let (sin, cos) = lens
         .filter(|lens| lens.blades > 0)
         .map_or((0.0, 1.0), |lens| (FRAC_PI_2 + lens.rotation).sin_cos());

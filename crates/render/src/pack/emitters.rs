@@ -1,4 +1,4 @@
-//! What shines, for the integrator `path`: of each thing how likely a sample of light is one of it, which is by its power.
+//! Emitters of the path integrator and their selection probabilities, proportional to power.
 
 use std::collections::BTreeMap;
 
@@ -15,24 +15,25 @@ use crate::cpu::primitive::is_solid;
 use crate::records::{Lighting, PackedBvh};
 use wgray_scene::{Color, Scene, Texels, TextureKind};
 
-/// What shines.
+/// The emitters of a scene.
 #[derive(Default)]
 pub struct PackedEmitters {
     /// The lights, the emitters and the light tree.
     pub lighting: Lighting,
     /// The probability of sampling the environment map.
     pub environment: f64,
-    /// Of each instance of a mesh [`Instance::leaves`](super::Instance::leaves), if there is a tree.
+    /// [`Instance::leaves`](super::Instance::leaves) of each instance; empty without a light tree.
     pub of_instances: Vec<u32>,
 }
 
-/// So many things that shine are chosen by their power alone, at most.
+/// Maximum number of emitters that an alias table selects by power alone; more use a light tree.
 pub const MOST_LISTED: usize = 16;
-/// So many have a tree, at most: its nodes are some 100 bytes for each of them. More are chosen by their power alone.
+/// Maximum number of emitters in a light tree, which takes about 100 bytes each. More are selected by power alone.
 const MOST_IN_TREE: usize = 500_000;
 
-/// All that shines, of primitives with their materials, lights without extent and meshes. The materials are told how densely samples lie on
-/// what shines. `around` is the sum of what the image that surrounds the scene sends from all directions, where there is one.
+/// Collects all emitters: primitives, delta lights, triangles of meshes and the environment map. Sets
+/// [`Material::density`], the PDF of samples on emissive surfaces. `around` is the integral of the environment map over
+/// all directions, if the scene has one.
 pub fn emitters(
     scene: &Scene,
     materials: &mut [Material],
@@ -41,12 +42,12 @@ pub fn emitters(
     trees: &PackedBvh,
     around: Option<f64>,
 ) -> PackedEmitters {
-    // Of each material the mean radiance, and the power of a unit of area.
+    // Mean radiance of each material, and its power per area.
     let radiances: Vec<f64> = (materials.iter().enumerate())
         .map(
             |(i, material)| match scene.materials.get(i).map(|material| &material.emission) {
                 Some(emission) => mean_of(scene, emission),
-                None => mean(material.emission), // a light's own
+                None => mean(material.emission), // of an area light
             },
         )
         .collect();
@@ -58,7 +59,7 @@ pub fn emitters(
         .collect();
     let mut shining = PackedEmitters::default();
     let mut powers = Vec::new();
-    // Of each of these its material; of lights without one a number of their own.
+    // Material of each emitter; a unique number for lights without one.
     let mut kinds = Vec::new();
     for (i, (primitive, _)) in (0..).zip(primitives) {
         let material = &materials[primitive.material as usize];
@@ -125,7 +126,7 @@ pub fn emitters(
     }
     let total: f64 = powers.iter().sum();
     for (material, strength) in materials.iter_mut().zip(strengths) {
-        // Where all that shines is tiny, what shines nowhere may be beyond all numbers.
+        // With a tiny total, the value of an emissive material without surfaces could overflow.
         material.density = if total > 0.0 {
             (strength / total).min(f64::from(f32::MAX)) as f32
         } else {
@@ -150,8 +151,9 @@ pub fn emitters(
     shining
 }
 
-/// Makes the power of each kind of what is near count as much that a quarter of the samples are of all alike: a strong lamp that lights nothing
-/// here does not hide all others. For each kind the factor of its power; where there is one kind, it is exactly 1.
+/// Defensive sampling of near emitters: scales the power of each kind so that a quarter of the samples are uniform over
+/// all emitters, and a strong emitter that is occluded does not starve the others. Returns the factors of the kinds;
+/// none if only one kind exists.
 fn defend(powers: &mut [f64], kinds: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
     let mut near: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
     for (i, (power, kind)) in powers.iter().zip(kinds).enumerate() {
@@ -180,8 +182,8 @@ fn defend(powers: &mut [f64], kinds: &[usize], is_far: impl Fn(usize) -> bool) -
     factors.into_iter().collect()
 }
 
-/// Makes the power of what is far away count as much that its share is half what it is, and half a half: a lamp in a wide landscape has hardly
-/// any of the power that arrives there, and yet lights what is around it.
+/// Scales the power of distant emitters so that their share s becomes 0.5 s + 0.25: a near emitter in a wide landscape
+/// has a tiny share but dominates its neighborhood.
 fn balance(powers: &mut [f64], places: &[(u32, u32)], lights: &[Light]) {
     let far: Vec<bool> = places.iter().map(|place| is_far(lights, place)).collect();
     let sum = |wanted: bool| -> f64 {
@@ -208,24 +210,22 @@ fn environment_light() -> Light {
     }
 }
 
-/// Whether what shines there, an instance and the number of a light or a triangle, is infinitely far away.
+/// Returns true if an emitter (instance, index of the light or triangle) is infinitely far away.
 fn is_far(lights: &[Light], &(instance, index): &(u32, u32)) -> bool {
     instance == 0 && matches!(lights[index as usize].kind, DIRECTIONAL | ENVIRONMENT)
 }
 
-/// What was found to shine.
 struct Found {
-    /// The instance, and the light's or the triangle's number.
+    /// Instance, and index of the light or triangle.
     places: Vec<(u32, u32)>,
-    /// The power of each of these.
     powers: Vec<f64>,
-    /// The mean radiance of each material.
+    /// Mean radiance of each material.
     radiances: Vec<f64>,
-    /// The power of a unit of area of each material.
+    /// Power per area of each material.
     strengths: Vec<f64>,
 }
 
-/// What shines where a tree chooses of it, but for what is far away.
+/// Builds the light tree over all near emitters. The alias table selects the tree or a distant emitter.
 fn with_tree(
     mut shining: PackedEmitters,
     materials: &mut [Material],
@@ -313,7 +313,7 @@ fn with_tree(
     shining
 }
 
-/// The corners of a triangle of an instance, and its material.
+/// Returns the corners of a triangle of an instance, and its material.
 fn face(trees: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
     let instance = &trees.instances[number];
     let mesh = &trees.meshes[instance.mesh as usize];
@@ -328,7 +328,7 @@ fn face(trees: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
     )
 }
 
-/// A triangle that shines on one side or on both, in the tree over all.
+/// Returns an emissive triangle for the light tree.
 fn lamp_of_triangle([a, b, c]: [DVec3; 3], radiance: f64, two_sided: bool) -> Lamp {
     let span = (b - a).cross(c - a);
     let area = 0.5 * span.length();
@@ -343,7 +343,6 @@ fn lamp_of_triangle([a, b, c]: [DVec3; 3], radiance: f64, two_sided: bool) -> La
     }
 }
 
-/// A light in the tree over all that shines.
 fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -> Lamp {
     let center = light.center.as_dvec3();
     let point = |cone: Cone| Lamp {
@@ -358,7 +357,7 @@ fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -
     match light.kind {
         POINT => return point(Cone::ALL),
         SPOT => {
-            // Brightest inside, then as bright as the cosine beyond says, or less.
+            // Conservative: full intensity within `spread`, then the falloff is below the cosine of the angle beyond.
             let angle = |below_one: f64| (1.0 - below_one).clamp(-1.0, 1.0).acos();
             let cone = f64::from(light.cone);
             let (outer, inner) = (angle(cone), angle(cone - 1.0 / f64::from(light.falloff)));
@@ -381,7 +380,7 @@ fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -
     }
     let area = area(primitive);
     let (cone, intensity) = match is_solid(primitive.kind) {
-        // The mean projected area of a convex solid (Cauchy).
+        // Mean projected area of a convex solid (Cauchy).
         true => (Cone::ALL, radiance * area / 4.0),
         false => {
             let normal = u.cross(v).normalize_or(DVec3::Z);
@@ -400,9 +399,8 @@ fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -
     }
 }
 
-/// For each of some weights a threshold and another index: one of n numbers is as likely as its weight if it is taken itself with
-/// its threshold's probability, else the other. Vose, "A Linear Algorithm for Generating Random Numbers with a Given Distribution",
-/// IEEE TSE 17(9), 1991.
+/// Builds an alias table: for each weight a threshold and an alias index. Vose, "A Linear Algorithm for Generating
+/// Random Numbers with a Given Distribution", IEEE TSE 17(9), 1991.
 fn table(weights: &[f64]) -> Vec<(f32, u32)> {
     let mean = weights.iter().sum::<f64>() / weights.len() as f64;
     let mut rest: Vec<f64> = weights.iter().map(|weight| weight / mean).collect();
@@ -419,7 +417,7 @@ fn table(weights: &[f64]) -> Vec<(f32, u32)> {
     table
 }
 
-/// The power of a spot of intensity 1: the integral of the square of a ramp that is linear in the cosine, and of 1 inside of it.
+/// Returns the power of a spot light of intensity 1. The falloff is the square of a ramp that is linear in the cosine.
 fn spot_power(light: &Light) -> f64 {
     let (cone, ramp) = (f64::from(light.cone), 1.0 / f64::from(light.falloff));
     2.0 * std::f64::consts::PI * (cone - ramp + ramp / 3.0)
@@ -429,7 +427,7 @@ fn mean(color: Vec3) -> f64 {
     color.as_dvec3().element_sum() / 3.0
 }
 
-/// The mean of a colour's components, over the whole of a texture.
+/// Returns the mean component of a color, averaged over a texture.
 fn mean_of(scene: &Scene, color: &Color) -> f64 {
     let mean = |color: DVec3| color.element_sum() / 3.0;
     match *color {
@@ -455,7 +453,7 @@ fn mean_of(scene: &Scene, color: &Color) -> f64 {
     }
 }
 
-/// A primitive that shines, as a light.
+/// Returns the light of an emissive primitive.
 fn light_of(primitive: &Primitive, number: u32, material: &Material, t_max: f32) -> Light {
     let [u, v, _] = axes(primitive);
     Light {
@@ -474,7 +472,7 @@ fn light_of(primitive: &Primitive, number: u32, material: &Material, t_max: f32)
     }
 }
 
-/// Half the diagonal of a box around all that is bounded; 1 where there is nothing.
+/// Returns half the diagonal of the bounding box of all bounded geometry, 1 if it is empty.
 fn radius(primitives: &[(Primitive, bool)], trees: &PackedBvh) -> f64 {
     let spheres = primitives.iter().filter(|(p, _)| p.kind != PLANE).map(|(p, _)| {
         let sphere = bounding_sphere(p);

@@ -1,5 +1,5 @@
-//! How much light rough glass reflects and lets pass at once, and facets that are rougher along one axis, as tables: what further bounces
-//! between them bring is as much as is missing. By an integral over the facets that are seen.
+//! Single-scattering albedo tables of rough glass and of anisotropic microfacets, for multiple-scattering compensation.
+//! Computed by quadrature over visible normals.
 
 use glam::{DVec2, UVec2, Vec2, Vec3};
 
@@ -10,12 +10,12 @@ use crate::cpu::math::{dot, max};
 use crate::cpu::sequence::sobol_sample;
 use crate::cpu::specular::{fresnel, refracted_cosine};
 
-/// Facets that are looked at where the roughness is known, and where it is not, for each of so many more numbers. They are points of Sobol's
-/// sequence: few facets lean so far that all light is reflected inside, and a grid would miss them.
+/// Number of sampled normals if the roughness is known, and per row if not. Sobol' points, as few microfacets tilt
+/// enough for total internal reflection, and a grid would miss them.
 const FACETS: (u32, u32) = (4096, 1024);
 
-/// The tables of both sides, the outer one first: rows by the root of alpha from 0 to 1, columns by the cosine,
-/// from 0 to 1. Only rows about `alpha` where it is known; 1 elsewhere.
+/// Returns the tables of both sides, outside first. Rows: sqrt(alpha), 0 to 1; columns: cosine, 0 to 1. If `alpha` is
+/// known only the adjacent rows are computed, and the others are 1.
 pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     let last = (ENERGY_SIZE - 1) as f32;
     let wanted = |row: u32| alpha.is_none_or(|alpha| (row as f32 - alpha.sqrt() * last).abs() < 1.0);
@@ -38,18 +38,17 @@ pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     table
 }
 
-/// Where facets are looked for: so many points of Sobol's sequence.
 fn points(count: u32) -> Vec<Vec2> {
     (0..count).map(|i| sobol_sample(i, UVec2::new(1, 2))).collect()
 }
 
-/// The share of light from everywhere that comes to the viewer, in whose direction the normal has this cosine, by one bounce.
+/// Returns the single-scattering albedo of rough glass at a cosine, from reflection and transmission.
 fn kept(index: f32, alpha: f32, cosine: f32, facets: &[Vec2]) -> f32 {
     let wo = Vec3::new(max(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine);
     glass_keeps(index, Vec2::splat(alpha), wo, facets)
 }
 
-/// The same in any direction, where facets may be rougher along one axis.
+/// Like `kept`, for any direction and anisotropic alpha.
 fn glass_keeps(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32 {
     let eta = 1.0 / index;
     let mut sum = 0.0;
@@ -70,7 +69,8 @@ fn glass_keeps(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32 {
     (sum / facets.len() as f64) as f32
 }
 
-/// What facets mirror of light from everywhere, by the Fresnel term of Schlick, as `ggx_albedo` has it: F0 x + F90 y.
+/// Returns the single-scattering albedo of reflection with Schlick's Fresnel term, as F0 x + F90 y. Counterpart of
+/// `ggx_albedo`.
 fn mirrors(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
     let mut sum = DVec2::ZERO;
     for u in facets {
@@ -85,25 +85,25 @@ fn mirrors(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
     sum / facets.len() as f64
 }
 
-/// What of the facets of a material gets a table, part after part, as they lie in it.
+/// Lobes of a material with tables, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Parts {
-    /// All that they mirror.
+    /// Reflection, for a Fresnel term of 1.
     Mirror,
-    /// What rough glass of the index with these bits lets pass and mirrors: from outside, from inside.
+    /// Rough glass, with the bits of its index: from outside, from inside.
     Glass(u32),
-    /// The two parts of what they mirror by Schlick's formula and, where there is an index, those of glass.
+    /// The F0 and F90 parts of reflection, and rough glass if it has an index.
     PrincipledLobes(Option<u32>),
 }
 
-/// Rows of a table by roughness, and by anisotropy, where a texture gives it.
+/// Number of rows by textured roughness and by textured anisotropy.
 const ROWS: (u32, u32) = (10, 6);
 
-/// Inside glass all light is mirrored from some directions on. The tables' straight lines cut that corner, and so much more counts as kept.
+/// Correction of the tables of glass: total internal reflection makes a kink, which linear interpolation cuts off.
 const CUT: f32 = 1.004;
 
-/// The table of facets that are rougher along one axis, for `single_scatter_albedo_aniso`: how many rows there are by roughness and by anisotropy, one where
-/// it is known; then for each part the rows, each of lines by the direction along the surface of columns by the cosine.
+/// Returns the table of anisotropic microfacets for `single_scatter_albedo_aniso`: the numbers of rows by roughness and
+/// by anisotropy, 1 if known; then for each part the rows, each with lines by azimuth of columns by cosine.
 pub fn streak_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
     let rows = [
         if roughness.is_none() { ROWS.0 } else { 1 },
@@ -164,13 +164,13 @@ pub fn streak_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32
     words
 }
 
-/// The direction that is at a place of the table: what `streak_place` inverts.
+/// Returns the direction at table coordinates. Inverse of `streak_place`.
 fn streak_direction(alpha: Vec2, place: Vec2) -> Vec3 {
     let seen = alpha.y + (alpha.x - alpha.y) * (place.x * place.x);
     let between = (seen * seen - alpha.y * alpha.y) / max(alpha.x * alpha.x - alpha.y * alpha.y, 1e-12);
     let along = max(0.0, if between > 1.0 { 1.0 } else { between });
     let half_way = 0.5 * seen.sqrt();
-    // The cosine of a place is the root of a square equation.
+    // Root of the quadratic equation of `streak_place`.
     let b = 1.0 + 2.0 * half_way - 2.0 * place.y;
     let root = (b * b + 8.0 * half_way * place.y).sqrt();
     let cosine = max(0.5 * (root - b), 1e-3);

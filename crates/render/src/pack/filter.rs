@@ -1,4 +1,4 @@
-//! Reconstruction filters as tables of bins, for sampling positions with a filter's own density.
+//! Reconstruction filters as tables of bins, for filter importance sampling.
 
 use std::f64::consts::PI;
 
@@ -7,14 +7,14 @@ use glam::{DVec4, Vec4};
 use super::FILTER_BINS_MAX;
 use wgray_scene::{PixelFilter, PixelFilterKind};
 
-/// Steps of the numerical integrals, between two sign changes of a filter.
+/// Quadrature steps per lobe.
 const STEPS: usize = 1 << 14;
 
-/// A filter's height at a distance from the centre of its pixel, in pixels; not normalised, 0 beyond the radius.
+/// Returns the unnormalized value of a filter at a distance from the pixel center in pixels; 0 beyond the radius.
 ///
-/// Mitchell: B = C = 1/3, stretched to the radius ("Reconstruction Filters in Computer Graphics", SIGGRAPH 1988, eq. 8).
-/// Gaussian: standard deviation of a third of the radius, lowered to reach 0 there. Blackman-Harris: the window of four
-/// terms with side lobes at -92 dB (Harris, "On the Use of Windows for Harmonic Analysis", Proc. IEEE 66(1), 1978).
+/// Mitchell: B = C = 1/3, scaled to the radius ("Reconstruction Filters in Computer Graphics", SIGGRAPH 1988, eq. 8).
+/// Gaussian: standard deviation of radius / 3, shifted to 0 at the radius. Blackman-Harris: four-term window with side
+/// lobes at -92 dB (Harris, "On the Use of Windows for Harmonic Analysis", Proc. IEEE 66(1), 1978).
 pub fn height(filter: PixelFilter, distance: f64) -> f64 {
     let x = distance.abs() / filter.radius;
     if x > 1.0 {
@@ -41,8 +41,9 @@ fn mitchell(x: f64) -> f64 {
     six_times / 6.0
 }
 
-/// The [`FILTER_BINS_MAX`] bins of a filter: inner edge, outer edge and weight, then 0. All bins are met equally often. Those of a lobe have the same integral, and a weight that makes
-/// up for the lobe's share of bins, which is a whole number: close to 1, below 0 in negative lobes.
+/// Returns the [`FILTER_BINS_MAX`] equally likely bins of a filter: inner edge, outer edge, weight, 0. The bins of a
+/// lobe have equal integrals. Their weight corrects the rounding of the lobe's share to whole bins: close to 1,
+/// negative in negative lobes.
 pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
@@ -68,11 +69,11 @@ pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     table
 }
 
-/// A part of a filter, from the centre outwards, in which it has one sign.
+/// An interval of a filter in which its sign is constant.
 struct Lobe {
     start: f64,
     step: f64,
-    /// Integrals from the start to each step.
+    /// Integrals up to each step.
     sums: Vec<f64>,
 }
 
@@ -94,7 +95,7 @@ impl Lobe {
         self.sums[STEPS]
     }
 
-    /// Up to where the lobe has a share of its integral.
+    /// Inverse of the cumulative distribution.
     fn quantile(&self, share: f64) -> f64 {
         let wanted = share * self.integral().abs();
         let above = self.sums.partition_point(|sum| sum.abs() <= wanted);
@@ -104,7 +105,7 @@ impl Lobe {
     }
 }
 
-/// The lobes of a filter: one, but for Mitchell's, which has a negative one.
+/// Returns the lobes: a positive one, and for Mitchell a negative one.
 fn lobes(filter: PixelFilter) -> Vec<Lobe> {
     if filter.kind != PixelFilterKind::Mitchell {
         return vec![Lobe::new(filter, 0.0, filter.radius)];

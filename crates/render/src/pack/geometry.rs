@@ -1,4 +1,4 @@
-//! The scene's tree: its items, and the instances of meshes among them.
+//! Builds the TLAS over a scene's primitives and mesh instances.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -13,10 +13,11 @@ use crate::records::{PackedBvh, PackedMesh};
 use wgray_scene::mesh::Mesh;
 use wgray_scene::{Geometry, Scene, Shape};
 
-/// Scenes of more bounded primitives have them in the tree. Fewer are faster one by one, and as constants.
+/// Maximum number of bounded primitives without a BVH. Few are faster as constants in a linear loop.
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
-/// The BVH over a scene's instances of meshes and these primitives, which have indices and may cast a shadow; and [`Counts::room`](super::Counts::room).
+/// Builds the BVH over a scene's mesh instances and these primitives, given with their indices and as shadow casters.
+/// Also returns [`Counts::room`](super::Counts::room).
 pub fn trees(
     scene: &Scene,
     primitives: &[(u32, &Primitive, bool)],
@@ -82,8 +83,8 @@ pub fn trees(
     (trees, Vec4::new(BOX_PAD * condition, farthest, 0.0, 0.0))
 }
 
-/// The meshes of which any instance has a normal map. What else has a direction along the surface, facets that are rougher along one axis and
-/// the normal map of a coat, takes tangents that come with the mesh, else those of single triangles.
+/// Returns the meshes that need computed tangents: those with a normal map in any instance. Other tangent directions,
+/// of anisotropy and coat normal maps, use the tangents of the mesh or else of its triangles.
 fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
     let wants = |mesh: &Mesh, material: &usize| {
         let material = &scene.materials[*material];
@@ -97,7 +98,7 @@ fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
 }
 
 impl PackedBvh {
-    /// Tells the instances where their meshes are in buffers: nodes behind all other rows of the first one.
+    /// Sets the buffer rows of the meshes in the instances. Nodes follow all other rows of the first buffer.
     fn place_rows(&mut self) {
         let mut node_row = self.mesh_nodes_row();
         let mut row = 0;
@@ -143,7 +144,7 @@ impl PackedBvh {
         }
     }
 
-    /// The rows where items, instances, groups' words, and the nodes of meshes start.
+    /// Returns the first rows of items, instances, group words and mesh nodes.
     pub fn rows(&self) -> [u32; 4] {
         let items = NODE_ROWS * self.nodes.len() as u32;
         let instances = items + 2 * self.items.len() as u32;
@@ -166,7 +167,7 @@ const TANGENT_ROWS: u32 = (size_of::<[Vec4; 2]>() / 16) as u32;
 const INSTANCE_ROWS: u32 = (size_of::<Instance>() / 16) as u32;
 
 fn item(kind: u32, index: u32, (low, high): (DVec3, DVec3)) -> Item {
-    // Outwards, by as much as rounding to 32 bits may take.
+    // Rounded outward to f32.
     let down = |x: f64| (x as f32).next_down();
     let up = |x: f64| (x as f32).next_up();
     Item {

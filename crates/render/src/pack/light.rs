@@ -1,4 +1,4 @@
-//! Lights' records.
+//! Packs lights into records.
 
 use std::collections::BTreeMap;
 
@@ -8,21 +8,21 @@ use super::primitive::parallelogram;
 use super::{DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, RECTANGLE, SPOT};
 use wgray_scene::{self as scene, Scene};
 
-/// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
+/// `t_max` of shadow rays to directional lights: beyond any scene, with a finite square.
 pub(super) const DISTANT: f32 = 1e10;
 
-/// Shadow rays end at least so far before a light's sample, as a part of the way: a light may lie on a surface.
+/// Minimum relative distance between the end of a shadow ray and the light sample, as a light may lie on a surface.
 const BEFORE_LIGHT: f64 = 1e-5;
 
-/// A spot's light falls off over at least so much of the cosine.
+/// Minimum range of the cosine over which a spot light falls off.
 const LEAST_FALLOFF: f64 = 1e-12;
 
-/// Where shadow rays to a point of a light end, as a multiple of the way.
+/// `t_max` of shadow rays, as a multiple of the vector to the sample.
 pub(super) fn t_max(shadow_epsilon: f64) -> f32 {
     (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
 }
 
-/// Packs the lights, rectangles first, and returns the number of rectangles. Each of these adds a primitive and a material.
+/// Packs the lights, rectangles first, and counts these. Each rectangle adds a primitive and a material.
 pub(super) fn pack_lights(
     scene: &Scene,
     primitives: &mut Vec<Primitive>,
@@ -102,12 +102,12 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
     }
 }
 
-/// 1 minus the cosine of an angle, without what that loses of small ones.
+/// Returns 1 - cos(angle) without cancellation.
 fn below_one(angle: f64) -> f64 {
     2.0 * (angle / 2.0).sin().powi(2)
 }
 
-/// Tells the lights that have an area which primitives shine.
+/// Sets the primitives of area lights.
 pub(super) fn connect_lights(lights: &mut [Light], order: &[(Primitive, bool)], shapes: usize) {
     let mut of_number: BTreeMap<u32, u32> = BTreeMap::new();
     for (i, light) in (0..).zip(&*lights) {

@@ -1,5 +1,5 @@
-//! The tree over what shines, of four children a node, built in f64. Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree
-//! Splitting", HPG 2018: sections and equations are those of that paper.
+//! Builder of the light tree: a BVH over emitters with four children per node, in f64. Sections and equations are those
+//! of Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -8,21 +8,21 @@ use rayon::prelude::*;
 
 use super::{LightNode, NO_INDEX};
 
-/// Buckets along each axis where a node may be split, section 4.4.
+/// Number of buckets per axis for split candidates, section 4.4.
 const BUCKETS: usize = 12;
-/// Below so many levels nodes are split in the middle, so that no path gets long.
+/// Number of binary splits after which nodes are split at the median, which bounds the depth.
 const MOST_LEVELS: u32 = 48;
 
-/// The directions in which something sends light: normals within `spread` of the axis, and light within `edge` of a normal.
+/// Bounds of emission: normals within `spread` of the axis, and emission within `edge` of a normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Unit length.
     pub axis: DVec3,
-    /// 0 to pi.
+    /// θ_o, 0 to pi.
     pub spread: f64,
-    /// 0 to pi / 2.
+    /// θ_e, 0 to pi / 2.
     pub edge: f64,
-    /// Whether the opposite directions get light too.
+    /// True if the opposite directions are included.
     pub two_sided: bool,
 }
 
@@ -35,7 +35,7 @@ impl Cone {
         two_sided: false,
     };
 
-    /// The directions of a flat thing.
+    /// Returns the cone of a flat emitter.
     pub fn flat(normal: DVec3, two_sided: bool) -> Cone {
         Cone {
             axis: normal,
@@ -45,7 +45,7 @@ impl Cone {
         }
     }
 
-    /// One around two: algorithm 1.
+    /// Returns the union of two cones, algorithm 1.
     pub fn with(&self, other: &Cone) -> Cone {
         let (mut a, mut b) = (*self, *other);
         if b.spread > a.spread {
@@ -63,8 +63,8 @@ impl Cone {
         if a.spread >= PI {
             return around;
         }
-        // The angle of two unit vectors is 2 asin(chord / 2), without what the arc cosine loses of small ones. Most cones are inside by the bound
-        // asin(x) <= x + (pi / 2 - 1) x^3 already, which takes less time.
+        // The angle between unit vectors is 2 asin(chord / 2), without the cancellation of acos at small angles. The
+        // bound asin(x) <= x + (pi / 2 - 1) x^3 is cheaper and already decides most cases.
         let chord = (a.axis - b.axis).length();
         let bound = chord + 0.25 * (FRAC_PI_2 - 1.0) * chord.powi(3);
         if bound + b.spread <= a.spread * (1.0 - 1e-12) {
@@ -87,7 +87,7 @@ impl Cone {
         }
     }
 
-    /// How much there is of its directions, equation 1.
+    /// Orientation measure, equation 1.
     fn measure(&self) -> f64 {
         let (o, w) = (self.spread, (self.spread + self.edge).min(PI));
         let part = 2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos();
@@ -95,26 +95,26 @@ impl Cone {
     }
 }
 
-/// Something that shines, in the tree.
+/// An emitter in the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
-    /// The lower corner of its box.
+    /// Lower corner of the bounding box.
     pub low: DVec3,
-    /// The upper corner.
+    /// Upper corner of the bounding box.
     pub high: DVec3,
-    /// Where its light goes.
+    /// Bounds of the emission.
     pub cone: Cone,
-    /// The light that it sends in its brightest direction.
+    /// Maximum intensity over all directions.
     pub intensity: f64,
-    /// How densely samples lie on it, per area, with the tree's choice among all that shines.
+    /// PDF of samples on the emitter by area, times the probability of selecting the tree.
     pub density: f64,
-    /// 0 for a light, else one more than the number of a mesh's instance.
+    /// 0 for a light, else 1 + index of the mesh instance.
     pub instance: u32,
-    /// The number of the light, or where the triangle is in its mesh.
+    /// Index of the light, or of the triangle in its mesh.
     pub index: u32,
 }
 
-/// What is known of several.
+/// Bounds of several emitters.
 #[derive(Clone, Copy)]
 struct Bounds {
     low: DVec3,
@@ -153,8 +153,7 @@ impl Bounds {
         all.reduce(|a, b| a.with(&b))
     }
 
-    /// What it costs to have these in one node, equation 2's numerator. A box is counted wider by `room`, so that one without
-    /// area costs something too.
+    /// Cost of a node, numerator of equation 2. `room` enlarges the box, so that points have a cost too.
     fn cost(&self, room: f64) -> f64 {
         let size = self.high - self.low + room;
         let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
@@ -162,10 +161,10 @@ impl Bounds {
     }
 }
 
-/// Children of a node, at most.
+/// Maximum number of children of a node.
 const WIDTH: usize = 4;
 
-/// Minimum number of lamps of a node whose children are built in parallel.
+/// Minimum number of emitters of a node whose children are built in parallel.
 const PARALLEL: usize = 2048;
 
 /// Builds the tree. The root is node 0.
@@ -189,17 +188,14 @@ fn build_with(lamps: &[Lamp], parallel: usize) -> Vec<LightNode> {
 
 struct Builder<'a> {
     lamps: &'a [Lamp],
-    /// The intensity of all.
     total: f64,
-    /// Minimum number of lamps of a node whose children are built in parallel.
     parallel: usize,
 }
 
-/// Some lamps, which are a node's child.
 struct Part<'a> {
     order: &'a mut [u32],
     bounds: Bounds,
-    /// How many times lamps were split up to here.
+    /// Number of binary splits above.
     level: u32,
 }
 
@@ -209,7 +205,7 @@ impl Builder<'_> {
         Some(Part { order, bounds, level })
     }
 
-    /// Appends the node of some lamps and its descendants in depth-first order, and returns the node's index.
+    /// Appends a node and its descendants in depth-first order, and returns the index of the node.
     fn add_subtree(&self, parent: u32, all: Part, nodes: &mut Vec<LightNode>) -> u32 {
         let number = nodes.len();
         let is_parallel = all.order.len() >= self.parallel;
@@ -246,12 +242,12 @@ impl Builder<'_> {
         number as u32
     }
 
-    /// Returns the node of some lamps, without the indices of its children, and the lamps of each child.
+    /// Returns a node without the indices of its children, and the emitters of each child.
     fn node<'a>(&self, parent: u32, all: Part<'a>) -> (LightNode, Vec<Part<'a>>) {
         let size = (all.bounds.high - all.bounds.low).max_element();
         let room = if size > 0.0 { 1e-3 * size } else { 1.0 };
         let mut parts = vec![all];
-        // The one that costs most is split, as long as there is room.
+        // Split the most expensive part until the node is full.
         while parts.len() < WIDTH {
             let costs = parts.iter().enumerate().filter(|(_, part)| part.order.len() > 1);
             let worst = costs.max_by(|(_, a), (_, b)| a.bounds.cost(room).total_cmp(&b.bounds.cost(room)));
@@ -284,10 +280,9 @@ impl Builder<'_> {
         (node, parts)
     }
 
-    /// Writes down where and how bright a node's child is.
     fn describe(&self, node: &mut LightNode, i: usize, bounds: &Bounds) {
         let center = (0.5 * (bounds.low + bounds.high)).as_vec3();
-        // Around the box from the centre as it is rounded, and a bit more.
+        // Distance from the rounded center, with a margin.
         let far = (bounds.high - center.as_dvec3()).max(center.as_dvec3() - bounds.low);
         let radius = far.length() * (1.0 + 1e-6);
         let axis = bounds.cone.axis.as_vec3();
@@ -297,12 +292,11 @@ impl Builder<'_> {
         node.cosine[i] = bounds.cone.spread.cos() as f32;
         node.edge[i] = bounds.cone.edge.cos() as f32;
         node.sides[i] = if bounds.cone.two_sided { 2 } else { 1 };
-        // Above 0, which says that there is a child.
+        // Above 0, which marks an existing child.
         node.intensity[i] = ((bounds.intensity / self.total) as f32).max(f32::MIN_POSITIVE);
     }
 
-    /// Orders some lamps so that the first ones, whose number it gives, go to one side: where that costs least, by the heuristic of
-    /// surface, area and orientation.
+    /// Partitions emitters by the surface area orientation heuristic. Returns the size of the first part.
     fn split(&self, order: &mut [u32], level: u32) -> usize {
         let half = order.len() / 2;
         let middle = |i: &u32| {
@@ -342,7 +336,7 @@ impl Builder<'_> {
             let stretched = size[longest] / size[axis]; // K_r
             let mut first: Option<Bounds> = None;
             for split in 1..BUCKETS {
-                // Without lamps in the bucket before, this is the split before.
+                // With an empty bucket before it, a split equals the previous one.
                 let Some(added) = buckets[split - 1] else { continue };
                 let nearer = first.map_or(added, |before| before.with(&added));
                 first = Some(nearer);
@@ -370,7 +364,6 @@ impl Builder<'_> {
     }
 }
 
-/// Where along an axis something is.
 fn bucket(x: f64, low: f64, size: f64) -> usize {
     let share = (x - low) / size;
     ((share * BUCKETS as f64) as usize).min(BUCKETS - 1)

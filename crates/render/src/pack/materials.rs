@@ -1,4 +1,4 @@
-//! Materials and their textures as records, and images as pyramids of texels.
+//! Packs materials and their textures into records, and images into mip pyramids.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,27 +14,26 @@ use wgray_scene::{
     TextureFilter, TextureKind, Value, VertexColors, Wrap,
 };
 
-/// The records of a scene's materials and of the textures that they use.
 #[derive(Default)]
 pub struct Appearances {
     pub materials: Vec<Material>,
-    /// What materials look up; those of a material lie together.
+    /// Texture lookups; those of a material are consecutive.
     pub lookups: Vec<Lookup>,
     pub textures: Vec<Texture>,
     pub texels: Vec<u32>,
-    /// Where the pyramids of the scene's images are, by the images' addresses.
+    /// Location of each image's pyramid, by the address of the image.
     places: BTreeMap<usize, u32>,
-    /// How many levels their textures need.
+    /// Levels that the textures of each image need.
     levels: BTreeMap<usize, u32>,
-    /// The records of the scene's textures, apart for each strength as a normal map.
+    /// Records of the textures, with one per strength as a normal map.
     records: BTreeMap<(usize, Option<u64>), u32>,
-    /// The tables of rough glass, by its index and alpha where that is one.
+    /// Albedo tables of rough glass, by index of refraction and alpha (`None` if textured).
     energies: BTreeMap<(u32, Option<u32>), u32>,
-    /// Those of facets that are rougher along one axis, by what is in them, roughness and anisotropy.
+    /// Albedo tables of anisotropic microfacets, by parts, roughness and anisotropy.
     aniso_table: BTreeMap<(Parts, Option<u32>, Option<u32>), u32>,
 }
 
-/// What of a material the camera does not see.
+/// Camera visibility flags.
 fn hidden(material: &scene::Material) -> u32 {
     match &material.reflection {
         _ if !material.visible => 1,
@@ -43,7 +42,7 @@ fn hidden(material: &scene::Material) -> u32 {
     }
 }
 
-/// A record of facets; `texture` gives the roughness of one.
+/// Record of microfacets. `found` resolves a textured roughness.
 fn faceted(facets: &Facets, found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
     Material {
         roughness: of_value(&facets.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, found),
@@ -54,7 +53,7 @@ fn faceted(facets: &Facets, found: &mut impl FnMut(&Color, u32, Option<(Channel,
     }
 }
 
-/// A record of facets as one of a kind without them, where it is polished everywhere; so is glass that hardly refracts.
+/// Reduces microfacets to a delta BSDF if they are smooth everywhere. The same applies to glass that hardly refracts.
 fn simplest(record: Material, textured: bool) -> Material {
     let polished = !textured && is_polished(&record);
     let kind = match record.kind {
@@ -88,7 +87,8 @@ impl Appearances {
         appearances
     }
 
-    /// Most lookups of a material, and of one of mirrors or glass; of any, twice, where all are looked up in one place.
+    /// Returns the maximum lookups of a material, and of a mirror or glass. Both are the overall maximum for the
+    /// path integrator, which evaluates all materials in one place.
     pub fn lookups(&self, integrator: Integrator) -> (u32, u32) {
         let most = |specular: bool| {
             let materials = self
@@ -109,30 +109,28 @@ impl Appearances {
         self.have_lookup(FOR_NORMAL | FOR_COAT_NORMAL)
     }
 
-    /// Whether any texture is looked up for any of these purposes.
+    /// Returns true if any lookup has any of the purposes.
     pub fn have_lookup(&self, purposes: u32) -> bool {
         self.lookups.iter().any(|lookup| lookup.purposes & purposes != 0)
     }
 
-    /// Whether a material looks any texture up for any of these purposes.
     pub fn has_lookup(&self, material: &Material, purposes: u32) -> bool {
         let [first, count] = material.lookups.to_array().map(|x| x as usize);
         let mut lookups = self.lookups.iter().skip(first).take(count);
         lookups.any(|lookup| lookup.purposes & purposes != 0)
     }
 
-    /// Bits of the textures' kinds.
+    /// Bit mask of the texture kinds.
     pub fn kinds(&self) -> u32 {
         self.textures.iter().fold(0, |bits, texture| bits | 1 << texture.kind)
     }
 
-    /// Bits of the texels' formats.
+    /// Bit mask of the texel formats.
     pub fn formats(&self) -> u32 {
         let images = self.textures.iter().filter(|texture| texture.kind >= NEAREST);
         images.fold(0, |bits, texture| bits | 1 << texture.format)
     }
 
-    /// Whether any texture is filtered over footprints.
     pub fn needs_footprints(&self) -> bool {
         self.kinds() & !(1 << NEAREST | 1 << BILINEAR) != 0
     }
@@ -158,7 +156,7 @@ impl Appearances {
                 shininess,
             } => Material {
                 ambient: match scene.render.integrator.follows_paths() {
-                    true => Vec3::ZERO, // without effect
+                    true => Vec3::ZERO, // not used
                     false => found(ambient, FOR_AMBIENT, None),
                 },
                 kind: PHONG,
@@ -253,7 +251,7 @@ impl Appearances {
         record
     }
 
-    /// Where the table of what rough glass reflects and lets pass at once starts; a new one where there is none such.
+    /// Returns the start of the albedo table of rough glass, which is created on first use.
     fn energy(&mut self, record: &Material, textured: bool) -> u32 {
         let square = 0.5 * facet_alpha(record).length_squared();
         let alpha = if textured { None } else { Some(square.sqrt()) };
@@ -266,7 +264,7 @@ impl Appearances {
         })
     }
 
-    /// The same of facets that are rougher along one axis; textures may give roughness and anisotropy.
+    /// Like `energy`, for anisotropic microfacets. `rough` and `long` mean that roughness and anisotropy are textured.
     fn aniso_table(&mut self, record: &Material, parts: Parts, rough: bool, long: bool) -> u32 {
         let known = |number: f32, textured: bool| (!textured).then_some(number);
         let (roughness, anisotropy) = (known(record.roughness, rough), known(record.anisotropy, long));
@@ -279,7 +277,7 @@ impl Appearances {
         })
     }
 
-    /// The record of a texture that gives a colour, or a normal if it has a strength.
+    /// Returns the record of a color texture, or of a normal map if it has a strength.
     fn texture(&mut self, scene: &Scene, i: usize, strength: Option<f64>) -> u32 {
         let key = (i, strength.map(f64::to_bits));
         if let Some(record) = self.records.get(&key) {
@@ -375,7 +373,7 @@ fn wrap(wrap: Wrap) -> u32 {
     }
 }
 
-/// What tells a scene's images apart while it stands.
+/// Returns a key of an image, unique during the lifetime of the scene.
 fn address(image: &Arc<Image>) -> usize {
     Arc::as_ptr(image).addr()
 }
@@ -384,12 +382,12 @@ fn levels_of(image: &Image, filter: TextureFilter) -> u32 {
     if filter.needs_levels() { image.levels() } else { 1 }
 }
 
-/// The lookups of a material: each texture once, with all its purposes.
+/// The lookups of a material: one per texture, with all of its purposes.
 #[derive(Default)]
 struct Lookups(Vec<Lookup>);
 
 impl Lookups {
-    /// A number has a place for its channel.
+    /// A scalar has a channel and its position in `Lookup::channels`.
     fn add(&mut self, texture: u32, uv_set: u32, purpose: u32, channel: Option<(Channel, u32)>) {
         let known = self.0.iter().position(|lookup| lookup.texture == texture);
         let place = known.unwrap_or_else(|| {
@@ -408,7 +406,7 @@ impl Lookups {
     }
 }
 
-/// The record of a principled material, but for what all have.
+/// Record of a principled material, without the shared parameters.
 fn principled(p: &scene::Principled, found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
     let sees_through = p.alpha_mode != AlphaMode::Opaque;
     Material {
@@ -452,7 +450,7 @@ fn principled(p: &scene::Principled, found: &mut impl FnMut(&Color, u32, Option<
     }
 }
 
-/// Asks `found` for a colour, or notes a lookup of it, and takes a number of it.
+/// Resolves a scalar: a constant, or a channel of the texture that `found` resolves.
 fn of_value(
     value: &Value,
     purpose: u32,
@@ -468,7 +466,6 @@ fn of_value(
     }
 }
 
-/// Which value of a texture's colour it is.
 fn number_of(channel: Channel) -> u32 {
     match channel {
         Channel::R | Channel::A => 0,

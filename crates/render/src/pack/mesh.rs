@@ -1,4 +1,4 @@
-//! From a mesh to the records that both backends read.
+//! Packs meshes into the records that both backends read.
 
 use std::sync::Arc;
 
@@ -10,11 +10,11 @@ use crate::bvh::{Aabb, build};
 use crate::records::PackedMesh;
 use wgray_scene::mesh::{Mesh, VertexTangents};
 
-/// Triangles in a leaf, at most.
+/// Maximum number of triangles in a leaf.
 const MOST_IN_LEAF: u32 = 4;
 
 impl PackedMesh {
-    /// Packs a mesh, with tangents for normal maps if it can have any. The result is kept with the mesh.
+    /// Packs a mesh, with tangents for normal maps if it has the attributes. The result is cached in the mesh.
     pub(crate) fn cached(mesh: &Arc<Mesh>, with_tangents: bool) -> Arc<PackedMesh> {
         struct WithTangents(Arc<PackedMesh>);
         if with_tangents && !mesh.uvs.is_empty() && !mesh.normals.is_empty() {
@@ -27,7 +27,6 @@ impl PackedMesh {
         mesh.cached(|mesh| PackedMesh::of(mesh, None))
     }
 
-    /// Packs a mesh, and builds its BVH.
     fn of(mesh: &Mesh, tangents: Option<VertexTangents>) -> PackedMesh {
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
         let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| Aabb::around(&corners(t))).collect();
@@ -45,7 +44,7 @@ impl PackedMesh {
         let normal = |i: usize| mesh.normals.get(i).copied().unwrap_or_default();
         let own = mesh.positions.len();
         let count = own + copies.len();
-        // The vertex that one is, or is a copy of.
+        // Index of the original of a duplicated vertex.
         let original = |i: usize| if i < own { i } else { copies[i - own] as usize };
         let vertices = (0..count).into_par_iter().map(original);
         let vertices = vertices.map(|i| mesh.positions[i].extend(uv(i).x));

@@ -1,4 +1,4 @@
-//! Packing: from a validated scene to the records that both backends read, and the constants that a kernel is compiled for.
+//! Packs a validated scene into the records of both backends, and the constants that specialize kernels.
 
 mod camera;
 mod emitters;
@@ -34,8 +34,8 @@ use self::surroundings::EnvironmentMap;
 use crate::records::*;
 use wgray_scene::{PixelFilter, PixelFilterKind, Scene};
 
-/// Rays start at least so far above a surface, relative to the largest coordinate, 32 units of rounding: what the
-/// surface's own arithmetic and a neighbour's lose together (`docs/decisions/shadow-rays.md`).
+/// Minimum offset of ray origins from a surface, relative to the largest coordinate: 32 ulp, the combined rounding
+/// error of the surface and a neighbor (`docs/decisions/shadow-rays.md`).
 const LEAST_EPSILON: f64 = 32.0 / 16_777_216.0;
 
 /// Packs a scene.
@@ -122,7 +122,7 @@ pub fn pack(scene: &Scene) -> Packed {
     }
 }
 
-/// Packs the values of the scene as a whole. `share` is the probability of sampling the environment map.
+/// Packs the global parameters. `share` is the probability of sampling the environment map.
 fn environment(scene: &Scene, around: &EnvironmentMap, share: f64) -> Environment {
     let environment = scene.environment.as_ref();
     let background = environment.and_then(|environment| environment.background);
@@ -137,8 +137,7 @@ fn environment(scene: &Scene, around: &EnvironmentMap, share: f64) -> Environmen
     }
 }
 
-/// How many primitives of each kind there are, of those that are sorted by kind and by whether they cast shadows; and how
-/// many rows the tables of records have.
+/// Counts the primitives of each kind, which are sorted by kind and by shadow casting, and the rows of the tables.
 fn counts(
     order: &[(Primitive, bool)],
     area_lights: usize,
@@ -176,7 +175,7 @@ fn counts(
     }
 }
 
-/// Whether a filter is the pixel itself: the same weight for all samples inside.
+/// Returns true if a filter is the box of one pixel, which weights all samples equally.
 fn is_pixel(filter: PixelFilter) -> bool {
     filter.kind == PixelFilterKind::Box && filter.radius == 0.5
 }

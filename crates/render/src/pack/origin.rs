@@ -1,5 +1,5 @@
-//! Where a packed scene's coordinates are counted from. 32-bit floats have 24 bits: a thousand of its own sizes away from
-//! the origin a scene would lose ten of them. So the origin is near what the camera looks at.
+//! Origin of the packed coordinates, near the camera's target. A scene a thousand times its size away from the origin
+//! would lose ten of the 24 bits of f32.
 
 use std::borrow::Cow;
 
@@ -7,14 +7,14 @@ use glam::DVec3;
 
 use wgray_scene::{Camera, Light, Scene};
 
-/// A point near what the camera looks at: on the grid whose cells are at least as large as their distance, a power of 2.
-/// So what is near the origin of the scene file keeps its coordinates, and no coordinate gets more digits.
+/// Returns a point near the camera's target, on a grid with cells of a power of 2 that is at least the distance of the
+/// target. Scenes near the origin of the file keep their coordinates, and no coordinate gains digits.
 pub fn origin(camera: &Camera) -> DVec3 {
     let cell = camera.position.distance(camera.look_at).log2().ceil().exp2();
     (camera.look_at / cell).round() * cell
 }
 
-/// A scene by coordinates from another origin.
+/// Translates a scene to another origin.
 pub fn seen_from(scene: &Scene, origin: DVec3) -> Cow<'_, Scene> {
     if origin == DVec3::ZERO {
         return Cow::Borrowed(scene);

@@ -1,4 +1,4 @@
-//! The environment map, as texels and the tables by which samples of its light are taken.
+//! Packs the environment map: texels, and the tables for sampling it.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -10,16 +10,16 @@ use super::{BACKGROUND, ENVIRONMENT_BLOCKS, ENVIRONMENT_INVISIBLE, ENVIRONMENT_M
 use wgray_scene::halves::linear;
 use wgray_scene::{self as scene, EnvironmentImage, Scene};
 
-/// Darker surroundings count as black: what the densities of samples are made of would be beside the normal numbers.
+/// Maps with a smaller integral count as black, as their PDFs would approach the subnormal numbers.
 const DARKEST: f64 = 1e-25;
-/// A block darker than this share of the map has no samples of light: rays that happen to go there find it.
+/// Blocks with a smaller fraction of the total power get no light samples; only BSDF samples find them.
 const DARKEST_SHARE: f64 = 1e-12;
-/// Parts of a block along a side, of each of which the light's mean direction counts.
+/// Number of parts per side of a block; each part has its own mean direction.
 const PARTS: usize = 4;
-/// Half the width of a bin of normals, about, as an angle.
+/// Approximate angular radius of a bin of normals.
 const BIN_RADIUS: f64 = 0.06;
 
-/// The location of the environment map among the texels, if the scene has one.
+/// Location of the environment map in the texels, if the scene has one.
 #[derive(Default)]
 pub struct EnvironmentMap(Option<Around>);
 
@@ -31,12 +31,12 @@ struct Around {
     cells: usize,
     blocks: usize,
     shifts: u32,
-    /// The integral over all directions of the mean of the colours' components, as the cells have it.
+    /// Integral of the mean color component over all directions, by the cells.
     sum: f64,
 }
 
 impl EnvironmentMap {
-    /// Adds the image's texels and its cells' table to the scene's texels.
+    /// Appends the image's texels and the sampling tables to the scene's texels.
     pub fn of(scene: &Scene, texels: &mut Vec<u32>) -> EnvironmentMap {
         let image = scene
             .environment
@@ -45,7 +45,6 @@ impl EnvironmentMap {
         EnvironmentMap(image.and_then(|image| around(image, texels)))
     }
 
-    /// Returns the integral of the radiance over all directions.
     pub fn sum(&self) -> Option<f64> {
         self.0.as_ref().map(|around| around.sum)
     }
@@ -59,7 +58,7 @@ impl EnvironmentMap {
             | bit(any(|environment| environment.background.is_some()), BACKGROUND)
     }
 
-    /// Its part of the record, where so large a share of all samples of light is of it.
+    /// Returns the map's fields of the record. `share` is the probability of sampling the map.
     pub fn record(&self, share: f64) -> Environment {
         let Some(around) = &self.0 else {
             return bytemuck::Zeroable::zeroed();
@@ -73,7 +72,7 @@ impl EnvironmentMap {
             z,
             height: around.height,
             cells: around.cells as u32,
-            // Of the sum of four corners' three components.
+            // Relative to the sum of three components at four corners.
             density: (share / 12.0) as f32,
             blocks: around.blocks as u32,
             shifts: around.shifts,
@@ -118,30 +117,28 @@ fn around(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<Around> {
     })
 }
 
-/// A division of a map's cells into at most [`ENVIRONMENT_BLOCKS`] x [`ENVIRONMENT_BLOCKS`] blocks. Their sides are powers of two, except at the
-/// right and the lower edge.
+/// Partition of a map's cells into at most [`ENVIRONMENT_BLOCKS`] x [`ENVIRONMENT_BLOCKS`] blocks. Their sides are
+/// powers of two, except at the right and lower edges.
 struct Grid {
-    /// Width of the map in cells.
+    /// Size of the map in cells.
     width: usize,
-    /// Height of the map in cells.
     height: usize,
-    /// Binary logarithm of the width of a block in cells.
+    /// log2 of the width of a block in cells.
     along: usize,
-    /// Binary logarithm of the height of a block in cells.
+    /// log2 of the height of a block in cells.
     down: usize,
 }
 
-/// The light of a part of a block.
+/// Radiance of a part of a block.
 #[derive(Clone, Copy, Default)]
 struct Part {
-    /// The integral of the directions, times their radiance.
+    /// Integral of direction times radiance.
     vector: DVec3,
-    /// The integral of the radiance.
     power: f64,
 }
 
 impl Grid {
-    /// Returns the blocks of a map of this size in texels.
+    /// Returns the partition of a map of this size in texels.
     fn of(width: usize, height: usize) -> Grid {
         let most = ENVIRONMENT_BLOCKS as usize;
         let shift = |count: usize| (0..).find(|shift| (count - 1) >> shift < most).unwrap_or(0);
@@ -153,30 +150,28 @@ impl Grid {
         }
     }
 
-    /// Columns of blocks.
     fn columns(&self) -> usize {
         ((self.width - 1) >> self.along) + 1
     }
 
-    /// Rows of blocks.
     fn rows(&self) -> usize {
         ((self.height - 1) >> self.down) + 1
     }
 
-    /// 32-bit words of the blocks' tables.
+    /// Number of words of the block tables.
     fn words(&self) -> usize {
         let (side, bins) = (ENVIRONMENT_BLOCKS as usize, (NORMAL_BINS * NORMAL_BINS) as usize + 1);
         self.rows() * side + bins * (self.rows() + 1) * (side + 1)
     }
 
-    /// The blocks row by row, each as its columns and rows of cells.
+    /// Returns the column and row ranges of the blocks, row by row.
     fn blocks(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
         let columns = move |i: usize| i << self.along..((i + 1) << self.along).min(self.width);
         let rows = move |i: usize| i << self.down..((i + 1) << self.down).min(self.height);
         (0..self.rows()).flat_map(move |row| (0..self.columns()).map(move |column| (columns(column), rows(row))))
     }
 
-    /// Writes the tables by which the cells of each block are chosen.
+    /// Writes the alias table of the cells of each block.
     fn write_cells(&self, weights: &[f64], words: &mut Vec<u32>) {
         let table = |(columns, rows): (Range<usize>, Range<usize>)| {
             let places: Vec<(usize, usize)> = rows
@@ -196,7 +191,7 @@ impl Grid {
             }
             words
         };
-        // A row of blocks at a time, which bounds the memory.
+        // One row of blocks at a time, to bound the memory.
         let blocks: Vec<_> = self.blocks().collect();
         for blocks in blocks.chunks(self.columns()) {
             let tables: Vec<Vec<u32>> = blocks.par_iter().cloned().map(table).collect();
@@ -204,7 +199,7 @@ impl Grid {
         }
     }
 
-    /// Writes the inverses of the blocks' light, and their distributions for each bin of normals.
+    /// Writes the reciprocal power of the blocks, and their distribution per bin of normals and for all directions.
     fn write_distributions(&self, weights: &[f64], axes: [DVec3; 3], sum: f64, words: &mut Vec<u32>) {
         let side = ENVIRONMENT_BLOCKS as usize;
         let mut powers = vec![0.0; self.rows() * side];
@@ -244,7 +239,7 @@ impl Grid {
         }
         let inverse = |power: &f64| if *power > 0.0 { (1.0 / power) as f32 } else { 0.0 };
         words.extend(powers.iter().map(inverse).map(f32::to_bits));
-        // What one cell, or a bin of normals, spreads over.
+        // Angular radius of a cell.
         let cell = ((PI / self.width as f64).powi(2) + (PI / 2.0 / image_rows).powi(2)).sqrt();
         let lobes: Vec<(usize, DVec3, f64, f64)> = (parts.iter())
             .map(|(block, Part { vector, power })| {
@@ -260,7 +255,7 @@ impl Grid {
             for (block, mean, power, spread) in &lobes {
                 cosines[*block] += power * mean_cosine(normal.dot(*mean), *spread);
             }
-            // Of light from behind alone no sample counts.
+            // Without light in front of the surface, no sample contributes.
             let any = cosines.iter().any(|weight| *weight > 0.0);
             let mut words = Vec::new();
             write_bin(if any { &cosines } else { &powers }, &mut words);
@@ -272,7 +267,7 @@ impl Grid {
     }
 }
 
-/// The normal in the middle of a bin, as `normal_bin` has them.
+/// Returns the normal at the center of a bin. Inverse of `normal_bin`.
 fn bin_normal(bin: u32) -> DVec3 {
     let at = |i: u32| f64::from(i) / f64::from(NORMAL_BINS - 1) * 2.0 - 1.0;
     let (x, y) = (at(bin % NORMAL_BINS), at(bin / NORMAL_BINS));
@@ -281,8 +276,8 @@ fn bin_normal(bin: u32) -> DVec3 {
     DVec3::new(folded(x, y), folded(y, x), z).normalize()
 }
 
-/// The mean of the clamped cosine to directions whose cosines are evenly spread from m - r to m + r; larger where few of them are above 0, so
-/// that light which just rises above the horizon is not too rare.
+/// Returns the mean clamped cosine of directions with cosines uniform in m - r to m + r. Larger if only few are
+/// positive, so that light just above the horizon is sampled often enough.
 fn mean_cosine(m: f64, r: f64) -> f64 {
     if m >= r {
         m
@@ -293,7 +288,7 @@ fn mean_cosine(m: f64, r: f64) -> f64 {
     }
 }
 
-/// Writes the cumulative distributions of the rows, and of each row's blocks.
+/// Writes the cumulative distributions of the rows, and of the blocks in each row.
 fn write_bin(weights: &[f64], words: &mut Vec<u32>) {
     let rows: Vec<&[f64]> = weights.chunks(ENVIRONMENT_BLOCKS as usize).collect();
     let sums: Vec<f64> = rows.iter().map(|row| row.iter().sum()).collect();
@@ -301,8 +296,8 @@ fn write_bin(weights: &[f64], words: &mut Vec<u32>) {
     rows.iter().for_each(|row| write_distribution(row, words));
 }
 
-/// Writes where the intervals of up to [`ENVIRONMENT_BLOCKS`] weights begin, and the end of the last: multiples of 2^-24, so that differences
-/// are exact. What has no weight has no width.
+/// Writes the cumulative distribution of up to [`ENVIRONMENT_BLOCKS`] weights in multiples of 2^-24, so that
+/// differences are exact. Intervals of zero weight are empty.
 fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
@@ -318,7 +313,7 @@ fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
     }
 }
 
-/// Returns the weight of each cell: the mean of its corners times its solid angle.
+/// Returns the weight of each cell: mean of its corners times its solid angle.
 fn weights(texels: &[u32], width: usize, height: usize) -> Vec<f64> {
     let value = |i: usize| {
         let parts = &texels[3 * i..3 * i + 3];
@@ -338,18 +333,18 @@ fn weights(texels: &[u32], width: usize, height: usize) -> Vec<f64> {
     weights
 }
 
-/// The solid angle of each cell of a row.
+/// Returns the solid angle of a cell in a row.
 fn solid_angle(row: usize, width: usize, height: usize) -> f64 {
     let border = |row: f64| (row - 0.5).clamp(0.0, height as f64) / height as f64 * std::f64::consts::PI;
     let (above, below) = (border(row as f64), border(row as f64 + 1.0));
-    // cos a - cos b, where both may be nearly 1.
+    // cos a - cos b without cancellation.
     let zone = 2.0 * ((above + below) / 2.0).sin() * ((below - above) / 2.0).sin();
     std::f64::consts::TAU / width as f64 * zone
 }
 
-/// The table by which one of the weights' indices is chosen, of weights whose mean is 1: Vose, "A Linear Algorithm for Generating Random Numbers with
-/// a Given Distribution", IEEE TSE 17(9), 1991, without lists of the small and of the large ones, which would take as much memory as the
-/// table. What is small is filled up by the first large one that is left.
+/// Writes the alias table of weights with mean 1: Vose, "A Linear Algorithm for Generating Random Numbers with a Given
+/// Distribution", IEEE TSE 17(9), 1991. Scans replace the lists of small and large weights, which would use as much
+/// memory as the table. The first remaining large weight fills each small one.
 fn write_table(mut rest: Vec<f64>, words: &mut Vec<u32>) {
     let start = words.len();
     words.extend((0..rest.len() as u32).flat_map(|i| [u32::MAX, i]));
@@ -357,11 +352,11 @@ fn write_table(mut rest: Vec<f64>, words: &mut Vec<u32>) {
     let mut large = next_large(&rest, 0);
     for i in 0..rest.len() {
         let mut small = i;
-        // One that has become small behind `i` is filled up at once; those before it are met later.
+        // A large weight before `i` that becomes small is filled at once; those after it are reached later.
         while let Some(filling) = large
             && rest[small] < 1.0
         {
-            // None that has any weight is never chosen.
+            // Rounded up, so that every positive weight can be selected.
             words[start + 2 * small] = (rest[small] * 4_294_967_296.0).ceil() as u32;
             words[start + 2 * small + 1] = filling as u32;
             rest[filling] -= 1.0 - rest[small];
@@ -382,7 +377,7 @@ mod tests {
     use super::*;
     use crate::cpu::equirect::normal_bin;
 
-    /// The probabilities that a table gives.
+    /// Returns the probabilities that an alias table encodes.
     fn probabilities(words: &[u32]) -> Vec<f64> {
         let count = words.len() / 2;
         let mut out = vec![0.0; count];
@@ -423,7 +418,7 @@ mod tests {
         }
     }
 
-    /// A cumulative distribution as the widths of its intervals.
+    /// Returns the widths of the intervals of a cumulative distribution.
     fn widths(words: &[u32]) -> Vec<f64> {
         let bounds: Vec<f64> = words.iter().map(|bits| f64::from(f32::from_bits(*bits))).collect();
         assert_eq!((bounds[0], bounds[bounds.len() - 1]), (0.0, 1.0));
@@ -457,7 +452,7 @@ mod tests {
     #[test]
     fn a_bin_holds_the_normal_in_its_middle() {
         for bin in 0..NORMAL_BINS * NORMAL_BINS {
-            // Two points of the map's edge are one normal.
+            // Two points on the edge of the octahedral map are the same normal.
             let normal = bin_normal(bin);
             let again = bin_normal(normal_bin(normal.as_vec3()));
             assert!((normal - again).length() < 1e-6, "{bin}: {normal}, {again}");
@@ -486,7 +481,7 @@ mod tests {
         }
     }
 
-    /// The blocks' probabilities for a normal are about the light that each sends to it, and the cells' those of their light in the block.
+    /// Block probabilities approximate the irradiance for a normal; cell probabilities match the power.
     #[test]
     fn blocks_have_the_light_that_they_send() {
         for (width, height) in [(1, 1), (2, 1), (5, 3), (64, 32), (100, 77), (1024, 512)] {
@@ -511,7 +506,7 @@ mod tests {
                 let block = i / grid.columns() * 32 + i % grid.columns();
                 let inverse = f64::from(f32::from_bits(words[block]));
                 assert!((inverse * power - 1.0).abs() < 1e-6, "{width} x {height}, block {i}");
-                // In the table the others of a cell are rows and columns.
+                // Aliases are stored as row and column.
                 let table: Vec<u32> = cells[2 * first..2 * (first + places.len())]
                     .chunks(2)
                     .flat_map(|pair| {
@@ -528,7 +523,7 @@ mod tests {
                 }
                 first += places.len();
             }
-            // A white hemisphere's light towards its pole, by its rows: most comes from half way up.
+            // A white hemisphere's irradiance from the upward direction, by rows.
             let stride = (grid.rows() + 1) * 33;
             let up = normal_bin(Vec3::new(0.01, 0.01, 1.0)) as usize;
             let distribution = |bin: usize| widths(&words[grid.rows() * 32 + bin * stride..][..33]);

@@ -1,4 +1,4 @@
-//! Constants of both sides.
+//! Constants that the host and the shaders share.
 
 #[cfg(doc)]
 use super::{Camera, Instance, Item, Lookup, Material, Texture};
@@ -11,188 +11,186 @@ use super::KINDS;
 use super::record::constants;
 
 constants! {
-    /// [`Camera::projection`] of a camera whose rays start at one point.
+    /// [`Camera::projection`]: perspective.
     pub const PERSPECTIVE: u32 = 0;
-    /// [`Camera::projection`] of a camera whose rays are parallel.
+    /// [`Camera::projection`]: orthographic.
     pub const ORTHOGRAPHIC: u32 = 1;
-    /// [`Camera::projection`] of a camera that sees in all directions.
+    /// [`Camera::projection`]: equirectangular panorama of all directions.
     pub const PANORAMA: u32 = 2;
 
     /// [`Item::kind`]: an instance of a mesh.
     pub const INSTANCE: u32 = KINDS;
-    /// In [`Item::kind`]: casts a shadow.
+    /// Flag in [`Item::kind`]: casts shadows.
     pub const CASTS_SHADOW: u32 = 0x100;
-    /// In the word of a mesh's group: casts no shadow. The other bits are its material.
+    /// Flag in a mesh group's word: casts no shadow. The other bits are the material index.
     pub const NO_SHADOW: u32 = 0x8000_0000;
-    /// [`Instance::shadows`]: some groups cast none.
+    /// [`Instance::shadows`]: some groups cast no shadow.
     pub const SOME_SHADOWS: u32 = 1;
-    /// Levels of nodes that a tree has at most.
+    /// Maximum number of levels of a BVH.
     pub const BVH_MAX_DEPTH: u32 = 32;
-    /// How much larger a mesh's boxes count, relative to the coordinates: 32 units of rounding, more than all that is
-    /// computed of a ray and a triangle loses.
+    /// Padding of mesh boxes, relative to coordinates: 32 unit roundoffs, more than the error of a ray-triangle test.
     pub const BOX_PAD: f32 = 32.0 / 16_777_216.0;
 
     /// [`Material::kind`]: Phong's reflection model.
     pub const PHONG: u32 = 0;
-    /// [`Material::kind`]: a light's surface, of one colour.
+    /// [`Material::kind`]: the surface of an area light, with a single color.
     pub const EMITTER: u32 = 1;
-    /// [`Material::kind`]: a mirror.
+    /// [`Material::kind`]: a perfect mirror.
     pub const MIRROR: u32 = 2;
-    /// [`Material::kind`]: clear glass.
+    /// [`Material::kind`]: smooth glass.
     pub const GLASS: u32 = 3;
-    /// [`Material::kind`]: a diffuse surface.
+    /// [`Material::kind`]: diffuse reflection.
     pub const DIFFUSE: u32 = 4;
-    /// [`Material::kind`]: metal that is rough, or has an index of refraction.
+    /// [`Material::kind`]: rough metal, or metal with a complex index of refraction.
     pub const METAL: u32 = 5;
-    /// [`Material::kind`]: clear glass that is rough.
+    /// [`Material::kind`]: rough glass.
     pub const ROUGH_GLASS: u32 = 6;
-    /// [`Material::kind`]: a sheet of clear glass, rough or not.
+    /// [`Material::kind`]: a thin sheet of glass, smooth or rough.
     pub const THIN: u32 = 7;
-    /// The bits of the kinds of materials that have facets.
+    /// Bits of the kinds of materials with microfacets.
     pub const FACET_KINDS: u32 = 1 << METAL | 1 << ROUGH_GLASS | 1 << THIN;
-    /// The bits of those of them that let light through.
+    /// Bits of the microfacet kinds that transmit light.
     pub const PASSING_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
-    /// Rows and columns of a table of [`Material::energy`], for each side.
+    /// Rows and columns, for each side, of the table at [`Material::energy`].
     pub const ENERGY_SIZE: u32 = 32;
-    /// Lines of a table of [`Material::aniso_table`], by the direction along the surface.
+    /// Rows of the table at [`Material::aniso_table`], by azimuth.
     pub const STREAK_LINES: u32 = 49;
-    /// Its columns, by the cosine.
+    /// Columns of the table at [`Material::aniso_table`], by cosine.
     pub const STREAK_COLUMNS: u32 = 48;
-    /// A microfacet lobe whose alpha are all below this is a delta; each of any other is at least this.
+    /// Minimum alpha of a microfacet lobe. A lobe whose alphas are all smaller is a delta.
     pub const SMALLEST_ALPHA: f32 = 1e-3;
-    /// [`Material::kind`]: glTF's material.
+    /// [`Material::kind`]: glTF's metallic-roughness material.
     pub const PRINCIPLED: u32 = 8;
-    /// What a clear coat reflects head-on: its index of refraction is 1.5.
+    /// Reflectance of a clear coat at normal incidence, for an index of refraction of 1.5.
     pub const COAT_F0: f32 = 0.04;
-    /// The smallest roughness of sheen: a smoother one stands for it.
+    /// Minimum sheen roughness; smaller values are clamped.
     pub const LEAST_SHEEN: f32 = 0.15;
-    /// [`Material::alpha_mode`]: all of the surface is there.
+    /// [`Material::alpha_mode`]: the surface is opaque.
     pub const OPAQUE: u32 = 0;
-    /// [`Material::alpha_mode`]: it is there where its alpha is not below the cutoff.
+    /// [`Material::alpha_mode`]: the surface exists where its opacity is at least the cutoff.
     pub const MASK: u32 = 1;
-    /// [`Material::alpha_mode`]: it is there for that share of the rays.
+    /// [`Material::alpha_mode`]: the opacity is the probability that a ray hits the surface.
     pub const BLEND: u32 = 2;
-    /// The most surfaces that a ray passes by their alpha.
+    /// Maximum number of surfaces that a ray passes by their alpha.
     pub const MAX_ALPHA_SKIPS: u32 = 64;
-    /// The bits of the kinds of materials that mirror or refract, and do nothing else.
+    /// Bits of the kinds of materials whose BSDF is a pure delta.
     pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
 
-    /// [`Light::kind`](super::Light::kind), behind the kinds of primitives and instances: light from one point.
+    /// [`Light::kind`](super::Light::kind), after the kinds of primitives and instances: a point light.
     pub const POINT: u32 = KINDS + 1;
-    /// [`Light::kind`](super::Light::kind): light from infinitely far away.
+    /// [`Light::kind`](super::Light::kind): a directional light.
     pub const DIRECTIONAL: u32 = KINDS + 2;
-    /// [`Light::kind`](super::Light::kind): the image that surrounds the scene.
+    /// [`Light::kind`](super::Light::kind): the environment map.
     pub const ENVIRONMENT: u32 = KINDS + 3;
 
-    /// In [`Specialization::surroundings`](super::Specialization::surroundings): an image surrounds the scene.
+    /// [`Specialization::surroundings`](super::Specialization::surroundings): the scene has an environment map.
     pub const ENVIRONMENT_MAP: u32 = 1;
-    /// In [`Specialization::surroundings`](super::Specialization::surroundings): the camera does not see what surrounds the scene.
+    /// [`Specialization::surroundings`](super::Specialization::surroundings): invisible to the camera.
     pub const ENVIRONMENT_INVISIBLE: u32 = 2;
-    /// In [`Specialization::surroundings`](super::Specialization::surroundings): the camera sees one colour in place of them.
+    /// [`Specialization::surroundings`](super::Specialization::surroundings): the camera sees a single color.
     pub const BACKGROUND: u32 = 4;
-    /// Blocks of an environment map's cells along a row or a column, at most; a power of two.
+    /// Maximum number of blocks of an environment map's cells along a row or a column, a power of two.
     pub const ENVIRONMENT_BLOCKS: u32 = 32;
-    /// Bins of normals along a side of the octahedral map, for each of which blocks have probabilities of their own; an odd number, so that
-    /// the axes are in the middle of theirs.
+    /// Bins of normals per side of the octahedral map, each with a distribution of blocks; odd, to center the axes.
     pub const NORMAL_BINS: u32 = 17;
-    /// [`Light::kind`](super::Light::kind): a cone of light from one point.
+    /// [`Light::kind`](super::Light::kind): a spot light.
     pub const SPOT: u32 = KINDS + 4;
-    /// [`Material::hidden`]: the camera's rays go through its back.
+    /// [`Material::hidden`]: camera rays pass its back faces.
     pub const CULL_BACKFACE: u32 = 2;
-    /// [`Material::vertex_colors`]: colours of vertices do nothing.
+    /// [`Material::vertex_colors`]: vertex colors are ignored.
     pub const NO_COLORS: u32 = 0;
-    /// [`Material::vertex_colors`]: they are factors of the base colour, and of what there is of the surface.
+    /// [`Material::vertex_colors`]: they multiply the base color and the opacity.
     pub const COLORS_OF_BASE: u32 = 1;
-    /// [`Material::vertex_colors`]: they are factors of the emission, and of what there is of the surface.
+    /// [`Material::vertex_colors`]: they multiply the emission and the opacity.
     pub const COLORS_OF_EMISSION: u32 = 2;
-    /// The camera's rays go through so many surfaces that are hidden from it, at most; they see the next one.
+    /// Maximum number of camera-invisible surfaces that a camera ray passes; it sees the next one.
     pub const MAX_CAMERA_SKIPS: u32 = 64;
 
-    /// Glass splits a path at the first so many bounces.
+    /// Number of bounces, from the camera on, at which glass splits a path into reflection and refraction.
     pub const MAX_SPLIT_DEPTH: u32 = 2;
-    /// A path so has at most so many ends.
+    /// Maximum number of leaves of a split path.
     pub const MAX_PATH_LEAVES: u32 = 4;
 
-    /// [`Texture::kind`]: two colours that alternate.
+    /// [`Texture::kind`]: a checkerboard.
     pub const CHECKER: u32 = 0;
-    /// [`Texture::kind`]: lines.
+    /// [`Texture::kind`]: grid lines.
     pub const LINES: u32 = 1;
-    /// [`Texture::kind`]: an image, by its nearest texel.
+    /// [`Texture::kind`]: an image with nearest-texel lookup.
     pub const NEAREST: u32 = 2;
-    /// [`Texture::kind`]: an image, between its texels.
+    /// [`Texture::kind`]: an image with bilinear filtering.
     pub const BILINEAR: u32 = 3;
-    /// [`Texture::kind`]: an image, between its texels and levels.
+    /// [`Texture::kind`]: an image with trilinear filtering.
     pub const TRILINEAR: u32 = 4;
-    /// [`Texture::kind`]: an image, by the elliptical weighted average.
+    /// [`Texture::kind`]: an image with the elliptical weighted average (EWA) filter.
     pub const EWA: u32 = 5;
 
-    /// [`Texture::format`]: 8 bits by the sRGB curve.
+    /// [`Texture::format`]: 8 bits, sRGB-encoded.
     pub const SRGB8: u32 = 0;
-    /// [`Texture::format`]: 8 bits.
+    /// [`Texture::format`]: 8 bits, linear.
     pub const LINEAR8: u32 = 1;
     /// [`Texture::format`]: 32-bit floats.
     pub const FLOAT: u32 = 2;
 
-    /// [`Texture::wrap`]: the image again and again.
+    /// [`Texture::wrap`]: repeat.
     pub const REPEAT: u32 = 0;
-    /// [`Texture::wrap`]: the colour of the nearest edge.
+    /// [`Texture::wrap`]: clamp to the edge.
     pub const CLAMP: u32 = 1;
-    /// [`Texture::wrap`]: the image again and again, every other one mirrored.
+    /// [`Texture::wrap`]: repeat, mirroring every other copy.
     pub const MIRRORED: u32 = 2;
 
-    /// In [`Lookup::purposes`]: gives [`Material::ambient`].
+    /// [`Lookup::purposes`], flags of the parameters that a texture gives: [`Material::ambient`].
     pub const FOR_AMBIENT: u32 = 0x1;
-    /// In [`Lookup::purposes`]: gives [`Material::diffuse`].
+    /// [`Lookup::purposes`]: [`Material::diffuse`].
     pub const FOR_DIFFUSE: u32 = 0x2;
-    /// In [`Lookup::purposes`]: gives [`Material::specular`].
+    /// [`Lookup::purposes`]: [`Material::specular`].
     pub const FOR_SPECULAR: u32 = 0x4;
-    /// In [`Lookup::purposes`]: gives [`Material::tint`].
+    /// [`Lookup::purposes`]: [`Material::tint`].
     pub const FOR_TINT: u32 = 0x8;
-    /// In [`Lookup::purposes`]: gives the normal.
+    /// [`Lookup::purposes`]: the normal.
     pub const FOR_NORMAL: u32 = 0x10;
-    /// In [`Lookup::purposes`]: gives [`Material::emission`].
+    /// [`Lookup::purposes`]: [`Material::emission`].
     pub const FOR_EMISSION: u32 = 0x20;
-    /// In [`Lookup::purposes`]: gives [`Material::roughness`].
+    /// [`Lookup::purposes`]: [`Material::roughness`].
     pub const FOR_ROUGHNESS: u32 = 0x40;
-    /// In [`Lookup::purposes`]: gives [`Material::sheen`].
+    /// [`Lookup::purposes`]: [`Material::sheen`].
     pub const FOR_SHEEN: u32 = 0x80;
-    /// In [`Lookup::purposes`]: gives the normal of the coat.
+    /// [`Lookup::purposes`]: the normal of the clear coat.
     pub const FOR_COAT_NORMAL: u32 = 0x100;
-    /// In [`Lookup::purposes`]: gives [`Material::metallic`].
+    /// [`Lookup::purposes`]: [`Material::metallic`].
     pub const FOR_METALLIC: u32 = 0x200;
-    /// In [`Lookup::purposes`]: gives [`Material::anisotropy`].
+    /// [`Lookup::purposes`]: [`Material::anisotropy`].
     pub const FOR_ANISOTROPY: u32 = 0x400;
-    /// In [`Lookup::purposes`]: gives [`Material::specular_weight`].
+    /// [`Lookup::purposes`]: [`Material::specular_weight`].
     pub const FOR_WEIGHT: u32 = 0x800;
-    /// In [`Lookup::purposes`]: gives [`Material::transmission`].
+    /// [`Lookup::purposes`]: [`Material::transmission`].
     pub const FOR_TRANSMISSION: u32 = 0x1000;
-    /// In [`Lookup::purposes`]: gives [`Material::clearcoat`].
+    /// [`Lookup::purposes`]: [`Material::clearcoat`].
     pub const FOR_COAT: u32 = 0x2000;
-    /// In [`Lookup::purposes`]: gives [`Material::clearcoat_roughness`].
+    /// [`Lookup::purposes`]: [`Material::clearcoat_roughness`].
     pub const FOR_COAT_ROUGHNESS: u32 = 0x4000;
-    /// In [`Lookup::purposes`]: gives [`Material::sheen_roughness`].
+    /// [`Lookup::purposes`]: [`Material::sheen_roughness`].
     pub const FOR_SHEEN_ROUGHNESS: u32 = 0x8000;
-    /// In [`Lookup::purposes`]: gives [`Material::opacity`].
+    /// [`Lookup::purposes`]: [`Material::opacity`].
     pub const FOR_OPACITY: u32 = 0x10000;
-    /// In [`Lookup::purposes`]: turns [`Material::rotation`].
+    /// [`Lookup::purposes`]: added to [`Material::rotation`].
     pub const FOR_DIRECTION: u32 = 0x20000;
-    /// Where the two bits of [`Lookup::channels`] are that say which value gives [`Material::roughness`].
+    /// [`Lookup::channels`], index of the two bits that select the channel: [`Material::roughness`].
     pub const ROUGHNESS_CHANNEL: u32 = 0;
-    /// Those of [`Material::metallic`], and so on.
+    /// [`Lookup::channels`]: [`Material::metallic`].
     pub const METALLIC_CHANNEL: u32 = 1;
-    /// Of [`Material::anisotropy`].
+    /// [`Lookup::channels`]: [`Material::anisotropy`].
     pub const ANISOTROPY_CHANNEL: u32 = 2;
-    /// Of [`Material::specular_weight`].
+    /// [`Lookup::channels`]: [`Material::specular_weight`].
     pub const WEIGHT_CHANNEL: u32 = 3;
-    /// Of [`Material::transmission`].
+    /// [`Lookup::channels`]: [`Material::transmission`].
     pub const TRANSMISSION_CHANNEL: u32 = 4;
-    /// Of [`Material::clearcoat`].
+    /// [`Lookup::channels`]: [`Material::clearcoat`].
     pub const COAT_CHANNEL: u32 = 5;
-    /// Of [`Material::clearcoat_roughness`].
+    /// [`Lookup::channels`]: [`Material::clearcoat_roughness`].
     pub const COAT_ROUGHNESS_CHANNEL: u32 = 6;
-    /// Of [`Material::sheen_roughness`].
+    /// [`Lookup::channels`]: [`Material::sheen_roughness`].
     pub const SHEEN_ROUGHNESS_CHANNEL: u32 = 7;
-    /// Of [`Material::opacity`].
+    /// [`Lookup::channels`]: [`Material::opacity`].
     pub const OPACITY_CHANNEL: u32 = 8;
 
     /// [`Pattern::Grid`].
@@ -208,19 +206,18 @@ constants! {
     /// [`Pattern::Sobol`].
     pub const SOBOL: u32 = 5;
 
-    /// Bins between the centre and the radius of a reconstruction filter.
+    /// Number of bins between the center and the radius of a reconstruction filter.
     pub const FILTER_BINS_MAX: u32 = 128;
 
-    /// No distance of a hit is larger.
+    /// Maximum distance of a hit, also that of a miss.
     pub const INFINITE_T: f32 = f32::MAX;
-    /// The number of a primitive that is none.
+    /// The index that stands for none.
     pub const NO_INDEX: u32 = u32::MAX;
-    /// The instance and primitive of a ray's start that is on none.
+    /// The instance and primitive of a ray that does not start on a surface.
     pub const NO_PRIMITIVE: UVec2 = UVec2::new(0, NO_INDEX);
-    /// Shadow rays are traced in blocks of so many, a bit of a word for each.
+    /// Number of shadow rays per block; a 32-bit mask has one bit per ray.
     pub const SAMPLE_BLOCK: u32 = 32;
 
-    /// How many samples an estimate must rest on to allow a pixel as many samples again as its first look has, under adaptive
-    /// sampling.
+    /// Effective samples of the variance estimate that adaptive sampling requires to repeat the pilot samples once.
     pub const EFFECTIVE_SAMPLES_PER_DOUBLING: f32 = 2.0;
 }

@@ -1,4 +1,4 @@
-//! The course's files: what they become, and what is told of bad ones.
+//! Tests of the conversion and of the errors of JSON scenes of the course.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use crate::{
     Scene, Value,
 };
 
-/// A file of the course, one key a line.
+/// A valid file, one key per line.
 const GOOD: &str = r#"{
   "spp": 256,
   "max_depth": 10,
@@ -49,7 +49,7 @@ const GOOD: &str = r#"{
 const FLOOR: &str = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nf 1 2 3 4\n";
 const LEFT: &str = "v -1 0 -1\nv -1 2 -1\nv -1 2 1\nv -1 0 1\nf 1 2 3 4\n";
 
-/// The tall box: its corners at the top as the course tells them, in x and z.
+/// The tall box, with the course's x and z of its top corners.
 fn tall() -> String {
     let corners = [
         (-0.720444, 0.473882),
@@ -66,7 +66,6 @@ fn tall() -> String {
     text + "f 5 6 7 8\nf 1 4 3 2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
 }
 
-/// A folder with the course's folders, and the meshes.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
@@ -78,7 +77,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Loads a text as a file of that name in the folder of scenes.
+/// Loads a text as a file of this name in the folder `configs`.
 fn load(name: &str, text: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
     let folder = folder();
     let path = folder.path().join("configs").join(name);
@@ -90,7 +89,7 @@ fn near(a: DVec3, b: DVec3) -> bool {
     a.distance(b) < 1e-6
 }
 
-/// The middle of the box around a shape, and the half of its size.
+/// Returns center and half size of the bounding box of a shape.
 fn extent(scene: &Scene, shape: usize) -> (DVec3, DVec3) {
     let Geometry::Mesh { mesh, to_world, .. } = &scene.shapes[shape].geometry else {
         panic!("no mesh: {:?}", scene.shapes[shape]);
@@ -131,7 +130,7 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
     assert!(near(u.cross(*v).normalize(), DVec3::NEG_Z));
     assert_eq!(*color, DVec3::new(17.0, 12.0, 5.0));
 
-    // In the order of their names: a mirror, grey, red.
+    // In the order of their names: a mirror, gray, red.
     let plain = |r, g, b| Color::Plain(DVec3::new(r, g, b));
     let plain_of = |reflection| Material {
         reflection,
@@ -157,7 +156,7 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
         extent(&scene, 1),
         (DVec3::new(-1.0, 0.0, 1.0), DVec3::new(0.0, 1.0, 1.0))
     );
-    // Half as large, then moved by (0.7, 0, -0.5), which is 0.5 away from the camera.
+    // Scaled by 0.5, then translated by (0.7, 0, -0.5): 0.5 away from the camera.
     let (middle, half) = extent(&scene, 2);
     let (low, high) = ((-0.720444, -0.0906493), (0.0495656, 0.673479));
     let expected = DVec3::new((low.0 + high.0) / 4.0 + 0.7, -(low.1 + high.1) / 4.0 + 0.5, 0.3);
@@ -168,7 +167,7 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
     );
 }
 
-/// The ends of the ranges.
+/// Tests both ends of the ranges.
 #[test]
 fn samples_need_not_be_a_square() {
     for (spp, max_depth) in [(1, 0), (200, 12), (65_536, 1024)] {
@@ -182,7 +181,7 @@ fn samples_need_not_be_a_square() {
 
 #[test]
 fn a_camera_sees_the_same_in_both_coordinates() {
-    // What is to the right of the camera, and above it, is so after it is turned.
+    // The axes of the camera must be converted like vectors.
     let described = camera(&Camera {
         position: DVec3::new(1.0, 2.0, 3.0),
         look_at: DVec3::new(-1.0, 0.5, 0.25),
@@ -259,7 +258,7 @@ fn overrides_stand_in_for_the_files_values() {
         told(&overrides(None, Some(1025))),
         "max_depth: 1025 must be from 0 to 1024"
     );
-    // Its materials are none of direct light.
+    // The materials need the path integrator.
     let message = told(&overrides(Some(Integrator::Phong), None));
     let rule = "a.json:20: materials[2].type: \"specular\" needs integrator = \"path\"";
     assert!(message.ends_with(rule), "{message}");
@@ -282,7 +281,7 @@ fn all_errors_are_reported() {
             .map(|error| error.place().line.unwrap_or_default());
         lines.collect::<Vec<_>>()
     };
-    // Keys and types, also in an object.
+    // Invalid keys and types, also within an object.
     let types = [
         ("256", "\"many\""),
         ("[0, 1, 6.8]", "[0, 1]"),
@@ -360,9 +359,9 @@ fn meshes_lie_in_the_folder_above_or_where_it_is_told() {
     );
 }
 
-/// A piece of the good file, a bad one in its place, and what is told of it, from its line on.
+/// A fragment of the valid file, an invalid replacement, and the message from the line number on.
 const BAD: &[(&str, &str, &str)] = &[
-    // What is no JSON.
+    // Invalid JSON.
     ("\"spp\": 256,", "\"spp\": 256", "3:3: expected \",\" or \"}\""),
     ("\"spp\": 256,", "\"spp\": NaN,", "2:10: spp: expected value"),
     (

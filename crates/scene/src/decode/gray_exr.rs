@@ -1,5 +1,5 @@
-//! EXR files of one channel, whatever its name, as gray: the image library reads such of red, green and blue alone. What has
-//! neither is refused here, as only here its channels are known.
+//! EXR files with one channel of any name, decoded as gray; the crate `image` requires R, G and B. Files with neither
+//! are rejected here, where the channel names are known.
 
 use std::io::Cursor;
 
@@ -10,11 +10,11 @@ use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat};
 
 use super::{Channels, Header, Refused};
 
-/// What a file of colours has.
 const COLORS: [&str; 3] = ["R", "G", "B"];
 
-/// The image, if the file has one layer with one channel, and perhaps an opacity `A`, which is ignored. Before anything but the
-/// header is read `check_layer` is asked of each layer that the file has, with its sides and the bytes of a pixel, and `check` of the image.
+/// Returns the image if the file has one layer with one channel and an optional, ignored `A`; `None` if it is a color
+/// image. Before pixels are decoded, `check_layer` gets the size and the bytes per pixel of each layer, and `check` the
+/// header.
 pub(super) fn gray_exr(
     bytes: &[u8],
     check_layer: impl Fn((u32, u32), u64) -> Result<(), Refused>,

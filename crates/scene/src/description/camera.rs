@@ -1,4 +1,4 @@
-//! `[camera]`: where the picture is seen from.
+//! The section `[camera]` of scene files.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -13,63 +13,63 @@ use crate::description::kinds::{Aperture, Blades, Degrees, FNumber, Fov, Length,
 tagged! {
     /// `[camera]`
     CameraDescription {
-        /// All rays start at the camera's position.
+        /// Perspective projection.
         "perspective" => Perspective(PerspectiveDescription),
-        /// All rays are parallel.
+        /// Orthographic projection.
         "orthographic" => Orthographic(OrthographicDescription),
-        /// Rays go from the camera's position in all directions.
+        /// All directions from the camera's position.
         "panorama" => Panorama(PanoramaDescription),
     }
 }
 
-/// A pinhole camera, or one with a thin lens.
+/// A perspective camera with a pinhole or a thin lens.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PerspectiveDescription {
-    /// The centre of projection.
+    /// Center of projection.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// The point in the middle of the picture.
+    /// Point at the center of the image.
     #[schemars(with = "Point")]
     pub look_at: DVec3,
-    /// Which way is up.
+    /// Up direction.
     #[serde(default = "z_up")]
     #[schemars(with = "Vector")]
     pub up: DVec3,
     /// Vertical field of view in degrees.
     #[schemars(with = "Fov")]
     pub fov: f64,
-    /// Focal length of the lens in scene units, of which `f_number` is told; without effect otherwise.
+    /// Focal length of the lens in scene units; only used with `f_number`.
     #[serde(default = "one")]
     #[schemars(with = "Length")]
     pub focal_length: f64,
-    /// Diameter of the lens in scene units; 0 for a pinhole camera, which it is if nothing is said.
+    /// Diameter of the lens in scene units; 0, or absent, for a pinhole.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Aperture>")]
     pub aperture: Option<f64>,
-    /// The focal length over the diameter, in place of `aperture`.
+    /// Focal length divided by the diameter, in place of `aperture`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<FNumber>")]
     pub f_number: Option<f64>,
-    /// Distance of the plane that is sharp, along the view; that of `look_at` if nothing is said.
+    /// Distance of the plane in focus, along the view direction. If absent, that of `look_at`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Length>")]
     pub focus_distance: Option<f64>,
-    /// Corners of the lens, 3 to 16; 0 if it is round.
+    /// Number of corners of the lens, 3 to 16; 0 if it is round.
     #[serde(default)]
     #[schemars(with = "Blades")]
     pub blades: u32,
-    /// In degrees, how far the corners are turned to the left, as seen in the picture; at 0 one is at the top.
+    /// Rotation of the corners in degrees, counter-clockwise in the image. At 0, one is at the top.
     #[serde(default)]
     #[schemars(with = "Degrees")]
     pub blade_rotation: f64,
-    /// How it moves from frame to frame, if it does.
+    /// Animation of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<CameraPathDescription>,
 }
 
 impl PerspectiveDescription {
-    /// A camera with z upwards. `fov` is vertical, in degrees.
+    /// Creates a camera with z up. `fov` is vertical, in degrees.
     pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>, fov: f64) -> Self {
         Self {
             position: position.into(),
@@ -87,30 +87,30 @@ impl PerspectiveDescription {
     }
 }
 
-/// A camera of parallel rays.
+/// An orthographic camera.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OrthographicDescription {
-    /// The middle of the image plane, where the rays start.
+    /// Center of the image plane, where the rays start.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// The point in the middle of the picture.
+    /// Point at the center of the image.
     #[schemars(with = "Point")]
     pub look_at: DVec3,
-    /// Which way is up.
+    /// Up direction.
     #[serde(default = "z_up")]
     #[schemars(with = "Vector")]
     pub up: DVec3,
-    /// Height of the seen rectangle in scene units.
+    /// Height of the image plane in scene units.
     #[schemars(with = "Length")]
     pub height: f64,
-    /// How it moves from frame to frame, if it does.
+    /// Animation of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<CameraPathDescription>,
 }
 
 impl OrthographicDescription {
-    /// A camera with z upwards. `height` is that of the seen rectangle, in scene units.
+    /// Creates a camera with z up. `height` is that of the image plane in scene units.
     pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>, height: f64) -> Self {
         Self {
             position: position.into(),
@@ -122,27 +122,27 @@ impl OrthographicDescription {
     }
 }
 
-/// A camera that sees in all directions.
+/// A camera for all directions.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PanoramaDescription {
-    /// Where all rays start.
+    /// Origin of all rays.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// The point in the middle of the picture.
+    /// Point at the center of the image.
     #[schemars(with = "Point")]
     pub look_at: DVec3,
-    /// Which way is up.
+    /// Up direction.
     #[serde(default = "z_up")]
     #[schemars(with = "Vector")]
     pub up: DVec3,
-    /// How it moves from frame to frame, if it does.
+    /// Animation of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<CameraPathDescription>,
 }
 
 impl PanoramaDescription {
-    /// A camera with z upwards.
+    /// Creates a camera with z up.
     pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>) -> Self {
         Self {
             position: position.into(),
@@ -154,10 +154,10 @@ impl PanoramaDescription {
 }
 
 impl CameraDescription {
-    /// What a file means that does not say of what type its camera is.
+    /// Type of a camera without `type`.
     pub(crate) const DEFAULT: &str = "perspective";
 
-    /// How it moves from frame to frame, if it does.
+    /// Returns the animation of the camera.
     pub fn path(&self) -> Option<&CameraPathDescription> {
         match self {
             CameraDescription::Perspective(camera) => camera.path.as_ref(),
@@ -166,7 +166,7 @@ impl CameraDescription {
         }
     }
 
-    /// The camera with another path.
+    /// Replaces the animation of the camera.
     pub fn with_path(mut self, path: impl Into<Option<CameraPathDescription>>) -> Self {
         match &mut self {
             CameraDescription::Perspective(camera) => camera.path = path.into(),

@@ -1,24 +1,24 @@
-//! `[camera.path]`: how the camera moves from frame to frame.
+//! `[camera.path]`: camera animation by keys.
 
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::description::kinds::{Aperture, Fov, FrameNumber, Length, Point, Vector};
-/// The way of a camera through its keys. Before the first and after the last one it stands.
+/// A camera animation by keys. The camera is constant before the first key and after the last.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraPathDescription {
-    /// How it goes from key to key.
+    /// Interpolation between keys.
     #[serde(default)]
     pub interpolation: Interpolation,
-    /// At which frame it is where, in the order of their frames.
+    /// Keys in ascending order of their frames.
     #[schemars(length(min = 1))]
     pub keys: Vec<CameraKeyDescription>,
 }
 
 impl CameraPathDescription {
-    /// A way through these keys.
+    /// Creates a path through these keys.
     pub fn new(interpolation: Interpolation, keys: impl IntoIterator<Item = CameraKeyDescription>) -> Self {
         Self {
             interpolation,
@@ -27,36 +27,36 @@ impl CameraPathDescription {
     }
 }
 
-/// How values go from key to key.
+/// Interpolation between keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Interpolation {
-    /// Straight, and with a constant speed between two keys.
+    /// Linear, with constant speed between two keys.
     #[default]
     Linear,
-    /// On a curve without corners, whose speed does not jump.
+    /// A smooth curve with continuous velocity.
     Smooth,
 }
 
-/// What the camera is like at one frame. Each value goes its own way through the keys that have it; what no key has is the
-/// camera's own.
+/// The camera at one frame. Each value is interpolated between the keys that have it; values without keys are the
+/// camera's.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("minProperties" = 2))] // something beside the frame
+#[schemars(extend("minProperties" = 2))] // at least one value
 pub struct CameraKeyDescription {
-    /// Which frame; it may be a fraction.
+    /// Frame number; may be a fraction.
     #[schemars(with = "FrameNumber")]
     pub frame: f64,
-    /// The camera's position.
+    /// Position of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>")]
     pub position: Option<DVec3>,
-    /// The point in the middle of the picture.
+    /// Point at the center of the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>")]
     pub look_at: Option<DVec3>,
-    /// Which way is up.
+    /// Up direction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub up: Option<DVec3>,
@@ -64,7 +64,7 @@ pub struct CameraKeyDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Fov>")]
     pub fov: Option<f64>,
-    /// Height of the seen rectangle in scene units, of orthographic cameras.
+    /// Height of the image plane in scene units, of orthographic cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Length>")]
     pub height: Option<f64>,
@@ -72,14 +72,14 @@ pub struct CameraKeyDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Aperture>")]
     pub aperture: Option<f64>,
-    /// Distance of the plane that is sharp, of perspective cameras.
+    /// Distance of the plane in focus, of perspective cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Length>")]
     pub focus_distance: Option<f64>,
 }
 
 impl CameraKeyDescription {
-    /// A key that says nothing yet.
+    /// Creates a key without values.
     pub fn new(frame: f64) -> Self {
         Self {
             frame,
@@ -93,7 +93,7 @@ impl CameraKeyDescription {
         }
     }
 
-    /// A key with the camera's position and what it looks at.
+    /// Creates a key with position and target point.
     pub fn looking(frame: f64, position: impl Into<DVec3>, look_at: impl Into<DVec3>) -> Self {
         Self {
             position: Some(position.into()),

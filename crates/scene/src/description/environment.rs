@@ -1,4 +1,4 @@
-//! What a scene file says of what surrounds the scene.
+//! The section `[environment]` of scene files.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 use super::{Rotation, one};
 use crate::description::kinds::{Degrees, Elevation, EnvironmentScale, Rgb, Turbidity};
 
-/// What surrounds the scene, for `integrator = "path"`: one of `color`, `file` and `name`.
+/// The environment, for `integrator = "path"`: one of `color`, `file` and `name`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{ "required": ["color"] }, { "required": ["file"] }, { "required": ["name"] }]))]
 pub struct EnvironmentDescription {
-    /// Radiance from everywhere; linear RGB.
+    /// Constant radiance; linear RGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Rgb>")]
     pub color: Option<DVec3>,
@@ -20,40 +20,40 @@ pub struct EnvironmentDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub file: Option<String>,
-    /// One of the program's own.
+    /// A built-in environment.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<EnvironmentName>,
     /// Factor of the radiance.
     #[serde(default = "one")]
     #[schemars(with = "EnvironmentScale")]
     pub scale: f64,
-    /// How it is turned: by degrees about the z axis, counter-clockwise as seen from above, or as a mesh is, each angle from -360 to 360
-    /// degrees. If absent, not at all.
+    /// Rotation: degrees about the z axis, counter-clockwise as seen from above, or as for a mesh; each angle from -360
+    /// to 360 degrees. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<EnvironmentRotation>,
-    /// Whether the camera sees it.
+    /// Visible to the camera.
     #[serde(default = "yes")]
     pub visible: bool,
-    /// The radiance that the camera sees in its place; linear RGB.
+    /// Radiance that the camera sees instead; linear RGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Rgb>")]
     pub background: Option<DVec3>,
-    /// How high the sun of `"sky"` stands, in degrees.
+    /// Elevation of the sun of `"sky"`, in degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Elevation>", extend("default" = 40))]
     pub sun_elevation: Option<f64>,
-    /// Where the sun of `"sky"` stands: degrees from +x towards +y.
+    /// Azimuth of the sun of `"sky"`: degrees from +x towards +y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Degrees>", extend("default" = 0))]
     pub sun_azimuth: Option<f64>,
-    /// How hazy `"sky"` is: light that air and haze take from a ray, relative to clean air.
+    /// Turbidity of `"sky"`: extinction by air and haze, relative to clean air.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Turbidity>", extend("default" = 2))]
     pub turbidity: Option<f64>,
 }
 
 impl EnvironmentDescription {
-    /// This radiance from everywhere, in linear RGB.
+    /// Creates an environment of constant radiance, in linear RGB.
     pub fn new(color: impl Into<DVec3>) -> Self {
         Self {
             color: Some(color.into()),
@@ -61,7 +61,7 @@ impl EnvironmentDescription {
         }
     }
 
-    /// An equirectangular image, relative to the scene file's folder.
+    /// Creates an environment from an equirectangular image, relative to the scene file's folder.
     pub fn image(file: impl Into<String>) -> Self {
         Self {
             file: Some(file.into()),
@@ -69,7 +69,7 @@ impl EnvironmentDescription {
         }
     }
 
-    /// One of the program's own.
+    /// Creates a built-in environment.
     pub fn named(name: EnvironmentName) -> Self {
         Self {
             name: Some(name),
@@ -93,21 +93,21 @@ impl EnvironmentDescription {
     }
 }
 
-/// Surroundings that the program makes by a formula. In a file the names are in snake case: `"studio"`.
+/// Built-in environments, computed by formulas. In a file the names are in snake case: `"studio"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EnvironmentName {
-    /// A grey room with lamps, as of a photographer.
+    /// A gray photo studio with area lights.
     Studio,
     /// A clear sky with a sun.
     Sky,
 }
 
 impl EnvironmentName {
-    /// All of them.
+    /// All built-in environments.
     pub const ALL: [EnvironmentName; 2] = [EnvironmentName::Studio, EnvironmentName::Sky];
 
-    /// The name in files and options.
+    /// Returns the name in files and options.
     pub const fn name(self) -> &'static str {
         match self {
             EnvironmentName::Studio => "studio",
@@ -116,7 +116,7 @@ impl EnvironmentName {
     }
 }
 
-/// How surroundings are turned, counter-clockwise as seen against an axis.
+/// A rotation of the environment, counter-clockwise as seen against the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(
     untagged,
@@ -125,7 +125,7 @@ impl EnvironmentName {
 pub enum EnvironmentRotation {
     /// About the z axis, in degrees.
     Degrees(#[schemars(with = "Degrees")] f64),
-    /// In any way that a mesh may be turned.
+    /// Any rotation of a mesh.
     Any(Rotation),
 }
 

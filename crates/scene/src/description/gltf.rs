@@ -1,4 +1,4 @@
-//! What a scene file says of glTF files.
+//! glTF files as shapes of scene files.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{Rotation, Scale};
 use crate::description::kinds::{Matrix, Place, Point, Seconds};
 
-/// A glTF file: its meshes with their materials and textures, and its lights.
+/// A glTF file: meshes with materials and textures, and lights.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
@@ -18,45 +18,45 @@ pub struct GltfDescription {
     /// The file, relative to the scene file's folder.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Which of its scenes; absent, the one that the file names, else the first.
+    /// Scene of the file. If absent, its default scene, else the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<Selection>,
-    /// At which second of an animation it is; absent, as it is without animations.
+    /// Time of the animation. If absent, the file is not animated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Seconds>")]
     pub time: Option<f64>,
-    /// Which of its animations; absent, the first, where a time is said.
+    /// Animation of the file. If absent, the first, if `time` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub animation: Option<Selection>,
-    /// Which of its variants of materials; absent, none.
+    /// Material variant of the file. If absent, none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<Selection>,
-    /// Whether its lights are lit.
+    /// Use the lights of the file.
     #[serde(default = "yes")]
     pub lights: bool,
-    /// Names of the scene's materials by those of the file's that they stand in for.
+    /// Names of the scene's materials, by the names of the file's materials that they replace.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
-    /// Added to its coordinates, after all else.
+    /// Translation, applied last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// How it is turned, after it was scaled: by three angles about x, y and z, or by one about an axis, each from -360 to 360 degrees. If
-    /// absent, not at all.
+    /// Rotation, applied after the scale: three angles about x, y and z, or one about an axis, each from -360 to 360
+    /// degrees. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Factors of its coordinates, one or three, each from 1e-6 to 1e6 or negative.
+    /// Scale, one or three factors, each from 1e-6 to 1e6 or negative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// The rows of an affine map, in place of `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, in place of `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
 }
 
 impl GltfDescription {
-    /// A file, relative to the scene file's folder, as it is.
+    /// Creates a shape with default settings. `file` is relative to the scene file's folder.
     pub fn new(file: impl Into<String>) -> Self {
         Self {
             file: file.into(),
@@ -74,18 +74,18 @@ impl GltfDescription {
     }
 }
 
-/// One of several things, by its number, from 0, or its name.
+/// One of several elements, by index from 0 or by name.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged, expecting = "must be a name or a number, from 0")]
 pub enum Selection {
-    /// Its place in the list.
+    /// Index in the list.
     Number(#[schemars(with = "Place")] u32),
     /// Its name.
     Name(String),
 }
 
 impl Selection {
-    /// The index of the first of these names that is meant. A name of digits goes before a number.
+    /// Returns the index of the first name that is selected. A name of digits takes precedence over an index.
     pub(crate) fn among(&self, names: &[Option<&str>]) -> Option<usize> {
         let named = |wanted: &str| names.iter().position(|name| *name == Some(wanted));
         match self {
@@ -99,7 +99,7 @@ impl Selection {
 }
 
 impl From<&str> for Selection {
-    /// A text as a command line has it: a number where it is one.
+    /// Parses the text of an option: an index if it is a number, else a name.
     fn from(text: &str) -> Self {
         text.parse()
             .map_or_else(|_| Selection::Name(text.to_owned()), Selection::Number)

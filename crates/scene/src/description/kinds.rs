@@ -1,5 +1,5 @@
-//! Kinds of values of a scene file: what the schema says of a number, of a list of them, or of a name, whatever its type in Rust is.
-//! Fields of descriptions name them: `#[schemars(with = "Length")]`.
+//! Kinds of values of scene files: JSON schemas independent of the Rust types. Fields of descriptions name them:
+//! `#[schemars(with = "Length")]`.
 
 use std::borrow::Cow;
 
@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 use crate::limits::*;
 use crate::{MetalIndex, ViewSettings};
 
-/// What is between the words of a kind of values and their range, as `description::kinds` has them.
+/// Separator of a kind's words and its range, in schema titles.
 pub(crate) const SPLIT: &str = "|";
 
-/// Each kind with its words, behind which its range comes, and its schema.
+/// Defines kinds by name, words and schema.
 macro_rules! kinds {
     ($($name:ident, $words:literal, $schema:expr;)+) => { $(
         pub(crate) struct $name;
@@ -93,7 +93,7 @@ kinds! {
     Place, "a number", whole(0, u32::MAX);
 }
 
-/// Colours from textures, where a colour is a share of light.
+/// A color or texture with plain components from 0 to 1.
 pub(crate) struct ShareColor;
 
 impl JsonSchema for ShareColor {
@@ -118,7 +118,7 @@ impl JsonSchema for ShareColor {
     }
 }
 
-/// Where a texture may stand in place of a plain value, the key tells what that may be.
+/// Copies the title of the plain value to a key that also accepts a texture.
 pub(crate) fn tell_plain(schema: &mut Schema) {
     let plain = schema.get("anyOf").and_then(|either| either.get(0)?.get("title"));
     if let Some(told) = plain.and_then(Value::as_str) {
@@ -142,7 +142,7 @@ fn kind(words: &str, schema: Value) -> Schema {
     schema
 }
 
-/// `1e-9 to 1e9`, or several of that.
+/// Returns the range of a schema: `1e-9 to 1e9`, or several joined by "or".
 fn range(schema: &Value) -> Option<String> {
     if let Some(either) = schema.get("anyOf").and_then(Value::as_array) {
         let all: Option<Vec<String>> = either.iter().map(range).collect();
@@ -203,7 +203,7 @@ fn scale() -> Value {
     json!({ "type": "number", "anyOf": [{ "minimum": low, "maximum": high }, { "minimum": -high, "maximum": -low }] })
 }
 
-/// There may be a fourth row.
+/// A matrix of three rows and an optional fourth.
 fn matrix() -> Value {
     let mut schema = list(3, list(4, number(COORDINATES)));
     schema["maxItems"] = json!(4);

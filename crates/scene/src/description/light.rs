@@ -1,4 +1,4 @@
-//! What a scene file says of lights.
+//! Lights of scene files.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -14,36 +14,36 @@ tagged! {
     LightDescription {
         /// An area light.
         "rectangle" => Rectangle(RectangleLightDescription),
-        /// Light from one point.
+        /// A point light.
         "point" => Point(PointLightDescription),
-        /// Light from infinitely far away.
+        /// A directional light.
         "directional" => Directional(DirectionalLightDescription),
-        /// A cone of light from one point.
+        /// A spot light.
         "spot" => Spot(SpotLightDescription),
     }
 }
 
-/// A rectangle that shines to both sides.
+/// A rectangular area light that emits from both sides.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RectangleLightDescription {
-    /// The middle.
+    /// Center.
     #[schemars(with = "Point")]
     pub center: DVec3,
-    /// Lengths along the tangent and along the bitangent.
+    /// Lengths along the tangent and the bitangent.
     #[schemars(with = "Size")]
     pub size: [f64; 2],
-    /// Perpendicular to the rectangle; any length.
+    /// Normal; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Along the first edge; any length. If absent, x, or y where the normal is nearly along x.
+    /// Direction of the first edge; any length. If absent, x, or y if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
     /// Linear RGB.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
-    /// Whether the camera sees it.
+    /// Visible to the camera.
     #[serde(default = "yes")]
     pub visible: bool,
 }
@@ -53,7 +53,7 @@ fn yes() -> bool {
 }
 
 impl RectangleLightDescription {
-    /// A light of this middle, size along tangent and bitangent, normal, tangent and linear RGB.
+    /// Creates a light. `size` is along tangent and bitangent; `color` is linear RGB.
     pub fn new(
         center: impl Into<DVec3>,
         size: [f64; 2],
@@ -72,11 +72,11 @@ impl RectangleLightDescription {
     }
 }
 
-/// Light from one point, without falloff.
+/// A point light without distance falloff.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointLightDescription {
-    /// Where it is.
+    /// Position.
     #[schemars(with = "Point")]
     pub position: DVec3,
     /// Linear RGB.
@@ -85,7 +85,7 @@ pub struct PointLightDescription {
 }
 
 impl PointLightDescription {
-    /// A light at this position, of linear RGB.
+    /// Creates a light. `color` is linear RGB.
     pub fn new(position: impl Into<DVec3>, color: impl Into<DVec3>) -> Self {
         Self {
             position: position.into(),
@@ -94,11 +94,11 @@ impl PointLightDescription {
     }
 }
 
-/// Light from infinitely far away.
+/// A directional light.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DirectionalLightDescription {
-    /// In which the light travels; any length.
+    /// Direction of propagation; any length.
     #[schemars(with = "Vector")]
     pub direction: DVec3,
     /// Linear RGB.
@@ -107,7 +107,7 @@ pub struct DirectionalLightDescription {
 }
 
 impl DirectionalLightDescription {
-    /// Light that travels in this direction, of linear RGB.
+    /// Creates a light. `direction` is that of propagation; `color` is linear RGB.
     pub fn new(direction: impl Into<DVec3>, color: impl Into<DVec3>) -> Self {
         Self {
             direction: direction.into(),
@@ -116,35 +116,35 @@ impl DirectionalLightDescription {
     }
 }
 
-/// A cone of light from one point, without falloff with the distance. It has a direction or looks at a point.
+/// A spot light without distance falloff, with either `direction` or `look_at`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpotLightDescription {
-    /// Where it is.
+    /// Position.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// In which the middle of its light travels; any length.
+    /// Direction of the axis, away from the light; any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub direction: Option<DVec3>,
-    /// The point that the middle of its light goes to.
+    /// Target point of the axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>")]
     pub look_at: Option<DVec3>,
-    /// Linear RGB in the middle.
+    /// Linear RGB on the axis.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
-    /// From the middle to where its light ends, in degrees.
+    /// Angle between axis and edge of the cone, in degrees.
     #[schemars(with = "ConeAngle")]
     pub cone_angle: f64,
-    /// From the middle to where its light begins to fall off, in degrees.
+    /// Angle between the axis and the start of the falloff, in degrees.
     #[serde(default)]
     #[schemars(with = "InnerAngle")]
     pub inner_angle: f64,
 }
 
 impl SpotLightDescription {
-    /// A light at this position that shines towards a point, of linear RGB and this angle in degrees between its middle and its edge.
+    /// Creates a light. `color` is linear RGB; `cone_angle` is between axis and edge, in degrees.
     pub fn new(
         position: impl Into<DVec3>,
         look_at: impl Into<DVec3>,

@@ -1,4 +1,4 @@
-//! What a scene file says of materials.
+//! Materials of scene files.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -13,25 +13,25 @@ use crate::description::kinds::{Absorption, Degrees, Etas, Ior, Ks, Metal, Share
 tagged! {
     /// `[materials.NAME]`
     MaterialDescription {
-        /// Phong's reflection model.
+        /// Phong reflection model.
         "phong" => Phong(PhongDescription),
-        /// A mirror.
+        /// A perfect mirror.
         "mirror" => Mirror(MirrorDescription),
         /// Clear glass.
         "glass" => Glass(GlassDescription),
-        /// Matt, for `integrator = "path"`.
+        /// Diffuse surface, for `integrator = "path"`.
         "diffuse" => Diffuse(DiffuseDescription),
         /// Metal, for `integrator = "path"`.
         "conductor" => Conductor(ConductorDescription),
-        /// Clear glass or liquid, for `integrator = "path"`.
+        /// Glass or liquid, for `integrator = "path"`.
         "dielectric" => Dielectric(DielectricDescription),
-        /// glTF's material, for `integrator = "path"`.
+        /// glTF's metallic-roughness material, for `integrator = "path"`.
         "principled" => Principled(PrincipledDescription),
     }
 }
 
 impl MaterialDescription {
-    /// The numbers that may come from textures.
+    /// Returns the scalar values that may be textures.
     pub(crate) fn values(&self) -> Vec<&ValueDescription> {
         match self {
             Self::Diffuse(diffuse) => vec![&diffuse.roughness],
@@ -53,11 +53,11 @@ impl MaterialDescription {
     }
 }
 
-/// Phong's reflection model. A factor that is absent is `color`.
+/// Phong reflection model.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhongDescription {
-    /// Short for the three factors.
+    /// Default of the three factors.
     pub color: Option<ColorDescription>,
     /// Factor of the ambient light: linear red, green and blue, or a texture. If absent, `color`.
     pub ambient: Option<ColorDescription>,
@@ -69,16 +69,16 @@ pub struct PhongDescription {
     #[serde(default = "sixteen")]
     #[schemars(with = "Shininess")]
     pub shininess: f64,
-    /// What bends its normals.
+    /// Normal map.
     pub normal_map: Option<NormalMapDescription>,
-    /// Radiance that it sends out, for `integrator = "path"`; black if absent.
+    /// Emitted radiance, for `integrator = "path"`; black if absent.
     pub emission: Option<ColorDescription>,
-    /// Whether the camera sees it; yes if absent.
+    /// Visible to the camera; true if absent.
     pub visible: Option<bool>,
 }
 
 impl PhongDescription {
-    /// A material with one colour for all three factors, and the exponent 16.
+    /// Creates a material with one color for all factors, and the exponent 16.
     pub fn new(color: impl Into<ColorDescription>) -> Self {
         Self {
             color: Some(color.into()),
@@ -93,7 +93,7 @@ impl PhongDescription {
     }
 }
 
-/// A mirror.
+/// A perfect mirror.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MirrorDescription {
@@ -101,11 +101,11 @@ pub struct MirrorDescription {
     #[serde(default)]
     #[schemars(with = "ShareColor")]
     pub tint: ColorDescription,
-    /// What bends its normals.
+    /// Normal map.
     pub normal_map: Option<NormalMapDescription>,
-    /// Radiance that it sends out, for `integrator = "path"`; black if absent.
+    /// Emitted radiance, for `integrator = "path"`; black if absent.
     pub emission: Option<ColorDescription>,
-    /// Whether the camera sees it; yes if absent.
+    /// Visible to the camera; true if absent.
     pub visible: Option<bool>,
 }
 
@@ -116,20 +116,20 @@ pub struct GlassDescription {
     /// Index of refraction.
     #[schemars(with = "Ior")]
     pub ior: f64,
-    /// Factor of the light that passes the surface.
+    /// Factor of the transmitted light.
     #[serde(default)]
     #[schemars(with = "ShareColor")]
     pub tint: ColorDescription,
-    /// What bends its normals.
+    /// Normal map.
     pub normal_map: Option<NormalMapDescription>,
-    /// Radiance that it sends out, for `integrator = "path"`; black if absent.
+    /// Emitted radiance, for `integrator = "path"`; black if absent.
     pub emission: Option<ColorDescription>,
-    /// Whether the camera sees it; yes if absent.
+    /// Visible to the camera; true if absent.
     pub visible: Option<bool>,
 }
 
 impl GlassDescription {
-    /// Glass that colours no light.
+    /// Creates glass without a tint.
     pub fn new(ior: f64) -> Self {
         Self {
             ior,
@@ -141,26 +141,26 @@ impl GlassDescription {
     }
 }
 
-/// A matt surface.
+/// A diffuse surface.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiffuseDescription {
-    /// The share of the light that it reflects.
+    /// Albedo.
     #[schemars(with = "ShareColor")]
     pub color: ColorDescription,
-    /// How rough it is, 0 to 1.
+    /// Roughness, 0 to 1.
     #[serde(default)]
     pub roughness: ValueDescription,
-    /// What bends its normals.
+    /// Normal map.
     pub normal_map: Option<NormalMapDescription>,
-    /// Radiance that it sends out; black if absent.
+    /// Emitted radiance; black if absent.
     pub emission: Option<ColorDescription>,
-    /// Whether the camera sees it; yes if absent.
+    /// Visible to the camera; true if absent.
     pub visible: Option<bool>,
 }
 
 impl DiffuseDescription {
-    /// A smooth one that reflects this share of the light.
+    /// Creates a smooth surface with this albedo.
     pub fn new(color: impl Into<ColorDescription>) -> Self {
         Self {
             color: color.into(),
@@ -172,7 +172,7 @@ impl DiffuseDescription {
     }
 }
 
-/// How rough a surface of facets is.
+/// Defines the description of a microfacet material.
 macro_rules! faceted {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $ty:ty,)* }) => {
         $(#[$doc])*
@@ -180,50 +180,50 @@ macro_rules! faceted {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: $ty,)*
-            /// How rough it is, 0 to 1.
+            /// Roughness, 0 to 1.
             #[serde(default)]
             pub roughness: ValueDescription,
-            /// How much rougher it is along its first axis, 0 to 1.
+            /// Increase of the roughness along the first axis, 0 to 1.
             #[serde(default)]
             #[schemars(with = "Share")]
             pub anisotropy: f64,
-            /// How far that axis is turned from the direction of the texture's u towards that of its v, in degrees.
+            /// Rotation of that axis from the direction of u towards that of v, in degrees.
             #[serde(default)]
             #[schemars(with = "Degrees")]
             pub anisotropy_rotation: f64,
-            /// Whether light that bounces between facets is given back.
+            /// Compensate the energy loss by multiple scattering between microfacets.
             #[serde(default = "yes")]
             pub energy_compensation: bool,
-            /// What bends its normals.
+            /// Normal map.
             pub normal_map: Option<NormalMapDescription>,
-            /// Radiance that it sends out; black if absent.
+            /// Emitted radiance; black if absent.
             pub emission: Option<ColorDescription>,
-            /// Whether the camera sees it; yes if absent.
+            /// Visible to the camera; true if absent.
             pub visible: Option<bool>,
         }
     };
 }
 
 faceted! {
-    /// Metal, polished or rough. One of `color`, `metal`, and `eta` with `k` says what it reflects.
+    /// Smooth or rough metal. Its reflectance is given by one of `color`, `metal`, and `eta` with `k`.
     ConductorDescription {
-        /// The share of the light that it reflects; all if nothing else is said.
+        /// Reflectance; 1 if no key sets it.
         #[schemars(with = "Option<ShareColor>")]
         color: Option<ColorDescription>,
-        /// The name of a metal.
+        /// A metal's name.
         #[schemars(with = "Option<Metal>")]
         metal: Option<String>,
-        /// The real part of its index of refraction.
+        /// Real part of the index of refraction.
         #[schemars(with = "Option<Etas>")]
         eta: Option<DVec3>,
-        /// The imaginary part.
+        /// Imaginary part of the index of refraction.
         #[schemars(with = "Option<Ks>")]
         k: Option<DVec3>,
     }
 }
 
 impl ConductorDescription {
-    /// Polished metal that reflects this share of the light.
+    /// Creates smooth metal with this reflectance.
     pub fn new(color: impl Into<ColorDescription>) -> Self {
         Self {
             color: Some(color.into()),
@@ -233,7 +233,7 @@ impl ConductorDescription {
 }
 
 impl Default for ConductorDescription {
-    /// Polished metal that reflects all light.
+    /// Smooth metal with a reflectance of 1.
     fn default() -> Self {
         Self {
             color: None,
@@ -252,27 +252,27 @@ impl Default for ConductorDescription {
 }
 
 faceted! {
-    /// Clear glass or liquid, or a sheet of it, polished or rough.
+    /// Smooth or rough glass or liquid, or a thin sheet of it.
     DielectricDescription {
         /// Index of refraction.
         #[schemars(with = "Ior")]
         ior: f64,
-        /// Factor of the light that passes the surface.
+        /// Factor of the transmitted light.
         #[serde(default)]
         #[schemars(with = "ShareColor")]
         color: ColorDescription,
-        /// How much light it swallows, for each unit of length.
+        /// Absorption coefficient.
         #[serde(default)]
         #[schemars(with = "Absorption")]
         absorption: DVec3,
-        /// Whether it is a thin sheet, behind which all is as before it.
+        /// Thin sheet, with the same medium on both sides.
         #[serde(default)]
         thin: bool,
     }
 }
 
 impl DielectricDescription {
-    /// Polished, and one that colours no light.
+    /// Creates a smooth dielectric without a tint.
     pub fn new(ior: f64) -> Self {
         Self {
             ior,

@@ -1,4 +1,4 @@
-//! What a scene file says of meshes.
+//! Meshes and instances of scene files.
 
 use std::collections::BTreeMap;
 
@@ -11,23 +11,23 @@ use toml::Table;
 use crate::description::kinds::{Angles, Degrees, Factor, Factor3, Matrix, Point, Vector};
 use crate::mesh::Normals;
 
-/// A mesh file, and how it is read.
+/// A mesh file and its import settings.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshFileDescription {
     /// The file, relative to the scene file's folder.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// The normals that it is shaded by. If absent, the file's if it has any, else flat ones.
+    /// Shading normals. If absent, those of the file, else flat ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normals: Option<Normals>,
-    /// Which axis of the file is up.
+    /// Up axis of the file.
     #[serde(default)]
     pub up: Up,
 }
 
 impl MeshFileDescription {
-    /// A mesh file, relative to the scene file's folder.
+    /// Creates default settings for a file, relative to the scene file's folder.
     pub fn new(file: impl Into<String>) -> Self {
         Self {
             file: file.into(),
@@ -45,38 +45,38 @@ pub struct MeshDescription {
     /// The file, relative to the scene file's folder.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// The normals that it is shaded by. If absent, the file's if it has any, else flat ones.
+    /// Shading normals. If absent, those of the file, else flat ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normals: Option<Normals>,
-    /// Which axis of the file is up.
+    /// Up axis of the file.
     #[serde(default)]
     pub up: Up,
-    /// Name of the material of all groups that `materials` does not name.
+    /// Name of the material of all groups that are not in `materials`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
     /// Names of materials by the names of the file's groups, or of its own materials.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
-    /// Added to its coordinates, after all else.
+    /// Translation, applied last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// How it is turned, after it was scaled: by three angles about x, y and z, or by one about an axis, each from -360 to 360 degrees. If
-    /// absent, not at all.
+    /// Rotation, applied after the scale: three angles about x, y and z, or one about an axis, each from -360 to 360
+    /// degrees. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Factors of its coordinates, one or three, each from 1e-6 to 1e6 or negative.
+    /// Scale, one or three factors, each from 1e-6 to 1e6 or negative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// The rows of an affine map, in place of `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, in place of `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
 }
 
 impl MeshDescription {
-    /// A mesh file, relative to the scene file's folder, of one material, where the file has it.
+    /// Creates a mesh without a transform. `file` is relative to the scene file's folder.
     pub fn new(material: impl Into<String>, file: impl Into<String>) -> Self {
         Self {
             file: file.into(),
@@ -92,39 +92,39 @@ impl MeshDescription {
     }
 }
 
-/// A mesh of `[meshes.NAME]`, at a place of its own.
+/// An instance of a mesh of `[meshes.NAME]`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
 pub struct InstanceDescription {
-    /// The mesh's name.
+    /// Name of the mesh.
     pub mesh: String,
-    /// Name of the material of all groups that `materials` does not name.
+    /// Name of the material of all groups that are not in `materials`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
     /// Names of materials by the names of the mesh's groups, or of its file's own materials.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
-    /// Added to its coordinates, after all else.
+    /// Translation, applied last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// How it is turned, after it was scaled: by three angles about x, y and z, or by one about an axis, each from -360 to 360 degrees. If
-    /// absent, not at all.
+    /// Rotation, applied after the scale: three angles about x, y and z, or one about an axis, each from -360 to 360
+    /// degrees. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Factors of its coordinates, one or three, each from 1e-6 to 1e6 or negative.
+    /// Scale, one or three factors, each from 1e-6 to 1e6 or negative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// The rows of an affine map, in place of `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, in place of `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
 }
 
 impl InstanceDescription {
-    /// The mesh of this name, of one material, where its file has it.
+    /// Creates an instance without a transform.
     pub fn new(material: impl Into<String>, mesh: impl Into<String>) -> Self {
         Self {
             mesh: mesh.into(),
@@ -138,7 +138,7 @@ impl InstanceDescription {
     }
 }
 
-/// Which axis of a file becomes the scene's z axis; the others follow in their order.
+/// The axis of a file that becomes the scene's z axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Up {
@@ -146,7 +146,7 @@ pub enum Up {
     X,
     /// (x, y, z) becomes (x, -z, y).
     Y,
-    /// Coordinates as they are.
+    /// Unchanged coordinates.
     #[default]
     Z,
 }
@@ -158,13 +158,13 @@ pub enum Up {
     expecting = "must be a list of 3 angles in degrees or a table such as { axis = [0, 0, 1], degrees = 90 }"
 )]
 pub enum Rotation {
-    /// About the x axis, then about the y axis, then about the z axis.
+    /// About the x axis, then the y axis, then the z axis.
     Angles(#[schemars(with = "Angles")] DVec3),
     /// About one axis.
     About(#[serde(deserialize_with = "table")] RotationAbout),
 }
 
-/// Reads a table. Within an untagged enum serde takes a list of its values too.
+/// Reads a table. Code derived for an untagged enum would also accept a list of values.
 fn table<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RotationAbout, D::Error> {
     Table::deserialize(deserializer)?.try_into().map_err(D::Error::custom)
 }
@@ -173,7 +173,7 @@ fn table<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RotationAbout, D:
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotationAbout {
-    /// The axis; any length.
+    /// Axis; any length.
     #[schemars(with = "Vector")]
     pub axis: DVec3,
     /// The angle.
@@ -185,8 +185,8 @@ pub struct RotationAbout {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged, expecting = "must be a number or a list of 3 numbers")]
 pub enum Scale {
-    /// The same for all.
+    /// One factor for all axes.
     All(#[schemars(with = "Factor")] f64),
-    /// One for each axis.
+    /// One factor per axis.
     Each(#[schemars(with = "Factor3")] DVec3),
 }

@@ -1,8 +1,8 @@
-//! What a scene file says, field for field; `docs/scene-format.md` describes every key.
+//! Scene files as Rust values, field by field; `docs/scene-format.md` describes every key.
 //!
-//! Nothing here is checked but the types: [`Description::validate`] makes a [`Scene`](super::Scene) of it.
-//! It is read from a file, or made in code by [`Description::new`] and the constructors of its parts.
-//! Serializing a `Description` with the `toml` crate gives a file that reads back as the same `Description`.
+//! Only types are checked here: [`Description::validate`] creates a [`Scene`](super::Scene). A `Description` is parsed
+//! from a file, or created by [`Description::new`] and the constructors of its parts. The `toml` crate serializes it to
+//! a file that reads back as the same `Description`.
 
 mod camera;
 mod camera_path;
@@ -43,44 +43,44 @@ pub use self::render::*;
 pub use self::shape::*;
 pub use self::texture::*;
 
-/// A whole scene file.
+/// A scene file.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Description {
-    /// `[image]`: the picture, its size and how it is shown.
+    /// `[image]`: size and display settings.
     pub image: ImageDescription,
-    /// `[camera]`: where the picture is seen from.
+    /// `[camera]`: the camera.
     pub camera: CameraDescription,
-    /// `[render]`: how it is rendered.
+    /// `[render]`: render settings.
     #[schemars(default)]
     pub render: RenderDescription,
-    /// `[environment]`: what surrounds the scene, for `integrator = "path"`.
+    /// `[environment]`: the environment, for `integrator = "path"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub environment: Option<EnvironmentDescription>,
-    /// `[textures.NAME]`: colours for each point of a surface, which materials name.
+    /// `[textures.NAME]`: textures of materials.
     #[schemars(default)]
     pub textures: BTreeMap<String, TextureDescription>,
-    /// `[materials.NAME]`: what surfaces look like.
+    /// `[materials.NAME]`: materials of surfaces.
     #[schemars(default)]
     pub materials: BTreeMap<String, MaterialDescription>,
-    /// `[[lights]]`: what shines, besides surfaces and surroundings.
+    /// `[[lights]]`: lights other than emissive surfaces and the environment.
     #[schemars(default)]
     pub lights: Vec<LightDescription>,
-    /// `[[shapes]]`: what is seen.
+    /// `[[shapes]]`: geometry.
     #[schemars(default)]
     pub shapes: Vec<ShapeDescription>,
-    /// `[meshes.NAME]`: meshes that instances name.
+    /// `[meshes.NAME]`: meshes for instances.
     #[schemars(default)]
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub meshes: BTreeMap<String, MeshFileDescription>,
-    /// `[[instances]]`: meshes, at places of their own.
+    /// `[[instances]]`: instances of meshes.
     #[schemars(default)]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub instances: Vec<InstanceDescription>,
 }
 
 impl Description {
-    /// An empty scene for a picture of this size, in pixels, rendered by the settings' defaults.
+    /// Creates an empty scene with default render settings. The size is in pixels.
     pub fn new(width: u32, height: u32, camera: impl Into<CameraDescription>) -> Self {
         Self {
             image: ImageDescription::new(width, height),
@@ -96,55 +96,55 @@ impl Description {
         }
     }
 
-    /// The scene with other settings.
+    /// Replaces the render settings.
     pub fn with_render(mut self, render: RenderDescription) -> Self {
         self.render = render;
         self
     }
 
-    /// The scene with other surroundings.
+    /// Replaces the environment.
     pub fn with_environment(mut self, environment: EnvironmentDescription) -> Self {
         self.environment = Some(environment);
         self
     }
 
-    /// The scene with a further texture, in place of any that has its name.
+    /// Adds a texture, or replaces the one of this name.
     pub fn with_texture(mut self, name: impl Into<String>, texture: impl Into<TextureDescription>) -> Self {
         self.textures.insert(name.into(), texture.into());
         self
     }
 
-    /// The scene with a further material, in place of any that has its name.
+    /// Adds a material, or replaces the one of this name.
     pub fn with_material(mut self, name: impl Into<String>, material: impl Into<MaterialDescription>) -> Self {
         self.materials.insert(name.into(), material.into());
         self
     }
 
-    /// The scene with a further light.
+    /// Adds a light.
     pub fn with_light(mut self, light: impl Into<LightDescription>) -> Self {
         self.lights.push(light.into());
         self
     }
 
-    /// The scene with a further shape.
+    /// Adds a shape.
     pub fn with_shape(mut self, shape: impl Into<ShapeDescription>) -> Self {
         self.shapes.push(shape.into());
         self
     }
 
-    /// The scene with a further mesh for instances to name, in place of any that has its name.
+    /// Adds a mesh for instances, or replaces the one of this name.
     pub fn with_mesh(mut self, name: impl Into<String>, mesh: MeshFileDescription) -> Self {
         self.meshes.insert(name.into(), mesh);
         self
     }
 
-    /// The scene with a further instance of a mesh.
+    /// Adds an instance of a mesh.
     pub fn with_instance(mut self, instance: InstanceDescription) -> Self {
         self.instances.push(instance);
         self
     }
 
-    /// The files that it names, without the images in memory.
+    /// Returns the files of the scene, except images in memory.
     pub(super) fn files_beside(&self, assets: &Assets) -> impl Iterator<Item = PathBuf> {
         let in_memory = |path: &PathBuf| {
             let mut names = assets.images.keys();
@@ -153,7 +153,7 @@ impl Description {
         self.files(&assets.folder).filter(move |path| !in_memory(path))
     }
 
-    /// The files that it names, which are relative to the scene file's folder.
+    /// Returns the files of the scene, relative to `folder`.
     pub fn files(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
         let images = self.textures.values().filter_map(|texture| match texture {
             TextureDescription::Image(image) => Some(&image.file),
@@ -171,27 +171,27 @@ impl Description {
     }
 }
 
-/// The picture: its size, and how it is shown.
+/// Size and display settings of the image.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageDescription {
-    /// Its width in pixels.
+    /// Width in pixels.
     #[schemars(with = "Pixels")]
     pub width: u32,
-    /// Its height in pixels.
+    /// Height in pixels.
     #[schemars(with = "Pixels")]
     pub height: u32,
-    /// From linear light to what a display is sent.
+    /// View transform, from linear radiance to display values.
     #[serde(default)]
     pub view_transform: ViewTransform,
-    /// In stops: light is multiplied by 2 to this power before it is shown.
+    /// Exposure in stops: radiance is multiplied by 2 to this power before the view transform.
     #[serde(default)]
     #[schemars(with = "Stops")]
     pub exposure: f64,
 }
 
 impl ImageDescription {
-    /// A picture of this size, shown as it is unless something else is said.
+    /// Creates an image with default display settings.
     pub fn new(width: u32, height: u32) -> Self {
         Self {
             width,

@@ -1,4 +1,4 @@
-//! What a scene file says of the material `principled`.
+//! The material `principled` of scene files.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -7,69 +7,69 @@ use serde::{Deserialize, Serialize};
 use super::{ColorDescription, NormalMapDescription, TextureReference, ValueDescription};
 use crate::description::kinds::{AttenuationDistance, Degrees, PrincipledIor, Share, ShareColor, ShareRgb, Thickness};
 
-/// glTF's metallic-roughness material with its extensions, for `integrator = "path"`; glTF's defaults.
+/// glTF's metallic-roughness material with extensions and glTF's defaults, for `integrator = "path"`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PrincipledDescription {
-    /// The share of light that a dielectric's ground spreads, or a metal reflects head-on.
+    /// Albedo of the dielectric's diffuse base, or reflectance of the metal at normal incidence.
     #[schemars(with = "ShareColor")]
     pub base_color: ColorDescription,
-    /// How much of it is metal, 0 to 1.
+    /// Metallic weight, 0 to 1.
     pub metallic: ValueDescription,
-    /// How rough it is, 0 to 1.
+    /// Roughness, 0 to 1.
     pub roughness: ValueDescription,
-    /// How much rougher it is along the tangent, 0 to 1.
+    /// Increase of the roughness along the tangent, 0 to 1.
     pub anisotropy: ValueDescription,
-    /// The tangent's angle, counter-clockwise in degrees.
+    /// Rotation of the tangent, counter-clockwise in degrees.
     #[schemars(with = "Degrees")]
     pub anisotropy_rotation: f64,
-    /// An image whose red and green, as numbers from -1 to 1, are the direction along u and v that is turned so.
+    /// Image of the tangent before that rotation: red and green, mapped to -1 to 1, are its components along u and v.
     pub anisotropy_direction: Option<TextureReference>,
     /// Index of refraction of the dielectric.
     #[schemars(with = "PrincipledIor")]
     pub ior: f64,
-    /// Factor of what the dielectric reflects, 0 to 1.
+    /// Factor of the dielectric's reflection, 0 to 1.
     pub specular: ValueDescription,
-    /// Factor of what it reflects head-on.
+    /// Factor of that reflection at normal incidence.
     pub specular_color: ColorDescription,
-    /// How much of the dielectric's light passes the surface, 0 to 1.
+    /// Fraction of the dielectric's light that is transmitted, 0 to 1.
     pub transmission: ValueDescription,
-    /// 0 where the surface is a thin sheet; else what is behind it is a volume.
+    /// 0 for a thin sheet; otherwise the surface encloses a volume.
     #[schemars(with = "Thickness")]
     pub thickness: f64,
-    /// What is left of light after `attenuation_distance` in the volume.
+    /// Transmittance of the volume over `attenuation_distance`.
     #[schemars(with = "ShareRgb")]
     pub attenuation_color: DVec3,
-    /// That distance; infinite if absent.
+    /// Distance of `attenuation_color`; infinite if absent.
     #[schemars(with = "Option<AttenuationDistance>")]
     pub attenuation_distance: Option<f64>,
-    /// How much there is of a clear coat, 0 to 1.
+    /// Weight of the clear coat, 0 to 1.
     pub clearcoat: ValueDescription,
-    /// How rough that is, 0 to 1.
+    /// Roughness of the clear coat, 0 to 1.
     pub clearcoat_roughness: ValueDescription,
-    /// What bends the coat's normals.
+    /// Normal map of the clear coat.
     pub clearcoat_normal_map: Option<NormalMapDescription>,
-    /// The colour of the sheen of cloth.
+    /// Color of the sheen.
     #[schemars(with = "ShareColor")]
     pub sheen_color: ColorDescription,
-    /// How rough the sheen is, 0 to 1.
+    /// Roughness of the sheen, 0 to 1.
     pub sheen_roughness: ValueDescription,
-    /// How much of the surface there is, 0 to 1.
+    /// Opacity, 0 to 1.
     pub alpha: ValueDescription,
-    /// What `alpha` does.
+    /// Effect of `alpha`.
     pub alpha_mode: AlphaMode,
-    /// The least alpha of what is there, under `"mask"`.
+    /// Minimum alpha of opaque points, under `"mask"`.
     #[schemars(with = "Share")]
     pub alpha_cutoff: f64,
-    /// What the colours of a mesh's vertices are factors of.
+    /// Use of a mesh's vertex colors.
     pub vertex_colors: VertexColors,
-    /// Whether the camera sees its back.
+    /// Back faces are visible to the camera.
     pub double_sided: bool,
-    /// What bends its normals.
+    /// Normal map.
     pub normal_map: Option<NormalMapDescription>,
-    /// Radiance that it sends out; black if absent.
+    /// Emitted radiance; black if absent.
     pub emission: Option<ColorDescription>,
-    /// Whether the camera sees it; yes if absent.
+    /// Visible to the camera; true if absent.
     pub visible: Option<bool>,
 }
 
@@ -106,28 +106,28 @@ impl Default for PrincipledDescription {
     }
 }
 
-/// What a material's alpha does. In a file the names are in snake case: `"mask"`.
+/// Effect of a material's alpha. In a file the names are in snake case: `"mask"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AlphaMode {
-    /// Nothing: all of the surface is there.
+    /// Ignored: the surface is opaque.
     #[default]
     Opaque,
-    /// The surface is there where its alpha is the cutoff or more.
+    /// Opaque where alpha is at least the cutoff, else fully transparent.
     Mask,
-    /// That share of the light meets it; the rest passes straight on.
+    /// Opacity: the rest of the light passes straight through.
     Blend,
 }
 
-/// What the colours of a mesh's vertices do. In a file the names are in snake case: `"base_color"`.
+/// Use of a mesh's vertex colors. In a file the names are in snake case: `"base_color"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VertexColors {
-    /// Nothing.
+    /// Ignored.
     #[default]
     None,
-    /// They are factors of the base colour and of alpha.
+    /// Factors of the base color and of alpha.
     BaseColor,
-    /// They are factors of the emission and of alpha.
+    /// Factors of the emission and of alpha.
     Emission,
 }

@@ -1,4 +1,4 @@
-//! What a scene file says of how it is rendered.
+//! Render settings of scene files.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -14,61 +14,61 @@ use super::integrator::Integrator;
 use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
 use crate::limits::MOST;
 
-/// Whether glass casts shadows. In a file the names are in snake case: `"opaque"`.
+/// Shadows of glass. In a file the names are in snake case: `"opaque"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shadows {
-    /// Like everything else.
+    /// Glass casts shadows.
     #[default]
     Opaque,
-    /// Not at all: light passes it straight on, with its full strength.
+    /// Glass casts no shadows: light passes it straight and unattenuated.
     Transparent,
 }
 
-/// The settings of a render.
+/// Render settings.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RenderDescription {
-    /// The light transport that is simulated. Absent, `"path"` if the scene uses a key that needs it, else `"phong"`.
+    /// Light transport algorithm. If absent, `"path"` if the scene uses a key that needs it, else `"phong"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integrator: Option<Integrator>,
-    /// The ambient light.
+    /// Ambient light.
     #[schemars(with = "Rgb")]
     pub ambient: DVec3,
     /// Radiance of rays that leave the scene.
     #[schemars(with = "Rgb")]
     pub background: DVec3,
-    /// How far above a surface rays start at least, relative to the largest coordinate there.
+    /// Minimum offset of ray origins above a surface, relative to the largest coordinate there.
     #[schemars(with = "ShadowEpsilon")]
     pub shadow_epsilon: f64,
-    /// Whether glass casts shadows.
+    /// Shadows of glass.
     pub shadows: Shadows,
-    /// Most bounces of a path; under `"phong"` by mirrors and glass.
+    /// Maximum number of bounces of a path; under `"phong"`, by mirrors and glass.
     #[schemars(with = "Depth")]
     pub max_depth: u32,
-    /// From which bounce on a path may end at random, for `integrator = "path"`; absent, 5.
+    /// First bounce with Russian roulette, for `integrator = "path"`; 5 if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Depth>")]
     pub rr_depth: Option<u32>,
-    /// Most of what a sample of indirect light may add, for `integrator = "path"`; absent, all of it.
+    /// Maximum contribution of a sample of indirect light, for `integrator = "path"`; unlimited if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Clamp>")]
     pub clamp: Option<f64>,
-    /// Whether the background is transparent, for `integrator = "path"`; absent, it is not.
+    /// Transparent background, for `integrator = "path"`; opaque if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alpha: Option<bool>,
-    /// Whether textures are filtered over the footprint of each ray.
+    /// Filter textures over the footprint of each ray.
     pub ray_differentials: bool,
     /// Seed of all random patterns.
     #[schemars(with = "Seed")]
     pub seed: u32,
-    /// Samples of every pixel.
+    /// Samples per pixel.
     pub pixel_samples: SamplesDescription,
-    /// Samples of every area light at every hit.
+    /// Samples per area light and hit.
     pub light_samples: SamplesDescription,
-    /// What a pixel's samples are weighted by.
+    /// Reconstruction filter.
     pub filter: PixelFilterDescription,
-    /// Further samples where they are needed.
+    /// Adaptive sampling: further samples where they are needed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<AdaptiveDescription>,
 }
@@ -102,10 +102,10 @@ impl Default for RenderDescription {
     }
 }
 
-/// A number of samples and their pattern. A scene file has a table, or the number alone.
+/// A number of samples and their pattern; in a scene file a table, or the number alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SamplesDescription {
-    /// Pattern; absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
+    /// Pattern. If absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pattern: Option<Pattern>,
     /// Number of samples.
@@ -116,7 +116,7 @@ pub struct SamplesDescription {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SamplesTable {
-    /// Pattern; absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
+    /// Pattern. If absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
     #[serde(default)]
     pattern: Option<Pattern>,
     /// Number of samples.
@@ -124,7 +124,7 @@ struct SamplesTable {
     count: u32,
 }
 
-// By hand: serde's untagged enums lose the location and the reason of an error.
+// Not derived: serde's untagged enums lose the location and the reason of an error.
 impl<'de> Deserialize<'de> for SamplesDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct SamplesVisitor;
@@ -169,7 +169,7 @@ impl JsonSchema for SamplesDescription {
 }
 
 impl SamplesDescription {
-    /// Returns this number of samples in the default pattern of the integrator.
+    /// Creates this number of samples in the default pattern of the integrator.
     pub fn new(count: u32) -> Self {
         Self { pattern: None, count }
     }
@@ -180,27 +180,27 @@ impl SamplesDescription {
     }
 }
 
-/// How samples are laid out on the unit square. In a file the names are in snake case: `"grid"`.
+/// Layout of samples in the unit square. In a file the names are in snake case: `"grid"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Pattern {
-    /// The centres of n x n cells.
+    /// Centers of n x n cells.
     #[default]
     Grid,
-    /// The grid, turned by atan(1/2).
+    /// The grid, rotated by atan(1/2).
     RotatedGrid,
-    /// A uniform position in each of n x n cells.
+    /// A uniform random position in each of n x n cells.
     Jittered,
-    /// Independent and uniform.
+    /// Independent uniform random positions.
     Random,
-    /// Halton's sequence in bases 2 and 3, randomly rotated.
+    /// The Halton sequence in bases 2 and 3, randomly rotated.
     Halton,
-    /// Sobol's sequence, Owen-scrambled.
+    /// The Sobol' sequence, Owen-scrambled.
     Sobol,
 }
 
 impl Pattern {
-    /// All of them.
+    /// All patterns.
     pub const ALL: [Pattern; 6] = [
         Pattern::Grid,
         Pattern::RotatedGrid,
@@ -210,7 +210,7 @@ impl Pattern {
         Pattern::Sobol,
     ];
 
-    /// The name in files and options.
+    /// Returns the name in files and options.
     pub const fn name(self) -> &'static str {
         match self {
             Pattern::Grid => "grid",
@@ -222,12 +222,12 @@ impl Pattern {
         }
     }
 
-    /// Whether the pattern is made of n x n cells, so that its count must be a square number.
+    /// Returns true if the count must be a square number, because the pattern consists of n x n cells.
     pub const fn needs_square(self) -> bool {
         matches!(self, Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered)
     }
 
-    /// Whether the pattern has further positions when all of a set are used, so that sampling can be adaptive.
+    /// Returns true if the pattern can be extended beyond its count, as adaptive sampling requires.
     pub const fn goes_on(self) -> bool {
         !matches!(self, Pattern::Grid | Pattern::RotatedGrid)
     }
@@ -237,10 +237,10 @@ impl Pattern {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { error = 0.01 }")]
 pub struct AdaptiveDescription {
-    /// The standard error of a pixel's displayed value that is aimed at.
+    /// Target standard error of a pixel's displayed value.
     #[schemars(with = "Share")]
     pub error: f64,
-    /// The most samples of a pixel; absent, 16 times their count.
+    /// Maximum number of samples per pixel. If absent, 16 times the count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<MostSamples>")]
     pub max_samples: Option<u32>,
@@ -250,35 +250,34 @@ pub struct AdaptiveDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { type = \"gaussian\" }")]
 pub struct PixelFilterDescription {
-    /// Its form.
+    /// Shape of the filter.
     #[serde(rename = "type")]
     pub kind: PixelFilterKind,
-    /// How far it reaches, in pixels. If absent, what is usual for its form: 0.5 for `"box"`, 1 for `"triangle"`, 1.5 for `"gaussian"` and
-    /// `"blackman_harris"`, 2 for `"mitchell"`.
+    /// Radius in pixels. If absent, 0.5 for `"box"`, 1 for `"triangle"`, 1.5 for `"gaussian"` and `"blackman_harris"`,
+    /// 2 for `"mitchell"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<FilterRadius>")]
     pub radius: Option<f64>,
 }
 
-/// The form of a reconstruction filter, a product of the same function of x and of y. In a file the names are in snake
-/// case: `"blackman_harris"`.
+/// Shape of a separable reconstruction filter. In a file the names are in snake case: `"blackman_harris"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PixelFilterKind {
     /// Constant.
     Box,
-    /// Linear from the middle to the radius.
+    /// Linear from the center to the radius.
     Triangle,
-    /// The bell, with a standard deviation of a third of the radius.
+    /// Gaussian with a standard deviation of a third of the radius.
     Gaussian,
-    /// The cubic of Mitchell and Netravali with B = C = 1/3, with negative lobes.
+    /// Mitchell-Netravali cubic with B = C = 1/3, which has negative lobes.
     Mitchell,
-    /// The window of Blackman and Harris, of four terms.
+    /// Four-term Blackman-Harris window.
     BlackmanHarris,
 }
 
 impl PixelFilterKind {
-    /// The usual radius in pixels.
+    /// Returns the default radius in pixels.
     pub const fn radius(self) -> f64 {
         match self {
             PixelFilterKind::Box => 0.5,

@@ -1,4 +1,4 @@
-//! What a scene file says of shapes.
+//! Shapes of scene files.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -18,7 +18,7 @@ tagged! {
         "rectangle" => Rectangle(RectangleDescription),
         /// A disk.
         "disk" => Disk(DiskDescription),
-        /// An ellipsoid by its half axes.
+        /// An ellipsoid.
         "ellipsoid" => Ellipsoid(EllipsoidDescription),
         /// A sphere.
         "sphere" => Sphere(SphereDescription),
@@ -26,11 +26,11 @@ tagged! {
         "cylinder" => Cylinder(CylinderDescription),
         /// A triangle.
         "triangle" => Triangle(TriangleDescription),
-        /// Four triangles.
+        /// A tetrahedron.
         "tetrahedron" => Tetrahedron(TetrahedronDescription),
         /// An infinite plane.
         "plane" => Plane(PlaneDescription),
-        /// A mesh of triangles, from a file.
+        /// A triangle mesh from a file.
         "mesh" => Mesh(MeshDescription),
         /// A glTF file: meshes, materials and lights.
         "gltf" => Gltf(GltfDescription),
@@ -41,25 +41,25 @@ tagged! {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RectangleDescription {
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// The middle.
+    /// Center.
     #[schemars(with = "Point")]
     pub center: DVec3,
-    /// Lengths along the tangent and along the bitangent.
+    /// Lengths along the tangent and the bitangent.
     #[schemars(with = "Size")]
     pub size: [f64; 2],
-    /// Perpendicular to the rectangle; any length.
+    /// Normal; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Along the first edge; any length. If absent, x, or y where the normal is nearly along x.
+    /// Direction of the first edge; any length. If absent, x, or y if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
 }
 
 impl RectangleDescription {
-    /// A rectangle of this material, middle, size along tangent and bitangent, normal and tangent.
+    /// Creates a rectangle. `size` is along tangent and bitangent.
     pub fn new(
         material: impl Into<String>,
         center: impl Into<DVec3>,
@@ -81,25 +81,25 @@ impl RectangleDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiskDescription {
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// The middle.
+    /// Center.
     #[schemars(with = "Point")]
     pub center: DVec3,
-    /// Its radius.
+    /// Radius.
     #[schemars(with = "Length")]
     pub radius: f64,
-    /// Perpendicular to the disk; any length.
+    /// Normal; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the texture coordinate u; any length. If absent, x, or y where the normal is nearly along x.
+    /// Direction of the texture coordinate u; any length. If absent, x, or y if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
 }
 
 impl DiskDescription {
-    /// A disk of this material, middle, radius and normal.
+    /// Creates a disk.
     pub fn new(material: impl Into<String>, center: impl Into<DVec3>, radius: f64, normal: impl Into<DVec3>) -> Self {
         Self {
             material: material.into(),
@@ -111,28 +111,28 @@ impl DiskDescription {
     }
 }
 
-/// An ellipsoid: the image of the unit sphere under the linear map with the columns a, b, c.
+/// An ellipsoid: the unit sphere transformed by the matrix with the columns a, b and c.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EllipsoidDescription {
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// The middle.
+    /// Center.
     #[schemars(with = "Point")]
     pub center: DVec3,
-    /// First half axis.
+    /// First semi-axis.
     #[schemars(with = "Vector")]
     pub a: DVec3,
-    /// Second half axis.
+    /// Second semi-axis.
     #[schemars(with = "Vector")]
     pub b: DVec3,
-    /// Third half axis, the pole of the texture coordinates.
+    /// Third semi-axis, the pole of the texture coordinates.
     #[schemars(with = "Vector")]
     pub c: DVec3,
 }
 
 impl EllipsoidDescription {
-    /// An ellipsoid of this material, middle and half axes.
+    /// Creates an ellipsoid by its semi-axes.
     pub fn new(
         material: impl Into<String>,
         center: impl Into<DVec3>,
@@ -154,18 +154,18 @@ impl EllipsoidDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SphereDescription {
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// The middle.
+    /// Center.
     #[schemars(with = "Point")]
     pub center: DVec3,
-    /// Its radius.
+    /// Radius.
     #[schemars(with = "Length")]
     pub radius: f64,
 }
 
 impl SphereDescription {
-    /// A sphere of this material, middle and radius.
+    /// Creates a sphere.
     pub fn new(material: impl Into<String>, center: impl Into<DVec3>, radius: f64) -> Self {
         Self {
             material: material.into(),
@@ -179,25 +179,25 @@ impl SphereDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CylinderDescription {
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// The center of the cap where the texture coordinate v is 0.
+    /// Center of the cap where the texture coordinate v is 0.
     #[schemars(with = "Point")]
     pub start: DVec3,
-    /// The center of the cap where v is 1.
+    /// Center of the cap where v is 1.
     #[schemars(with = "Point")]
     pub end: DVec3,
-    /// Its radius.
+    /// Radius.
     #[schemars(with = "Length")]
     pub radius: f64,
-    /// Direction from the axis in which the texture coordinate u is 0; any length. If absent, x, or y where the axis is nearly along x.
+    /// Direction from the axis where the texture coordinate u is 0; any length. If absent, x, or y if the axis is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
 }
 
 impl CylinderDescription {
-    /// A cylinder of this material, centers of the caps, and radius.
+    /// Creates a cylinder between the centers of its caps.
     pub fn new(material: impl Into<String>, start: impl Into<DVec3>, end: impl Into<DVec3>, radius: f64) -> Self {
         Self {
             material: material.into(),
@@ -213,15 +213,15 @@ impl CylinderDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TriangleDescription {
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// Counter-clockwise as seen from outside.
+    /// Vertices, counter-clockwise as seen from outside.
     #[schemars(with = "Points3")]
     pub vertices: [DVec3; 3],
 }
 
 impl TriangleDescription {
-    /// A triangle of this material and vertices, counter-clockwise as seen from outside.
+    /// Creates a triangle. The vertices are counter-clockwise as seen from outside.
     pub fn new(material: impl Into<String>, vertices: [impl Into<DVec3>; 3]) -> Self {
         Self {
             material: material.into(),
@@ -234,15 +234,15 @@ impl TriangleDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TetrahedronDescription {
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// Its corners.
+    /// Vertices.
     #[schemars(with = "Points4")]
     pub vertices: [DVec3; 4],
 }
 
 impl TetrahedronDescription {
-    /// A tetrahedron of this material and corners.
+    /// Creates a tetrahedron.
     pub fn new(material: impl Into<String>, vertices: [impl Into<DVec3>; 4]) -> Self {
         Self {
             material: material.into(),
@@ -255,22 +255,22 @@ impl TetrahedronDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneDescription {
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// A point of it, the origin of its texture coordinates.
+    /// A point of the plane, the origin of the texture coordinates.
     #[schemars(with = "Point")]
     pub point: DVec3,
-    /// Perpendicular to the plane; any length.
+    /// Normal; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the texture coordinate u; any length. If absent, x, or y where the normal is nearly along x.
+    /// Direction of the texture coordinate u; any length. If absent, x, or y if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
 }
 
 impl PlaneDescription {
-    /// A plane of this material, through a point, with this normal and tangent.
+    /// Creates a plane.
     pub fn new(
         material: impl Into<String>,
         point: impl Into<DVec3>,

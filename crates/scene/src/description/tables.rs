@@ -1,5 +1,4 @@
-//! Reads descriptions from the tables of a scene file, as serde does, but that what is a table must be one there: serde takes a list of
-//! its values in their order too.
+//! Deserializer of descriptions from tables of a scene file. Unlike serde's, it accepts no list of values as a table.
 
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Unexpected, Visitor};
@@ -7,10 +6,10 @@ use serde::forward_to_deserialize_any;
 use toml::de::Error;
 use toml::{Table, Value};
 
-/// An error of serde with the path that leads to it.
+/// A serde error with the path of the value.
 pub(crate) type ReadError = serde_path_to_error::Error<Error>;
 
-/// What a table describes.
+/// Reads a description from a table.
 pub(crate) fn read<T: DeserializeOwned>(table: Table) -> Result<T, ReadError> {
     serde_path_to_error::deserialize(Read(Value::Table(table)))
 }
@@ -42,7 +41,7 @@ impl<'de> Deserializer<'de> for Read {
                 let pairs = table.into_iter().map(|(key, value)| (key, Read(value)));
                 visitor.visit_map(MapDeserializer::new(pairs))
             }
-            // Not by `Value::deserialize_any`, for which the compiler would generate the derived code of tables and lists again.
+            // `Value::deserialize_any` would generate the derived code of tables and lists again.
             Value::Boolean(value) => visitor.visit_bool(value),
             Value::Integer(value) => visitor.visit_i64(value),
             Value::Float(value) => visitor.visit_f64(value),

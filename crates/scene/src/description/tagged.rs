@@ -1,20 +1,19 @@
-//! Tables of a scene file that their key `type` tells apart.
+//! Tables of a scene file whose key `type` selects an enum variant.
 
 use toml::Table;
 
 use super::tables::ReadError;
 
-/// An enum whose variants a file tells apart by the key `type`.
+/// An enum whose variant is selected by the key `type`.
 pub(crate) trait Tagged: Sized {
-    /// The values that `type` may have.
+    /// The values of `type`.
     const TYPES: &'static [&'static str];
 
-    /// Reads the table without its `type`, which is `tag`; `None` if there is no such type.
+    /// Reads a table without its `type`, which is `tag`. Returns `None` for an unknown type.
     fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>>;
 }
 
-/// Defines a [`Tagged`] enum. It is not left to serde's `tag` alone because that forgets, while reading, in
-/// which key of the table an error is.
+/// Defines a [`Tagged`] enum. With serde's `tag` alone, errors lose the path of the key.
 macro_rules! tagged {
     ($(#[$doc:meta])* $name:ident {
         $($(#[doc = $variant_doc:literal])* $tag:literal => $variant:ident($body:ident),)+

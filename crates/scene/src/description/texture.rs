@@ -1,4 +1,4 @@
-//! What a scene file says of textures, and of the colours that may come from them.
+//! Textures of scene files, and colors and numbers that may come from textures.
 
 use std::fmt;
 
@@ -16,14 +16,14 @@ use crate::description::kinds::{
 };
 use crate::{Channel, Encoding, TextureFilter, Wrap};
 
-/// A colour of a material: `[r, g, b]` or `{ texture = "NAME" }`.
+/// A color of a material: `[r, g, b]` or `{ texture = "NAME" }`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 #[schemars(transform = tell_plain)]
 pub enum ColorDescription {
     /// Linear RGB.
     Plain(#[schemars(with = "Rgb")] DVec3),
-    /// From a texture.
+    /// A texture.
     Texture(TextureReference),
 }
 
@@ -41,13 +41,13 @@ impl From<[f64; 3]> for ColorDescription {
 }
 
 impl ColorDescription {
-    /// The colours of a texture, by its name.
+    /// Returns a reference to the texture of this name.
     pub fn texture(name: impl Into<String>) -> Self {
         Self::Texture(TextureReference { texture: name.into() })
     }
 }
 
-// By hand: serde's untagged enums lose the place and the reason of an error.
+// Not derived: serde's untagged enums lose the location and the reason of an error.
 impl<'de> Deserialize<'de> for ColorDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct ColorVisitor;
@@ -76,9 +76,9 @@ impl<'de> Deserialize<'de> for ColorDescription {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum ValueDescription {
-    /// The same everywhere.
+    /// A constant.
     Plain(#[schemars(with = "Share")] f64),
-    /// One of a texture's values.
+    /// One channel of a texture.
     Texture(ChannelReference),
 }
 
@@ -96,12 +96,12 @@ impl From<f64> for ValueDescription {
 }
 
 impl ValueDescription {
-    /// The red of a texture, by its name.
+    /// Returns a reference to the red channel of the texture of this name.
     pub fn texture(name: impl Into<String>) -> Self {
         Self::channel(name, Channel::default())
     }
 
-    /// One of the values of a texture, by its name.
+    /// Returns a reference to a channel of the texture of this name.
     pub fn channel(name: impl Into<String>, channel: Channel) -> Self {
         Self::Texture(ChannelReference {
             texture: name.into(),
@@ -110,7 +110,7 @@ impl ValueDescription {
     }
 }
 
-// By hand, as that of colours.
+// Not derived, like that of colors.
 impl<'de> Deserialize<'de> for ValueDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct ValueVisitor;
@@ -160,7 +160,7 @@ pub struct TextureReference {
 pub struct ChannelReference {
     /// Name of the texture.
     pub texture: String,
-    /// Which of its values.
+    /// Channel of the texture.
     #[serde(default)]
     pub channel: Channel,
 }
@@ -180,9 +180,9 @@ pub struct NormalMapDescription {
 tagged! {
     /// `[textures.NAME]`
     TextureDescription {
-        /// One colour.
+        /// One color.
         "constant" => Constant(ConstantDescription),
-        /// Squares of two colours.
+        /// Squares of two colors.
         "checker" => Checker(CheckerDescription),
         /// Lines.
         "grid" => Lines(LinesDescription),
@@ -191,7 +191,7 @@ tagged! {
     }
 }
 
-/// One colour.
+/// One color.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstantDescription {
@@ -201,38 +201,38 @@ pub struct ConstantDescription {
 }
 
 impl ConstantDescription {
-    /// This colour, in linear RGB.
+    /// Creates a texture of this color, in linear RGB.
     pub fn new(color: impl Into<DVec3>) -> Self {
         Self { color: color.into() }
     }
 }
 
-/// Squares of two colours, of side 1.
+/// A checkerboard of squares of side 1.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CheckerDescription {
-    /// Of the square from (0, 0) to (1, 1); linear RGB.
+    /// Color of the square from (0, 0) to (1, 1); linear RGB.
     #[schemars(with = "Rgb")]
     pub even: DVec3,
-    /// Of its neighbours.
+    /// Color of its neighbors.
     #[schemars(with = "Rgb")]
     pub odd: DVec3,
     /// Factors of u and v.
     #[serde(default = "ones")]
     #[schemars(with = "UvScale")]
     pub scale: [f64; 2],
-    /// Counter-clockwise, in degrees.
+    /// Rotation counter-clockwise, in degrees.
     #[serde(default)]
     #[schemars(with = "Degrees")]
     pub rotate: f64,
-    /// Added to u and v.
+    /// Offset of u and v.
     #[serde(default)]
     #[schemars(with = "UvOffset")]
     pub offset: [f64; 2],
 }
 
 impl CheckerDescription {
-    /// Squares of side 1 in these colours, in linear RGB.
+    /// Creates a checkerboard of squares of side 1. The colors are linear RGB.
     pub fn new(even: impl Into<DVec3>, odd: impl Into<DVec3>) -> Self {
         Self {
             even: even.into(),
@@ -244,35 +244,35 @@ impl CheckerDescription {
     }
 }
 
-/// Lines around whole numbers.
+/// Lines around integer coordinates.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinesDescription {
-    /// Between the lines; linear RGB.
+    /// Color between the lines; linear RGB.
     #[schemars(with = "Rgb")]
     pub cell: DVec3,
-    /// On the lines.
+    /// Color of the lines.
     #[schemars(with = "Rgb")]
     pub line: DVec3,
-    /// Of the lines; cells with their lines have width 1.
+    /// Width of the lines, relative to the cells with their lines.
     #[schemars(with = "LineWidth")]
     pub line_width: f64,
     /// Factors of u and v.
     #[serde(default = "ones")]
     #[schemars(with = "UvScale")]
     pub scale: [f64; 2],
-    /// Counter-clockwise, in degrees.
+    /// Rotation counter-clockwise, in degrees.
     #[serde(default)]
     #[schemars(with = "Degrees")]
     pub rotate: f64,
-    /// Added to u and v.
+    /// Offset of u and v.
     #[serde(default)]
     #[schemars(with = "UvOffset")]
     pub offset: [f64; 2],
 }
 
 impl LinesDescription {
-    /// Lines of this width around cells, in these colours, in linear RGB.
+    /// Creates lines around cells. The colors are linear RGB.
     pub fn new(cell: impl Into<DVec3>, line: impl Into<DVec3>, line_width: f64) -> Self {
         Self {
             cell: cell.into(),
@@ -289,18 +289,18 @@ impl LinesDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageTextureDescription {
-    /// Its path, relative to the scene file.
+    /// Path, relative to the scene file.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// What its values mean; sRGB if absent, but EXR and HDR files are linear.
+    /// Encoding of the values. If absent, sRGB, but linear for EXR and HDR files.
     pub encoding: Option<Encoding>,
-    /// Beyond the edges.
+    /// Addressing beyond the edges.
     #[serde(default)]
     pub wrap: WrapDescription,
-    /// How its colours are found.
+    /// Filter.
     #[serde(default)]
     pub filter: TextureFilter,
-    /// The largest ratio of a footprint's axes.
+    /// Maximum anisotropy: ratio of the axes of a footprint.
     #[serde(default = "sixteen")]
     #[schemars(with = "Anisotropy")]
     pub max_anisotropy: f64,
@@ -308,11 +308,11 @@ pub struct ImageTextureDescription {
     #[serde(default = "ones")]
     #[schemars(with = "UvScale")]
     pub scale: [f64; 2],
-    /// Counter-clockwise, in degrees.
+    /// Rotation counter-clockwise, in degrees.
     #[serde(default)]
     #[schemars(with = "Degrees")]
     pub rotate: f64,
-    /// Added to u and v.
+    /// Offset of u and v.
     #[serde(default)]
     #[schemars(with = "UvOffset")]
     pub offset: [f64; 2],
@@ -320,14 +320,14 @@ pub struct ImageTextureDescription {
     #[serde(default = "four_ones")]
     #[schemars(with = "Factors")]
     pub factor: [f64; 4],
-    /// Which set of a mesh's texture coordinates it lies by.
+    /// Index of the set of texture coordinates of the mesh.
     #[serde(default)]
     #[schemars(with = "UvSet")]
     pub uv_set: u32,
 }
 
 impl ImageTextureDescription {
-    /// The image of this name, repeated, and filtered by the elliptical weighted average.
+    /// Creates a repeated texture with the default filter, the elliptical weighted average.
     pub fn new(file: impl Into<String>) -> Self {
         Self {
             file: file.into(),
@@ -344,13 +344,13 @@ impl ImageTextureDescription {
     }
 }
 
-/// An image beyond its edges: `"repeat"`, or `["repeat", "clamp"]` along u and along v.
+/// Texture addressing beyond the edges: `"repeat"`, or `["repeat", "clamp"]` along u and v.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum WrapDescription {
-    /// In both directions.
+    /// The same along u and v.
     Both(Wrap),
-    /// Along u, and along v.
+    /// Along u and along v.
     Each([Wrap; 2]),
 }
 
@@ -367,7 +367,7 @@ impl From<[Wrap; 2]> for WrapDescription {
 }
 
 impl WrapDescription {
-    /// Along u, and along v.
+    /// Returns the addressing along u and along v.
     pub fn each(self) -> [Wrap; 2] {
         match self {
             Self::Both(wrap) => [wrap; 2],
@@ -376,7 +376,7 @@ impl WrapDescription {
     }
 }
 
-// By hand, as that of colours.
+// Not derived, like that of colors.
 impl<'de> Deserialize<'de> for WrapDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct WrapVisitor;

@@ -1,4 +1,4 @@
-//! Accessors (specification, section 3.6.2): typed views of bytes, as numbers of 32 bits.
+//! glTF accessors (specification, section 3.6.2): typed buffer data as `f32` and `u32`.
 
 use gltf_json::accessor::sparse::Sparse;
 use gltf_json::accessor::{Accessor, ComponentType, Type};
@@ -10,14 +10,14 @@ use super::error::{Fault, GltfError};
 use super::extension;
 use super::json::missing;
 
-/// The most elements of an accessor that has no bytes of its own.
+/// Maximum element count of an accessor without a buffer view.
 const MOST_ZEROS: u64 = 1 << 22;
-/// The most bytes that they take in memory.
+/// Maximum decoded size of such an accessor, in bytes.
 const LARGEST_ZEROS: u64 = 64 << 20;
-/// What reading an accessor takes besides its bytes, in bytes: there may be many of few elements.
+/// Overhead per read in bytes, which limits reads of small accessors.
 const BESIDE: u64 = 64;
 
-/// How the elements of an accessor lie in bytes.
+/// Element type and memory layout of an accessor.
 #[derive(Clone, Copy)]
 struct Layout {
     component: ComponentType,
@@ -48,7 +48,7 @@ impl Layout {
         })
     }
 
-    /// From one column to the next: columns of matrices begin at multiples of 4 bytes (section 3.6.2.4).
+    /// Column stride in bytes; columns are aligned to 4 bytes (section 3.6.2.4).
     fn column(self) -> usize {
         let bytes = self.rows * self.component.size();
         if self.columns == 1 {
@@ -58,12 +58,12 @@ impl Layout {
         }
     }
 
-    /// From one element to the next, where they are packed.
+    /// Packed element stride in bytes.
     fn size(self) -> usize {
         self.column() * self.columns
     }
 
-    /// The bytes of an element without what follows its last number.
+    /// Element size without trailing padding, in bytes.
     fn used(self) -> usize {
         self.column() * (self.columns - 1) + self.rows * self.component.size()
     }
@@ -73,7 +73,6 @@ impl Layout {
     }
 }
 
-/// Elements of an accessor, all of which are in the bytes.
 struct Elements<'a> {
     bytes: &'a [u8],
     count: usize,
@@ -82,7 +81,7 @@ struct Elements<'a> {
 }
 
 impl Elements<'_> {
-    /// Finds `count` elements from byte `offset` on. `place` is what the bytes are of.
+    /// Checks that `count` elements are within `bytes`, which errors call `place`.
     fn in_bytes<'a>(
         key: &str,
         (bytes, place): (&'a [u8], &str),
@@ -118,7 +117,6 @@ impl Elements<'_> {
         })
     }
 
-    /// The elements as numbers. `N` is how many each has.
     fn vectors<const N: usize>(&self) -> Vec<[f32; N]> {
         let is_packed = self.stride == self.layout.size() && self.stride == 4 * N;
         match (self.layout.component, self.layout.is_normalized) {
@@ -134,7 +132,7 @@ impl Elements<'_> {
                 vectors
             }
             (ComponentType::F32, _) => self.gather(f32::from_le_bytes),
-            // Section 3.6.2.2 has these formulas.
+            // Normalized integers (section 3.6.2.2).
             (ComponentType::I8, true) => self.gather(|[x]: [u8; 1]| (f32::from(x as i8) / 127.0).max(-1.0)),
             (ComponentType::U8, true) => self.gather(|[x]: [u8; 1]| f32::from(x) / 255.0),
             (ComponentType::I16, true) => self.gather(|x| (f32::from(i16::from_le_bytes(x)) / 32767.0).max(-1.0)),
@@ -143,12 +141,11 @@ impl Elements<'_> {
             (ComponentType::U8, false) => self.gather(|[x]: [u8; 1]| f32::from(x)),
             (ComponentType::I16, false) => self.gather(|x| f32::from(i16::from_le_bytes(x))),
             (ComponentType::U16, false) => self.gather(|x| f32::from(u16::from_le_bytes(x))),
-            // The specification does not let these be normalized.
+            // The specification does not allow normalized 32-bit integers.
             (ComponentType::U32, _) => self.gather(|x| u32::from_le_bytes(x) as f32),
         }
     }
 
-    /// The elements, each component of `S` bytes by a function.
     fn gather<const N: usize, const S: usize>(&self, number: impl Fn([u8; S]) -> f32) -> Vec<[f32; N]> {
         let column = self.layout.column();
         let offsets: [usize; N] = std::array::from_fn(|k| k / self.layout.rows * column + k % self.layout.rows * S);
@@ -165,7 +162,6 @@ impl Elements<'_> {
             .collect()
     }
 
-    /// The elements as whole numbers, which they are by their type.
     fn whole(&self) -> Vec<u32> {
         let (bytes, stride) = (self.bytes, self.stride);
         let size = self.layout.component.size();
@@ -179,7 +175,7 @@ impl Elements<'_> {
 }
 
 impl Document {
-    /// How many numbers an element of an accessor has: 3 for VEC3, 16 for MAT4.
+    /// Returns the components per element: 3 for VEC3, 16 for MAT4.
     pub fn components(&self, accessor: usize) -> Result<usize, GltfError> {
         let layout = self
             .accessor(accessor)
@@ -187,13 +183,13 @@ impl Document {
         layout.map(Layout::count).map_err(|fault| fault.of(&self.path))
     }
 
-    /// The elements of an accessor of any type with `N` numbers, matrices column by column. Normalized ones are from -1 or 0
-    /// to 1; floats are what they are in the file, be they NaN or infinite.
+    /// Returns the elements of an accessor with `N` components, matrices column-major. Normalized integers are from -1
+    /// or 0 to 1; floats may be NaN or infinite.
     pub fn vectors<const N: usize>(&self, accessor: usize) -> Result<Vec<[f32; N]>, GltfError> {
         self.floats(accessor).map_err(|fault| fault.of(&self.path))
     }
 
-    /// The elements of an accessor as indices. None of them is the largest number of its type, which would restart a strip.
+    /// Returns the elements as indices. The primitive restart value is an error.
     pub fn indices(&self, accessor: usize) -> Result<Vec<u32>, GltfError> {
         self.whole(accessor).map_err(|fault| fault.of(&self.path))
     }
@@ -262,14 +258,14 @@ impl Document {
         }
     }
 
-    /// Refuses an accessor where all that were read are too much for the file. Each element takes so many bytes in memory.
+    /// Charges elements of `size` bytes to the budget.
     fn may_read(&self, key: &str, accessor: &Accessor, size: usize) -> Result<(), Fault> {
         let bytes = accessor.count.0.saturating_mul(size as u64).saturating_add(BESIDE);
         let room = self.budget.take(Thing::Read, bytes);
         room.map_err(|rule| Fault::key(format!("{key}.count"), rule))
     }
 
-    /// The elements of an accessor as its view has them; none where they are zeros, so many as can be.
+    /// Returns the elements of the buffer view; `None` for zeros.
     fn elements(&self, key: &str, accessor: &Accessor, layout: Layout) -> Result<Option<Elements<'_>>, Fault> {
         let count = accessor.count.0;
         let Some(view) = accessor.buffer_view else {
@@ -294,7 +290,7 @@ impl Document {
         Elements::in_bytes(key, bytes, offset, count, stride.map(|stride| stride.0), layout).map(Some)
     }
 
-    /// The places and the elements that stand in for others.
+    /// Returns the indices and values of the sparse elements.
     fn replaced(
         &self,
         key: &str,

@@ -1,4 +1,4 @@
-//! Animations: nodes at a time. Section 3.11 and appendix C.
+//! glTF animations (section 3.11, appendix C).
 
 use std::collections::HashSet;
 
@@ -10,15 +10,14 @@ use super::document::Document;
 use super::error::GltfError;
 use super::node::{Pose, quaternion};
 
-/// The most weights of morph targets that an animation gives to nodes.
+/// Maximum number of morph weights of all animated nodes.
 const MOST_WEIGHTS: usize = 1 << 24;
 
-/// Maximum number of animations that a warning names.
+/// Maximum number of animations named in a warning.
 const MOST_NAMED: usize = 5;
 
 impl Document {
-    /// Returns those of some animations that play together: each that drives no property which an earlier one drives. The others are
-    /// named in `notes`.
+    /// Returns the animations whose properties no earlier one drives. The others are named in `notes`.
     pub(super) fn compatible(&self, animations: Vec<usize>, notes: &mut Vec<String>) -> Vec<usize> {
         let mut driven = HashSet::new();
         let (mut playing, mut others) = (Vec::new(), Vec::new());
@@ -59,8 +58,7 @@ impl Document {
         playing
     }
 
-    /// Puts nodes where an animation has them at a time, in seconds. Before its first key and after its last it stands.
-    /// What a user should know is put into `notes`.
+    /// Applies an animation at `time` in seconds, clamped to its first and last key.
     pub(super) fn animate(
         &self,
         poses: &mut [Pose],
@@ -151,7 +149,7 @@ impl Document {
 }
 
 impl Pose {
-    /// An animated node has no matrix; where a file breaks that rule the matrix is taken apart.
+    /// Decomposes the matrix, which the specification forbids on animated nodes.
     fn take_apart(&mut self) {
         if let Some(matrix) = self.matrix.take() {
             (self.scale, self.rotation, self.translation) = matrix.to_scale_rotation_translation();
@@ -159,14 +157,14 @@ impl Pose {
     }
 }
 
-/// A time between two keys.
+/// The keys around a time.
 struct Between {
     interpolation: Interpolation,
-    /// The key before it, and the one behind it.
+    /// Key indices.
     keys: [usize; 2],
-    /// How far it is from the first to the second, 0 to 1.
+    /// Interpolation parameter, 0 to 1.
     share: f64,
-    /// The seconds between the two.
+    /// Key interval in seconds.
     seconds: f64,
 }
 
@@ -193,15 +191,13 @@ impl Between {
         }
     }
 
-    /// How many values there are for so many keys.
     fn values(&self, keys: usize) -> usize {
         match self.interpolation {
-            Interpolation::CubicSpline => 3 * keys, // with tangents before and behind each
+            Interpolation::CubicSpline => 3 * keys, // in-tangent, value and out-tangent
             _ => keys,
         }
     }
 
-    /// A value of several numbers.
     fn value<const N: usize>(&self, values: &[[f32; N]], keys: usize) -> Option<[f64; N]> {
         if values.len() != self.values(keys) {
             return None;
@@ -223,10 +219,10 @@ impl Between {
             return None;
         }
         let [a, b] = self.keys.map(|key| quaternion(values[key]));
-        Some(a.slerp(b, self.share)) // by the shorter way
+        Some(a.slerp(b, self.share)) // along the shorter arc
     }
 
-    /// A list of numbers at each key.
+    /// Interpolates lists of weights.
     fn list(&self, values: &[[f32; 1]], keys: usize) -> Option<Vec<f32>> {
         let each = self.values(keys);
         let count = values.len() / each;
@@ -237,7 +233,7 @@ impl Between {
         Some(found.collect())
     }
 
-    /// Between the numbers at the keys; of a spline those are the second of three.
+    /// Interpolates a scalar. A cubic spline has three output values per key.
     fn number(&self, at: impl Fn(usize) -> f64) -> f64 {
         let ([a, b], t) = (self.keys, self.share);
         match self.interpolation {
@@ -245,7 +241,7 @@ impl Between {
             Interpolation::Linear if a == b => at(a),
             Interpolation::Linear => at(a) * (1.0 - t) + at(b) * t,
             Interpolation::CubicSpline => {
-                // Hermite's: appendix C.5 of the specification.
+                // Cubic Hermite spline (appendix C.5).
                 let (t2, t3) = (t * t, t * t * t);
                 let (before, behind) = (at(3 * a + 2) * self.seconds, at(3 * b) * self.seconds);
                 (2.0 * t3 - 3.0 * t2 + 1.0) * at(3 * a + 1)

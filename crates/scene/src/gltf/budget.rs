@@ -1,23 +1,22 @@
-//! How much a file may ask for, by its bytes: accessors can name the same bytes any number of times, or none, and so can meshes,
-//! skins and channels. What no file needs that is not made to be much is refused, before it takes time or memory.
+//! Resource limits of a glTF file, relative to its size. Small files could request unbounded time or memory by
+//! referring to the same bytes repeatedly.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What there is a limit on.
+/// A limited resource.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Thing {
-    /// Bytes of accessors as they are read, as often as they are.
+    /// Bytes of accessor reads.
     Read,
-    /// Triangles of all meshes, those of a mesh with several skins or weights as often.
+    /// Triangles of all meshes, per combination of skin and weights.
     Triangles,
     /// Instances of meshes.
     Instances,
-    /// Bytes of views that are decompressed.
+    /// Bytes of decompressed buffer views.
     Decompressed,
 }
 
 impl Thing {
-    /// What messages call it.
     fn name(self) -> &'static str {
         match self {
             Thing::Read => "bytes of accessors, counted as often as they are read",
@@ -27,24 +26,24 @@ impl Thing {
         }
     }
 
-    /// How many any file may have; how many more for so many of its bytes; and the most of any file.
+    /// Returns the base allowance, the additional fraction of the file size, and the maximum.
     fn rates(self) -> (u64, (u64, u64), u64) {
         match self {
             Thing::Read => (1 << 30, (16, 1), u64::MAX),
-            // A triangle has three bytes of indices at least, or is in a mesh that several share.
+            // A triangle has at least three bytes of indices, except in a shared mesh.
             Thing::Triangles => (1 << 22, (1, 3), 1 << 28),
-            // Each takes more than a kilobyte in a scene.
+            // An instance takes more than 1 KiB in a scene.
             Thing::Instances => (1 << 16, (1, 4), super::MOST_INSTANCES as u64),
-            // Of what real meshes are it is less than 20; of zeros it could be 1,000.
+            // Real meshes compress by less than 20:1, zeros by up to 1000:1.
             Thing::Decompressed => (256 << 20, (64, 1), 4 << 30),
         }
     }
 }
 
-/// What a file has asked for by now.
+/// Resources used by a file.
 #[derive(Debug)]
 pub(super) struct Budget {
-    /// The bytes of its JSON, and of its buffers that are used.
+    /// Size of the JSON and of the referenced buffers.
     bytes: u64,
     taken: [AtomicU64; 4],
 }
@@ -57,17 +56,17 @@ impl Budget {
         }
     }
 
-    /// The most that the file may have.
+    /// Returns the limit.
     pub fn most(&self, thing: Thing) -> u64 {
         let (any, (more, of), most) = thing.rates();
         any.saturating_add(self.bytes.saturating_mul(more) / of).min(most)
     }
 
-    /// Takes so many. The error is the rule, where there would be more than the file may have.
+    /// Charges `count`; the error is the rule.
     pub fn take(&self, thing: Thing, count: u64) -> Result<(), String> {
         let most = self.most(thing);
         let taken = &self.taken[thing as usize];
-        // Where that is refused nothing is taken, so that many refusals do not go around to 0.
+        // Rejected requests are not counted, so they cannot overflow the counter.
         let taking = taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |taken| {
             taken.checked_add(count).filter(|all| *all <= most)
         });
@@ -99,7 +98,6 @@ mod tests {
         budget.take(Thing::Triangles, 1).unwrap();
         budget.take(Thing::Triangles, 0).unwrap();
         assert!(budget.take(Thing::Triangles, 1).is_err());
-        // Others are counted by themselves.
         budget.take(Thing::Instances, 65_536 + 75).unwrap();
         assert!(budget.take(Thing::Instances, 1).is_err());
     }
@@ -108,7 +106,7 @@ mod tests {
     fn large_files_may_have_more_up_to_an_end() {
         assert_eq!(Budget::of(u64::MAX).most(Thing::Read), u64::MAX);
         assert_eq!(Budget::of(u64::MAX).most(Thing::Instances), 1 << 20);
-        // Ten million triangles, each with three indices of 32 bits.
+        // Ten million triangles with three 32-bit indices each.
         assert!(Budget::of(120 << 20).most(Thing::Triangles) >= 10_000_000);
     }
 }

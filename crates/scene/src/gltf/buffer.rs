@@ -1,4 +1,4 @@
-//! Buffers and views of them (specification, section 3.6): bytes of the container, of data URIs and of other files.
+//! glTF buffers and buffer views (specification, section 3.6).
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -13,34 +13,33 @@ use super::json::missing;
 use super::meshopt::{self, Compressed};
 use super::uri::{self, Folder};
 
-/// The most bytes of all buffers together, and of a file.
+/// Maximum size of a file, and of all buffers together.
 pub(super) const MOST_BYTES: u64 = 8 << 30;
 
-/// Where the bytes of a buffer are.
+/// Storage of a buffer.
 enum Bytes {
-    /// Nobody asks for them.
+    /// Unreferenced.
     Unused,
-    /// In the container.
+    /// In the GLB file.
     Chunk(Range<usize>),
-    /// In memory, from a file or a data URI.
+    /// From a file or data URI.
     Read(Vec<u8>),
 }
 
-/// The bytes of all buffers that are used.
+/// The referenced buffers of a file.
 pub(super) struct Buffers {
-    /// The container, or nothing.
     file: Vec<u8>,
     list: Vec<Bytes>,
-    /// For each view how it is compressed, if it is.
+    /// Compression of each buffer view.
     compressed: Vec<Option<Compressed>>,
-    /// What compressed views are, once somebody has asked.
+    /// Decompressed buffer views, filled on first use.
     decoded: Vec<OnceLock<Vec<u8>>>,
-    /// How many bytes all buffers that are used have.
     total: u64,
 }
 
 impl Buffers {
-    /// Reads what views refer to, and takes data URIs out of `root`. `file` is the container, `chunk` its binary part.
+    /// Reads the referenced buffers, and removes data URIs from `root`. `chunk` is the binary chunk of the GLB file
+    /// `file`.
     pub fn read(
         root: &mut Root,
         file: Vec<u8>,
@@ -55,7 +54,7 @@ impl Buffers {
                 Some(all) => meshopt::compressed(&format!("bufferViews[{i}]"), &all.others, view.byte_length.0)?,
                 None => None,
             };
-            // The buffer of a compressed view itself is for those who cannot decode it.
+            // The core `buffer` is a fallback for loaders without the extension.
             let buffer = how.map_or(view.buffer.value(), |how| how.buffer);
             match used.get_mut(buffer) {
                 Some(used) => *used = true,
@@ -112,12 +111,12 @@ impl Buffers {
         })
     }
 
-    /// How many bytes all buffers that are used have.
+    /// Returns the size of the referenced buffers in bytes.
     pub fn total(&self) -> u64 {
         self.total
     }
 
-    /// Refuses compressed views that are too large once they are decoded.
+    /// Charges the decompressed views to `budget`.
     pub fn check(&self, budget: &Budget) -> Result<(), Fault> {
         for (i, how) in self.compressed.iter().enumerate() {
             let size = how.map_or(0, |how| how.size());
@@ -127,7 +126,7 @@ impl Buffers {
         Ok(())
     }
 
-    /// The bytes of a buffer, as many as it says that it has.
+    /// Returns the first `byteLength` bytes of a buffer.
     fn buffer(&self, root: &Root, index: usize) -> Result<&[u8], Fault> {
         let key = || format!("buffers[{index}]");
         let (Some(bytes), Some(buffer)) = (self.list.get(index), root.buffers.get(index)) else {
@@ -144,7 +143,7 @@ impl Buffers {
             .ok_or_else(|| Fault::key(key(), "has no data"))
     }
 
-    /// The bytes of a view.
+    /// Returns a buffer view, decompressed.
     pub fn view(&self, root: &Root, index: usize) -> Result<&[u8], Fault> {
         let view =
             (root.buffer_views.get(index)).ok_or_else(|| missing("bufferViews", index, root.buffer_views.len()))?;
@@ -167,7 +166,7 @@ impl Buffers {
         )
     }
 
-    /// A part of a buffer that something at `key` asks for.
+    /// Returns a range of a buffer. `key` is for errors.
     fn part(&self, root: &Root, key: &str, buffer: usize, offset: u64, length: u64) -> Result<&[u8], Fault> {
         let bytes = self.buffer(root, buffer)?;
         let end = offset.checked_add(length).filter(|end| *end <= bytes.len() as u64);

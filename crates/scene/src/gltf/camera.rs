@@ -1,4 +1,4 @@
-//! Cameras. Section 3.10: they look along their -z, with +y upwards.
+//! glTF cameras (section 3.10), which look along their -Z with +Y up.
 
 use glam::{DAffine3, DVec3};
 
@@ -9,7 +9,7 @@ use super::{ImportedCamera, UPRIGHT};
 use crate::{OrthographicDescription, PerspectiveDescription};
 
 impl Document {
-    /// The camera of a node, if it has one. What it looks at is as far away as the middle of all that is there.
+    /// Returns the camera of a node. Its target is at the depth of the centre of the scene bounds.
     pub(super) fn camera(
         &self,
         node: usize,

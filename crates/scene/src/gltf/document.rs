@@ -1,4 +1,4 @@
-//! A glTF file, opened and checked: its JSON, and the bytes of its buffers and images.
+//! A validated glTF document: JSON, buffers and encoded images.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -15,35 +15,34 @@ use super::json::missing;
 use super::uri::{self, Folder, Unfound};
 use super::{extension, glb, json};
 
-/// The largest file of an image, in bytes.
+/// Maximum size of an image file in bytes.
 const LARGEST_IMAGE: u64 = 512 << 20;
-/// Extensions of textures with images of further formats, in the order of three.js if a texture has several.
+/// Texture extensions with further image formats, in three.js's order of precedence.
 const SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
-/// The most bytes of all images together, each as often as it is asked for.
+/// Maximum size of all image reads in bytes.
 const MOST_OF_IMAGES: u64 = 4 << 30;
 
-/// A file that is open. Every index in its JSON is there and every word is known, but for what the crate keeps raw; which node
-/// is whose child, and what numbers mean, nobody has looked at, but all are finite. What accessors have may be anything.
+/// An open file. JSON indices (except in raw extension data) and enumerations are valid, and numbers finite. The node
+/// hierarchy and values are not validated.
 pub(super) struct Document {
-    /// What the file says. Data URIs of buffers are taken out.
+    /// JSON without data URIs of buffers.
     pub json: Root,
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// What a user should know.
+    /// Warnings for the user.
     pub notes: Vec<String>,
-    /// What it has asked for by now.
     pub budget: Budget,
     folder: Folder,
     buffers: Buffers,
-    /// How many bytes of images were asked for.
+    /// Size of all image reads in bytes.
     given: AtomicU64,
 }
 
-/// Why an image has no bytes.
+/// The reason why an image has no bytes.
 enum ImageFault {
-    /// It is missing or cannot be read.
+    /// Missing or unreadable.
     Missing(String),
-    /// It breaks a rule.
+    /// Violates a rule.
     Refused(Fault),
 }
 
@@ -54,13 +53,11 @@ impl From<Fault> for ImageFault {
 }
 
 impl Document {
-    /// Opens a file, whose other files are beside it and inside `root`. Which files those are is put into `files`, even if
-    /// the file breaks a rule.
+    /// Opens a file. Other files must be inside `root`. All paths are added to `files`, even on errors.
     ///
     /// # Errors
     ///
-    /// Files that cannot be read or are no glTF 2.0, extensions that are required and not known, and buffers whose bytes are
-    /// not there.
+    /// Unreadable or invalid files, unsupported required extensions, and missing or truncated buffers.
     pub fn open(path: &Path, root: &Path, files: &mut BTreeSet<PathBuf>) -> Result<Document, GltfError> {
         files.insert(path.to_owned());
         let file = uri::read(path, MOST_BYTES).map_err(|error| GltfError::Read {
@@ -118,12 +115,12 @@ impl Document {
         })
     }
 
-    /// An error at a value of the file.
+    /// Returns an error about a value of the JSON.
     pub fn fault(&self, key: impl Into<String>, message: impl Into<String>) -> GltfError {
         Fault::key(key, message).of(&self.path)
     }
 
-    /// The bytes of a view of a buffer, decompressed.
+    /// Returns a buffer view, decompressed.
     #[cfg(test)]
     pub fn view(&self, view: usize) -> Result<&[u8], GltfError> {
         self.bytes_of(view).map_err(|fault| fault.of(&self.path))
@@ -133,7 +130,7 @@ impl Document {
         self.buffers.view(&self.json, view)
     }
 
-    /// Returns the image of a texture: that of the first of [`SOURCES`] that it has, or else that of the core specification.
+    /// Returns the image of a texture: that of the first of [`SOURCES`], or the core source.
     pub fn image_of(&self, texture: usize) -> Result<usize, GltfError> {
         self.source_of(texture).map_err(|fault| fault.of(&self.path))
     }
@@ -154,7 +151,7 @@ impl Document {
                 Fault::key(format!("{key}.extensions.{name}.source"), rule)
             });
         }
-        // What stands for none in the crate is an index that no list reaches.
+        // In the crate, a missing source is an index out of range.
         match self.json.get(texture.source) {
             Some(_) => Ok(texture.source.value()),
             None => Err(match others.and_then(extension::unknown) {
@@ -164,11 +161,11 @@ impl Document {
         }
     }
 
-    /// Returns the bytes of an image, encoded as in the file, or why they are missing.
+    /// Returns the encoded bytes of an image, or why it is missing.
     ///
     /// # Errors
     ///
-    /// Files outside of the asset root, and images that are too large.
+    /// Files outside of the asset root, and too large images.
     pub fn image_bytes(&self, image: usize) -> Result<Result<Arc<[u8]>, String>, GltfError> {
         match self.encoded(image) {
             Ok(bytes) => Ok(Ok(bytes)),
@@ -219,7 +216,7 @@ impl Document {
         Ok(bytes.into())
     }
 
-    /// Refuses an image of so many bytes where it is too large, or all are: a small file may name the same bytes often.
+    /// Limits the size of an image and of all image reads. A small file may repeat references.
     fn has_room(&self, index: usize, bytes: u64) -> Result<(), Fault> {
         let given = self.given.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
         let fault = |rule: String| Err(Fault::key(format!("images[{index}]"), rule));

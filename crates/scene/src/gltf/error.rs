@@ -1,69 +1,69 @@
-//! What can be wrong with a glTF file, and where.
+//! Errors of glTF files, with their locations.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::ErrorPlace;
 
-/// Why there is no model. Every message begins with the place: `a.gltf: accessors[3]: 9 elements of 12 bytes, 12 apart, from byte
-/// 0 on; bufferViews[1] has 96 bytes`.
+/// An error of a glTF file. Messages begin with its location: `a.gltf: accessors[3]: 9 elements of 12 bytes, 12 apart,
+/// from byte 0 on; bufferViews[1] has 96 bytes`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GltfError {
-    /// A file cannot be read.
-    // The field is not named `source`: its text is in the message, and must not be printed twice.
+    /// Unreadable file.
+    // Not named `source`: error chains would print its text twice.
     #[error("{}: cannot be read: {error}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The I/O error.
         error: io::Error,
     },
-    /// The file's JSON is none.
+    /// Malformed JSON.
     #[error("{}:{line}:{column}: {message}", path.display())]
     Syntax {
         /// The file.
         path: PathBuf,
-        /// Counted from 1, in the JSON.
+        /// Line of the JSON, from 1.
         line: usize,
-        /// In bytes, counted from 1.
+        /// Column in bytes, from 1.
         column: usize,
-        /// What the parser says.
+        /// The message of the parser.
         message: String,
     },
-    /// A byte of a binary file breaks a rule.
+    /// Invalid byte of a binary file.
     #[error("{}: byte {offset}: {message}", path.display())]
     Byte {
         /// The file.
         path: PathBuf,
-        /// Counted from 0.
+        /// Offset from 0.
         offset: u64,
         /// The value and the rule.
         message: String,
     },
-    /// A value of the JSON, or what it stands for, breaks a rule.
+    /// Invalid value of the JSON, or invalid data of it.
     #[error("{}: {key}: {message}", path.display())]
     Key {
         /// The file.
         path: PathBuf,
-        /// The way to the value: `accessors[3].count`.
+        /// Key path: `accessors[3].count`.
         key: String,
         /// The value and the rule.
         message: String,
     },
-    /// The file does not have the chosen scene, animation or variant.
+    /// Missing scene, animation or variant.
     #[error("{}: {key}: {message}", path.display())]
     Choice {
         /// The file.
         path: PathBuf,
         /// The list: `scenes`, `animations` or `variants`.
         key: &'static str,
-        /// The name of the option: `gltf_scene`, `animation`, `variant` or `time`.
+        /// The option: `gltf_scene`, `animation`, `variant` or `time`.
         option: &'static str,
-        /// The choice, and what the file has.
+        /// The selection and the available entries.
         message: String,
     },
-    /// The file as a whole breaks a rule.
+    /// Invalid file.
     #[error("{}: {message}", path.display())]
     File {
         /// The file.
@@ -74,7 +74,6 @@ pub enum GltfError {
 }
 
 impl GltfError {
-    /// Where it is.
     pub(crate) fn place(&self) -> ErrorPlace {
         let mut place = ErrorPlace::default();
         let path = match self {
@@ -96,7 +95,6 @@ impl GltfError {
         place
     }
 
-    /// Returns the error with another path to the same file.
     pub(crate) fn at(mut self, other: &Path) -> GltfError {
         match &mut self {
             GltfError::Read { path, .. }
@@ -110,27 +108,26 @@ impl GltfError {
     }
 }
 
-/// An error before it knows its file.
+/// An error without its file.
 #[derive(Debug)]
 pub(super) struct Fault {
     pub place: Place,
     pub message: String,
 }
 
-/// A place in a file.
+/// A location in a file.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Place {
-    /// All of it.
     File,
-    /// A line and a column of the JSON, counted from 1.
+    /// In the JSON, from 1.
     Line(usize, usize),
-    /// A byte, counted from 0.
+    /// Byte offset.
     Byte(u64),
-    /// A value of the JSON.
+    /// Key path in the JSON.
     Key(String),
 }
 
-/// The longest message and the longest key, in characters: what a file says may be in them.
+/// Maximum length of messages and keys in characters.
 const LONGEST: usize = 1000;
 
 impl Fault {
@@ -141,12 +138,10 @@ impl Fault {
         }
     }
 
-    /// A fault of a value of the JSON.
     pub fn key(key: impl Into<String>, message: impl Into<String>) -> Fault {
         Fault::new(Place::Key(cut(key.into())), message)
     }
 
-    /// A fault of the whole file.
     pub fn file(message: impl Into<String>) -> Fault {
         Fault::new(Place::File, message)
     }
@@ -167,7 +162,7 @@ impl Fault {
     }
 }
 
-/// A text without its middle where it is long.
+/// Elides the middle of a long text.
 fn cut(text: String) -> String {
     let count = text.chars().count();
     if count <= LONGEST {
@@ -178,7 +173,7 @@ fn cut(text: String) -> String {
     format!("{start}...{end}")
 }
 
-/// What the JSON library says of a value of the wrong type, in words of the file.
+/// Rewrites a `serde_json` type error in terms of JSON.
 pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
     let message = message.to_string();
     if let Some((name, _)) = message
@@ -194,7 +189,7 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
     else {
         return message.replace('`', "\"");
     };
-    // What the file has may have these words too.
+    // The quoted value may contain the separator.
     let Some((found, wanted)) = rest.rsplit_once(", expected ") else {
         return rest.replace('`', "\"");
     };
@@ -204,7 +199,7 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
         "null" | "unit value" => "null".to_owned(),
         count if start == "invalid length " => format!("a list of {count}"),
         _ => match (found.strip_prefix("string "), found.split_once('`')) {
-            // It is quoted as it should be.
+            // Already quoted.
             (Some(text), _) if text.chars().count() <= 60 => text.to_owned(),
             (Some(text), _) => shown(text.trim_matches('"')),
             (None, Some((_, number))) => number.trim_end_matches('`').to_owned(),
@@ -229,7 +224,7 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
     format!("expected {wanted}, found {found}")
 }
 
-/// A name that a file gives, for a message: quoted, without its middle where it is long.
+/// Quotes a name for a message, eliding the middle if long.
 pub(super) fn shown(name: &str) -> String {
     const LONGEST: usize = 60;
     let count = name.chars().count();

@@ -1,4 +1,4 @@
-//! Extensions of glTF: which are known, and what becomes of those that are not (specification, section 3.12).
+//! Supported glTF extensions (specification, section 3.12).
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,6 @@ use serde_json::{Map, Value};
 
 use super::error::{Fault, shown};
 
-/// The extensions that are known.
 pub(super) const KNOWN: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -31,7 +30,7 @@ pub(super) const KNOWN: &[&str] = &[
     "KHR_meshopt_compression",
     "KHR_texture_basisu",
     "KHR_texture_transform",
-    // What a file says of its authors and its rights shows in no picture.
+    // Metadata only.
     "KHR_xmp_json_ld",
 ];
 
@@ -39,8 +38,7 @@ fn is_known(name: &str) -> bool {
     KNOWN.contains(&name)
 }
 
-/// Refuses a file that requires an extension that is not known, or has data in one alone; puts a note for each that is only
-/// used.
+/// Rejects unsupported extensions that are required or hold the only data of a primitive; notes others.
 pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), Fault> {
     for (i, name) in root.extensions_required.iter().enumerate() {
         if !is_known(name) {
@@ -68,7 +66,6 @@ pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), Fault> {
     let unknown: BTreeSet<&String> = (root.extensions_used.iter())
         .filter(|name| !is_known(name) && !root.extensions_required.contains(name))
         .collect();
-    // A file may name any number of them.
     const MOST: usize = 20;
     for name in unknown.iter().take(MOST) {
         notes.push(format!("the extension {} is not supported and is ignored", shown(name)));
@@ -80,7 +77,6 @@ pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Returns what to do about an extension that is not supported.
 fn remedy(name: &str) -> &'static str {
     match name {
         "KHR_draco_mesh_compression" => "; export without Draco compression, or run gltf-transform copy IN.glb OUT.glb",
@@ -88,13 +84,13 @@ fn remedy(name: &str) -> &'static str {
     }
 }
 
-/// The fault of data that nothing else has than an extension that is not known.
+/// Returns the error for data that only an unsupported extension has.
 pub(super) fn only_in(key: &str, name: &str) -> Fault {
     let rule = "holds its only data and is not supported";
     Fault::key(key, format!("{} {rule}{}", shown(name), remedy(name)))
 }
 
-/// The first extension of an object that is not known.
+/// Returns the first unsupported extension of an object.
 pub(super) fn unknown(others: &Map<String, Value>) -> Option<&str> {
     others.keys().map(String::as_str).find(|name| !is_known(name))
 }

@@ -1,4 +1,4 @@
-//! Files with everything in them, changed at random: what is read of them is sound, or there is a message.
+//! Random mutation of glTF files: imports fail cleanly or satisfy the invariants.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use super::{Choice, Imported, import};
 use crate::Selection;
 use crate::gltf::made::container;
 
-/// Random numbers: Marsaglia, "Xorshift RNGs", 2003, of 64 bits, the higher half of each.
+/// 64-bit xorshift, upper half (Marsaglia, "Xorshift RNGs", 2003).
 struct Random(u64);
 
 impl Random {
@@ -24,7 +24,7 @@ impl Random {
     }
 }
 
-/// What everything behind the importer relies on.
+/// Asserts the invariants.
 fn check(imported: &Imported) {
     let all_flat = |note: &String| note.ends_with("their scale is zero");
     assert!(!imported.instances.is_empty() || imported.notes.iter().any(all_flat));
@@ -58,7 +58,7 @@ fn check(imported: &Imported) {
     }
 }
 
-/// Reads a file in each way; how often there was something.
+/// Imports a file with several options; returns the number of successes.
 fn read(bytes: &[u8], path: &std::path::Path) -> usize {
     std::fs::write(path, bytes).unwrap();
     let root = path.parent().unwrap();
@@ -111,12 +111,10 @@ fn changed_files_are_read_or_told() {
             0 => bad += 1,
             _ => good += 1,
         }
-        // The whole way to a scene, at times.
         if round % 8 == 0 {
             scenes += usize::from(crate::Scene::load(&path).is_ok());
         }
     }
-    // All happen often.
     assert!(
         good * 5 > rounds && bad * 10 > rounds && scenes * 50 > rounds,
         "{good} {bad} {scenes}"

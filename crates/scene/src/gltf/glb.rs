@@ -1,4 +1,4 @@
-//! The container of `.glb` files: a header and chunks (specification, section 4).
+//! GLB containers: a header and chunks (specification, section 4).
 
 use std::ops::Range;
 
@@ -10,19 +10,18 @@ const CHUNK_HEADER: usize = 8;
 const JSON: u32 = 0x4E4F_534A;
 const BIN: u32 = 0x004E_4942;
 
-/// Where a container's parts are in its bytes.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Chunks {
     pub json: Range<usize>,
     pub binary: Option<Range<usize>>,
 }
 
-/// Whether these are the bytes of a container, whatever the file's name is.
+/// Returns true for GLB, whatever the file name.
 pub(super) fn is_container(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
-/// Finds the chunks. Those of other kinds than JSON and BIN are skipped, and so is what follows the length in the header.
+/// Finds the chunks. Other and repeated chunks, and bytes beyond the declared length, are skipped.
 pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, Fault> {
     if bytes.len() < HEADER {
         let rule = format!(
@@ -44,7 +43,7 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, Fault> {
     let mut json = None;
     let mut binary = None;
     let mut at = HEADER;
-    // Fewer bytes than a chunk's header has are padding.
+    // A remainder shorter than a chunk header is padding.
     while length.saturating_sub(at) >= CHUNK_HEADER {
         let (size, kind) = (word(bytes, at) as usize, word(bytes, at + 4));
         let start = at + CHUNK_HEADER;
@@ -65,7 +64,7 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, Fault> {
     Ok(Chunks { json, binary })
 }
 
-/// The caller has checked that it is there.
+/// The caller checks the bounds.
 fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
@@ -102,7 +101,7 @@ mod tests {
         let found = chunks(&bytes).unwrap();
         assert_eq!(&bytes[found.json], b"{}  ");
         assert_eq!(&bytes[found.binary.unwrap()], b"abcd");
-        // The second of a kind is skipped, as is what follows the end.
+        // A second BIN chunk and trailing bytes are skipped.
         let mut bytes = made(12 + 8 + 4 + 8 + 1, &[(JSON, b"{}  "), (BIN, b"a"), (BIN, b"b")]);
         let found = chunks(&bytes).unwrap();
         assert_eq!(&bytes[found.binary.unwrap()], b"a");

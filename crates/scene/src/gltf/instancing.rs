@@ -1,4 +1,4 @@
-//! Which scene, animation and variant is meant; and meshes that a node has many times: EXT_mesh_gpu_instancing.
+//! Selection of the scene, animations and variant of a glTF file, and EXT_mesh_gpu_instancing.
 
 use glam::{DAffine3, DVec3};
 use serde_json::Value;
@@ -10,7 +10,7 @@ use super::{Choice, STILL, unknown};
 use crate::Selection;
 
 impl Document {
-    /// The scene that is shown; None if the file has none, and all nodes are.
+    /// Returns the selected or default scene; `None` shows all nodes.
     pub(super) fn scene(&self, choice: &Choice) -> Result<Option<usize>, GltfError> {
         let scenes = &self.json.scenes;
         let Some(wanted) = &choice.scene else {
@@ -26,7 +26,7 @@ impl Document {
             .map(Some)
     }
 
-    /// Returns the animations that are chosen: one, all if only a time is given, or none.
+    /// Returns the selected animations; all if only a time is given.
     pub(super) fn animations(&self, choice: &Choice) -> Result<Vec<usize>, GltfError> {
         let animations = &self.json.animations;
         let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
@@ -41,7 +41,7 @@ impl Document {
         }
     }
 
-    /// The number of the variant of materials, if one is asked for: KHR_materials_variants.
+    /// Returns the selected variant (KHR_materials_variants).
     pub(super) fn variant(&self, choice: &Choice) -> Result<Option<usize>, GltfError> {
         let Some(wanted) = &choice.variant else {
             return Ok(None);
@@ -55,7 +55,7 @@ impl Document {
             .map(Some)
     }
 
-    /// Returns the index of a selection. `place` is the list in the file and the option.
+    /// `place` is the list in the file and the option.
     fn selected(
         &self,
         what: &str,
@@ -76,7 +76,7 @@ impl Document {
         }
     }
 
-    /// The maps of a node's mesh to the node's coordinates: one without a change, or those of EXT_mesh_gpu_instancing.
+    /// Returns the instance transforms of a node's mesh (EXT_mesh_gpu_instancing), relative to the node.
     pub(super) fn instances(&self, node: usize) -> Result<Vec<DAffine3>, GltfError> {
         let extensions = self.json.nodes[node].extensions.as_ref();
         let Some(extension) = extensions.and_then(|all| all.others.get("EXT_mesh_gpu_instancing")) else {

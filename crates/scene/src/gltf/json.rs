@@ -1,5 +1,4 @@
-//! From the text of a glTF file to [`Root`]: limits, what files in the wild get wrong and the crate is strict about, and the
-//! crate's own validation.
+//! Parsing of glTF JSON to [`Root`], with size limits, repairs and validation.
 
 use gltf_json::camera::Type;
 use gltf_json::validation::{Checked, Error, Validate as _};
@@ -8,14 +7,14 @@ use serde_json::{Map, Number, Value};
 
 use super::error::{Fault, Place, plain, shown};
 
-/// The longest text, in bytes. Data URIs make texts long.
+/// Maximum length in bytes; data URIs are long.
 pub(super) const LARGEST_TEXT: usize = 512 << 20;
-/// The most objects of a text: each takes up to a kilobyte when it is read.
+/// Maximum number of objects, which take up to 1 KiB each.
 const MOST_OBJECTS: usize = 2 << 20;
-/// The most values in all objects and lists of a text.
+/// Maximum number of elements of objects and arrays.
 const MOST_VALUES: usize = 32 << 20;
 
-/// Keys whose values are indices, or codes of OpenGL. The crate takes numbers of 64 bits for them, and of these the lower 32.
+/// Keys of indices and OpenGL codes. The crate truncates their 64-bit values to 32 bits.
 const INDICES: &[&str] = &[
     "attributes",
     "buffer",
@@ -49,10 +48,9 @@ const INDICES: &[&str] = &[
     "wrapT",
 ];
 
-/// Reads a text. What a user should know is put into `notes`.
 pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, Fault> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    // Some writers pad the chunk of a container by zeros in place of spaces.
+    // Some exporters pad the JSON chunk with zeros.
     let text = text.trim_ascii_end().trim_suffix_zeros();
     if text.len() > LARGEST_TEXT {
         return Err(Fault::file(format!(
@@ -95,14 +93,14 @@ impl TrimZeros for [u8] {
     }
 }
 
-/// Refuses a text that takes far more memory when it is read than it has bytes.
+/// Rejects texts that take far more memory once parsed.
 fn check_size(text: &[u8]) -> Result<(), Fault> {
     let (mut objects, mut values) = (0usize, 0usize);
     let mut bytes = text.iter();
     while let Some(byte) = bytes.next() {
         match byte {
             b'"' => {
-                // To the end of the string.
+                // Skips the string.
                 while let Some(byte) = bytes.next() {
                     match byte {
                         b'\\' => drop(bytes.next()),
@@ -128,7 +126,7 @@ fn check_size(text: &[u8]) -> Result<(), Fault> {
     }
 }
 
-/// Checks what the file says of its version (specification, section 3.2), before anything else, as all else depends on it.
+/// Checks the version (specification, section 3.2), on which all else depends.
 fn check_version(top: &Map<String, Value>) -> Result<(), Fault> {
     let asset = top.get("asset").and_then(Value::as_object);
     let asset = asset.ok_or_else(|| Fault::key("asset", "is required: an object with the version"))?;
@@ -168,14 +166,14 @@ fn told(value: &Value) -> String {
     }
 }
 
-/// Drops `extras`, makes whole numbers of those that are written with a fraction of zero, and checks that every number is one
-/// in 32 bits. The parser has bounded how deep this goes. The error is a key and a rule.
+/// Removes `extras`, converts whole floats to integers, and checks that numbers fit 32 bits. The parser limits the
+/// depth. The error is a key path and a rule.
 fn tidy(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> {
     match value {
         Value::Object(map) => {
             map.remove("extras");
             for (key, value) in map {
-                // What is inside of `attributes`, `targets` and the like is indices too.
+                // The elements of `attributes` and `targets` are indices as well.
                 let is_index = INDICES.contains(&key.as_str());
                 let inner = index.filter(|outer| ["attributes", "targets"].contains(outer));
                 let index = if is_index { Some(key.as_str()) } else { inner };
@@ -206,7 +204,7 @@ fn tidy(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> 
     Ok(())
 }
 
-/// Makes what the specification allows, or writers get wrong in ways that everyone understands, into what the crate reads.
+/// Rewrites valid JSON that the crate rejects, and unambiguous errors.
 fn repair(top: &mut Value, notes: &mut Vec<String>) {
     for scene in list(top, "scenes") {
         default(scene, "nodes", Value::Array(Vec::new()));
@@ -240,7 +238,7 @@ fn repair(top: &mut Value, notes: &mut Vec<String>) {
     }
 }
 
-/// Whether a channel is not the core's, and so is ignored (specification, section 3.11): `KHR_animation_pointer` has some.
+/// Returns true for channels of extensions such as `KHR_animation_pointer` (specification, section 3.11).
 fn is_of_an_extension(channel: &Value) -> bool {
     let Some(Value::Object(target)) = channel.get("target") else {
         return false;
@@ -266,9 +264,9 @@ fn default(of: &mut Value, key: &str, value: Value) {
     }
 }
 
-/// Checks what other parts rely on: that every index is there, and that every word is known.
+/// Checks indices and enumerations.
 fn check(root: &Root) -> Result<(), Fault> {
-    // The crate's validation takes these for granted.
+    // The crate's validation assumes these.
     for (i, mesh) in root.meshes.iter().enumerate() {
         for (k, primitive) in mesh.primitives.iter().enumerate() {
             for (name, accessor) in &primitive.attributes {
@@ -333,18 +331,18 @@ pub(super) fn missing(key: impl Into<String>, index: usize, count: usize) -> Fau
     Fault::key(key, format!("{index} is out of range; the file has {count}"))
 }
 
-/// What the crate's validation says and is no error here.
+/// Returns true for acceptable findings of the crate's validation.
 fn is_allowed(path: &str, error: Error) -> bool {
     let is_in = |list: &str| path.starts_with(list);
     match error {
-        // Extensions have a table of their own.
+        // Checked by `extension::check`.
         Error::Unsupported => is_in("extensionsRequired["),
-        // Accessors without data are zero; bounds are never trusted; a primitive without positions draws nothing.
+        // Accessors without data are zero, bounds are unused, primitives without positions are skipped.
         Error::Missing => {
             is_in("accessors[") && path.ends_with("].bufferView")
                 || is_in("meshes[") && path.contains("attributes[\"POSITION\"]")
         }
-        // Names of attributes that are not the core's, and strides out of the range that is good for GPUs.
+        // Application-specific attributes, and strides that only GPUs reject.
         Error::Invalid => {
             is_in("meshes[") && path.contains(".attributes[") || is_in("bufferViews[") && path.ends_with("].byteStride")
         }

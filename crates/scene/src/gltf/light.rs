@@ -1,5 +1,4 @@
-//! Lights: KHR_lights_punctual. Candela are taken as intensity and lux as irradiance, as three.js does: a number of the file is a
-//! number of the scene.
+//! glTF lights (KHR_lights_punctual). As in three.js, candela are intensity and lux irradiance, without conversion.
 
 use std::f64::consts::PI;
 
@@ -11,7 +10,7 @@ use super::document::Document;
 use super::error::{GltfError, plain};
 use crate::{DirectionalLightDescription, LightDescription, PointLightDescription, SpotLightDescription};
 
-/// The brightest colour of a light of a scene.
+/// Maximum colour component in a scene.
 const BRIGHTEST: f64 = 1e6;
 
 #[derive(Deserialize)]
@@ -52,7 +51,7 @@ fn one() -> f64 {
 }
 
 impl Document {
-    /// The light of a node, if it has one: it shines along the node's -z.
+    /// Returns the light of a node, which emits along its -Z.
     pub(super) fn light(
         &self,
         node: usize,
@@ -116,7 +115,7 @@ impl Document {
                     let rule = "its cone's angles must be 0 <= inner <= outer <= pi".to_owned();
                     return Err(self.fault(&place, rule));
                 }
-                // In degrees, rounded: a right angle is none.
+                // Allows for rounding: pi/2 in f32 exceeds 90 degrees.
                 if outer > 90.001 {
                     note(
                         notes,
@@ -143,9 +142,9 @@ impl Document {
     }
 }
 
-/// What is told where so much light arrives that all that it falls on is white: files often have the numbers of real lamps.
+/// Returns a warning if a white surface at `middle` would be overexposed, as with physical units.
 pub(super) fn brightness(lights: &[LightDescription], middle: DVec3) -> Option<String> {
-    /// The radiance of a white surface up to which a picture shows something.
+    /// Maximum radiance without a warning.
     const MOST: f64 = 30.0;
     let irradiance = |light: &LightDescription| match light {
         LightDescription::Directional(light) => light.color,
@@ -162,7 +161,7 @@ pub(super) fn brightness(lights: &[LightDescription], middle: DVec3) -> Option<S
     })
 }
 
-/// Adds a note that is not there yet. Where they are too many to be read there are no more of them.
+/// Adds a note unless it exists or notes are too many.
 pub(super) fn note(notes: &mut Vec<String>, note: String) {
     const MOST: usize = 200;
     let is_room = notes.len() < MOST;

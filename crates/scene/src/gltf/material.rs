@@ -1,4 +1,4 @@
-//! Materials: section 3.9 and the extensions KHR_materials_*, as materials of type `principled`, whose parameters have their names.
+//! Conversion of glTF materials (section 3.9, KHR_materials_*) to `principled`, whose parameters have the same names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -18,43 +18,40 @@ use crate::{
     TextureReference, ValueDescription, VertexColors,
 };
 
-/// The images of all materials by their names.
+/// The images of all materials, by name.
 #[derive(Default)]
 pub struct Images {
-    /// Their files.
     pub read: BTreeMap<String, Arc<[u8]>>,
-    /// Why there is no file.
+    /// Reasons for missing images.
     pub absent: BTreeMap<String, String>,
 }
 
-/// A material's textures by their names.
 type Textures = BTreeMap<String, TextureDescription>;
 
-/// The largest radiance of a surface of a scene.
+/// Maximum emitted radiance in a scene.
 const BRIGHTEST: f64 = 1e6;
-/// The longest name of a material, in characters: every instance has it.
+/// Maximum length of a name in characters; all instances store it.
 const LONGEST_NAME: usize = 200;
-/// Indices of refraction of a scene.
+/// Indices of refraction in a scene.
 const IORS: (f64, f64) = (1.0, 100.0);
 
-/// The materials that are in use.
+/// The materials in use.
 pub struct Materials<'a> {
     document: &'a Document,
     variant: Option<usize>,
-    /// By their number in the file; None for what has none.
+    /// Indices into `used` by material of the file; `None` is the default.
     numbers: BTreeMap<Option<usize>, usize>,
     used: Vec<Used>,
 }
 
-/// A material in use.
 pub struct Used {
-    /// Its number in the file.
+    /// Material index of the file.
     index: Option<usize>,
-    /// Whether any mesh with colours has it.
+    /// Used with vertex colours.
     is_colored: bool,
-    /// The sets of texture coordinates that it needs.
+    /// Required texture coordinate sets.
     pub sets: BTreeSet<u32>,
-    /// Where its normals are bent, or its facets have a direction: the texture of that.
+    /// Normal or anisotropy map.
     pub tangents: Option<Slot>,
 }
 
@@ -68,7 +65,7 @@ impl<'a> Materials<'a> {
         }
     }
 
-    /// The number of a primitive's material, which is in use from here on.
+    /// Returns the index of a primitive's material, which becomes used.
     pub fn number(&mut self, primitive: &Primitive, place: &str, is_colored: bool) -> Result<usize, GltfError> {
         let index = self.index(primitive);
         let count = self.document.json.materials.len();
@@ -90,12 +87,11 @@ impl<'a> Materials<'a> {
         Ok(number)
     }
 
-    /// A material in use.
     pub fn get(&self, number: usize) -> &Used {
         &self.used[number]
     }
 
-    /// A primitive's material in the file: that of the variant, if it has one.
+    /// Returns a primitive's material in the file, by variant.
     fn index(&self, primitive: &Primitive) -> Option<usize> {
         let extension = || primitive.extensions.as_ref()?.others.get("KHR_materials_variants");
         let mappings = || extension()?.get("mappings")?.as_array();
@@ -110,11 +106,10 @@ impl<'a> Materials<'a> {
         varied.or(primitive.material.map(|material| material.value()))
     }
 
-    /// The materials as a scene has them, and the images that they need.
     pub fn finish(self, notes: &mut Vec<String>) -> Result<(Vec<ImportedMaterial>, Images), GltfError> {
         let mut images = Images::default();
         let mut names = BTreeSet::new();
-        // The number that is tried next for each name.
+        // Next suffix of each name.
         let mut next: BTreeMap<String, usize> = BTreeMap::new();
         let mut materials = Vec::with_capacity(self.used.len());
         for used in &self.used {
@@ -161,7 +156,6 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// What a texture of an extension is called there, and whether it bends normals or turns facets.
 const EXTENSION_TEXTURES: [(&str, &str); 14] = [
     ("KHR_materials_transmission", "transmissionTexture"),
     ("KHR_materials_specular", "specularTexture"),
@@ -233,10 +227,8 @@ impl Used {
     }
 }
 
-/// Makes one material.
 struct Maker<'a> {
     document: &'a Document,
-    /// Where in the file it is.
     place: String,
     name: String,
     textures: Textures,
@@ -244,7 +236,6 @@ struct Maker<'a> {
     notes: &'a mut Vec<String>,
 }
 
-/// A channel that textures of materials have their numbers in.
 const R: Channel = Channel::R;
 const G: Channel = Channel::G;
 const B: Channel = Channel::B;
@@ -369,7 +360,7 @@ impl Maker<'_> {
             _ => AlphaMode::Opaque,
         };
         if of.alpha_mode == AlphaMode::Blend && a == 1.0 && !is_veiled && !is_colored {
-            of.alpha_mode = AlphaMode::Opaque; // as exporters write it of what is opaque
+            of.alpha_mode = AlphaMode::Opaque; // exporters write opaque materials as BLEND
         }
         if of.alpha_mode != AlphaMode::Opaque {
             of.alpha = match name {
@@ -378,7 +369,7 @@ impl Maker<'_> {
             };
             let cutoff = json.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0.into());
             if cutoff > 1.0 {
-                // Nothing of it is there.
+                // The cutoff exceeds any alpha: invisible.
                 of.alpha = 0.0.into();
             }
             of.alpha_cutoff = f64::clamp(cutoff, 0.0, 1.0);
@@ -389,7 +380,7 @@ impl Maker<'_> {
         Ok(of)
     }
 
-    /// What is seen in its colour whatever light falls on it: KHR_materials_unlit.
+    /// Converts KHR_materials_unlit to emission.
     fn unlit(&mut self, of: PrincipledDescription) -> PrincipledDescription {
         PrincipledDescription {
             emission: Some(of.base_color),
@@ -411,7 +402,7 @@ impl Maker<'_> {
 
     fn ior(&mut self, ior: f64, of: &mut PrincipledDescription) -> Result<(), GltfError> {
         if ior == 0.0 {
-            // By the extension, what is 0 reflects all that comes.
+            // By the extension, 0 is total reflection.
             of.ior = IORS.1;
             of.specular_color = [(101.0_f64 / 99.0).powi(2); 3].into();
             return Ok(());
@@ -427,17 +418,17 @@ impl Maker<'_> {
         Ok(())
     }
 
-    /// KHR_materials_volume. How thick it is is found by tracing; that it is not 0 makes it a volume.
+    /// Applies KHR_materials_volume. The factor only enables the volume; the thickness is traced.
     fn volume(&mut self, all: &Map<String, Value>, of: &mut PrincipledDescription) -> Result<(), GltfError> {
         let thickness = self.number(all, "thicknessFactor", 0.0)?;
         let color = self.triple(all, "attenuationColor", [1.0; 3])?;
         let color = self.shares("attenuationColor", color)?;
         let distance = self.number(all, "attenuationDistance", f64::INFINITY)?;
         if thickness <= 0.0 {
-            return Ok(()); // a thin sheet
+            return Ok(()); // thin-walled
         }
         of.thickness = thickness.min(1e9);
-        of.double_sided = true; // by the extension: what has an inside is seen from there
+        of.double_sided = true; // by the extension, as the interior is visible
         if color != [1.0; 3] && distance.is_finite() && distance > 0.0 {
             of.attenuation_color = color.into();
             of.attenuation_distance = Some(distance.clamp(1e-6, 1e9));
@@ -458,7 +449,7 @@ impl Maker<'_> {
         Ok(())
     }
 
-    /// KHR_materials_pbrSpecularGlossiness, which older files have: its diffuse colour, and what stands for its gloss.
+    /// Applies the older KHR_materials_pbrSpecularGlossiness. Returns the diffuse colour, alpha and texture.
     #[allow(clippy::type_complexity, reason = "the two are taken apart at once")]
     fn specular_glossiness(
         &mut self,
@@ -476,7 +467,7 @@ impl Maker<'_> {
         let gloss = self.share("glossinessFactor", self.number(all, "glossinessFactor", 1.0)?)?;
         of.metallic = 0.0.into();
         of.roughness = (1.0 - gloss).into();
-        // An index of refraction of 1.5 reflects 0.04.
+        // An ior of 1.5 has a reflectance of 0.04.
         of.specular_color = specular.map(|x| x / 0.04).into();
         if let Some(texture) = all.get("specularGlossinessTexture") {
             let (slot, _) = Slot::of_value(self.document, &self.place, texture)?;
@@ -492,7 +483,7 @@ impl Maker<'_> {
         Ok((base, slot.map(|(slot, _)| slot)))
     }
 
-    /// A number from 0 to 1 of an extension, from a texture's channel too.
+    /// Returns a parameter from 0 to 1, possibly textured.
     fn value(
         &mut self,
         all: &Map<String, Value>,
@@ -540,7 +531,7 @@ impl Maker<'_> {
         })
     }
 
-    /// The name of the texture of a slot, multiplied by factors.
+    /// Returns the name of a texture with a factor, adding it if new.
     fn texture(&mut self, slot: &Slot, encoding: Encoding, factor: [f64; 4]) -> Result<String, GltfError> {
         let file = self.image(slot)?;
         let mut lookup = self.document.lookup(slot, &self.place, &file, encoding)?;
@@ -555,7 +546,7 @@ impl Maker<'_> {
         Ok(name)
     }
 
-    /// The name of the image of a slot, which is read.
+    /// Returns the name of an image, reading it if new.
     fn image(&mut self, slot: &Slot) -> Result<String, GltfError> {
         let image = self.document.image_of(slot.texture)?;
         let name = format!("images[{image}]");
@@ -574,7 +565,6 @@ impl Maker<'_> {
         Ok(self.images.read.get(&name).is_some_and(|bytes| has_alpha(bytes)))
     }
 
-    /// Numbers of an extension's list.
     fn numbers<const N: usize>(
         &self,
         all: &Map<String, Value>,
@@ -610,7 +600,7 @@ impl Maker<'_> {
         })
     }
 
-    /// What must be from 0 to 1, moved there.
+    /// Clamps to the range 0 to 1, with a note.
     fn share(&mut self, key: &str, x: f64) -> Result<f64, GltfError> {
         let [x, _, _] = self.colors(key, [x, 0.0, 0.0], 1.0)?;
         Ok(x)
@@ -620,7 +610,7 @@ impl Maker<'_> {
         self.colors(key, color, 1.0)
     }
 
-    /// What must be from 0 to a limit, moved there.
+    /// Clamps to the range 0 to `most`, with a note.
     fn colors(&mut self, key: &str, color: [f64; 3], most: f64) -> Result<[f64; 3], GltfError> {
         if color.iter().any(|x| x.is_nan()) {
             return Err(self.document.fault(&self.place, format!("{key}: must be finite")));

@@ -1,4 +1,4 @@
-//! Meshes: section 3.7, with morph targets and skins as they are at the time that is shown.
+//! glTF meshes (section 3.7), with morph targets and skins at the selected time.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::{Mutex, PoisonError};
@@ -19,20 +19,18 @@ use super::vertices::{Frames, Source, attribute};
 use super::{Damage, LONGEST_AXIS};
 use crate::mesh::{Draft, Group, MAX_COORDINATE, Mesh, unit};
 
-/// What tells meshes apart.
+/// Identity of a mesh.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
     pub mesh: usize,
     pub skin: Option<usize>,
-    /// The bits of the weights of its morph targets, if the node has some of its own.
+    /// Bits of the node's own morph weights.
     weights: Option<Vec<u32>>,
-    /// The bits of the map to the scene, where that leaves so little of an axis that an instance cannot have it: then the vertices
-    /// have gone there.
+    /// Bits of a transform with an axis too short or too long for an instance, which is applied to the vertices.
     flat: Option<[u64; 12]>,
 }
 
 impl Key {
-    /// The mesh of a node.
     pub fn of(document: &Document, node: usize, mesh: usize, pose: &Pose) -> Key {
         let weights = pose.weights.as_ref();
         Key {
@@ -43,7 +41,7 @@ impl Key {
         }
     }
 
-    /// The mesh where a map takes its vertices.
+    /// Returns the key with a transform of the vertices.
     pub fn at(&self, map: &DAffine3) -> Key {
         Key {
             flat: Some(map.to_cols_array().map(f64::to_bits)),
@@ -51,7 +49,7 @@ impl Key {
         }
     }
 
-    /// Returns whether that transform leaves so little of an axis, rather than making one too long.
+    /// Returns true if an axis is too short rather than too long.
     pub fn is_flat(&self) -> bool {
         let is_small = |axis: DVec3| axis.length() <= LONGEST_AXIS;
         self.flat().is_some_and(|map| {
@@ -75,29 +73,27 @@ impl Key {
     }
 }
 
-/// A mesh, and for each of its groups the number of its material.
+/// A mesh, and its groups' materials.
 pub struct Built {
     pub mesh: Mesh,
     pub materials: Vec<usize>,
 }
 
-/// The meshes that are shown.
 pub struct Meshes<'a> {
     document: &'a Document,
-    /// The primitives of each that have triangles.
+    /// Primitives with triangles, by mesh.
     parts: BTreeMap<usize, Vec<Part<'a>>>,
     points: usize,
     lines: usize,
-    /// The first primitive that lacks texture coordinates which its material needs, with their set; and how many there are.
+    /// First primitive that lacks a texture coordinate set, and the set.
     bare: Option<(String, u32)>,
     bare_count: usize,
-    /// By attribute, the first primitive that has numbers which are not finite, and how many have.
+    /// First primitive with non-finite values, and their number, by attribute.
     strange: Mutex<BTreeMap<&'static str, (String, usize)>>,
-    /// The first primitive that has triangles without a position, and how many of these all have.
+    /// First primitive with triangles without valid positions, and the number of these triangles.
     unplaced: Mutex<Option<(String, usize)>>,
 }
 
-/// A primitive.
 struct Part<'a> {
     primitive: &'a Primitive,
     place: String,
@@ -106,7 +102,7 @@ struct Part<'a> {
 }
 
 impl<'a> Meshes<'a> {
-    /// Looks at the primitives of meshes, whose materials are in use from here on.
+    /// Collects the primitives of meshes and their materials.
     pub fn of<'k>(
         document: &'a Document,
         materials: &mut Materials,
@@ -142,7 +138,7 @@ impl<'a> Meshes<'a> {
                 match mode {
                     Mode::Points => meshes.points += 1,
                     Mode::Lines | Mode::LineLoop | Mode::LineStrip => meshes.lines += 1,
-                    _ if attribute(primitive, Semantic::Positions).is_none() => {} // has no form: section 3.7.2.1
+                    _ if attribute(primitive, Semantic::Positions).is_none() => {} // not drawn: section 3.7.2.1
                     _ => {
                         let is_colored = attribute(primitive, Semantic::Colors(0)).is_some();
                         let material = materials.number(primitive, &place, is_colored)?;
@@ -165,7 +161,6 @@ impl<'a> Meshes<'a> {
         Ok(meshes)
     }
 
-    /// What is left out.
     pub fn notes(&self) -> impl Iterator<Item = String> {
         let told = |count: usize, of: &str| match count {
             0 => None,
@@ -187,7 +182,6 @@ impl<'a> Meshes<'a> {
             .flatten()
     }
 
-    /// Returns the vertices that are damaged.
     pub fn damage(&self) -> Vec<Damage> {
         let strange = self.strange.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let strange = strange.into_iter().map(|(name, (place, count))| {
@@ -220,7 +214,7 @@ impl<'a> Meshes<'a> {
         unplaced.into_iter().chain(strange).collect()
     }
 
-    /// Returns why there are no triangles.
+    /// Returns why no triangles exist.
     pub fn nothing(&self) -> String {
         match (self.points, self.lines, self.damage().first()) {
             (0, 0, None) => "has no triangles".to_owned(),
@@ -229,7 +223,7 @@ impl<'a> Meshes<'a> {
         }
     }
 
-    /// Counts triangles of a primitive that have no position.
+    /// Records triangles without valid positions.
     fn lacks_positions(&self, place: &str, triangles: usize) {
         if triangles == 0 {
             return;
@@ -237,24 +231,24 @@ impl<'a> Meshes<'a> {
         let mut unplaced = self.unplaced.lock().unwrap_or_else(PoisonError::into_inner);
         let (first, count) = unplaced.get_or_insert_with(|| (place.to_owned(), 0));
         *count += triangles;
-        // Meshes are built in any order.
+        // In any order, as meshes are built in parallel.
         if (place.len(), place) < (first.len(), first.as_str()) {
             place.clone_into(first);
         }
     }
 
-    /// Keeps in mind that an attribute has numbers that are none.
+    /// Records an attribute with non-finite values.
     fn is_strange(&self, place: &str, name: &'static str) {
         let mut strange = self.strange.lock().unwrap_or_else(PoisonError::into_inner);
         let (first, count) = strange.entry(name).or_insert_with(|| (place.to_owned(), 0));
         *count += 1;
-        // Meshes are built in any order.
+        // In any order, as above.
         if (place.len(), place) < (first.len(), first.as_str()) {
             place.clone_into(first);
         }
     }
 
-    /// Makes a mesh; None if it has no triangles.
+    /// Builds a mesh; `None` if it has no triangles.
     pub fn build(&self, key: &Key, nodes: &Nodes, materials: &Materials) -> Result<Option<Built>, GltfError> {
         let parts = self.parts.get(&key.mesh).map_or(&[][..], Vec::as_slice);
         let skin = key.skin.map(|skin| Skin::of(self.document, skin, nodes)).transpose()?;
@@ -298,7 +292,7 @@ impl<'a> Meshes<'a> {
         let sets = parts.iter().flat_map(|part| materials.get(part.material).sets.iter());
         let most = sets.copied().max();
         let mesh = whole.finish(most).map_err(|rule| self.document.fault(place(), rule))?;
-        // Not what is so small that a scene cannot have it.
+        // Drops flattened meshes that are too small for a scene.
         let has_size = |mesh: &Mesh| {
             let positions = || mesh.positions.iter().copied();
             let extent = positions().fold(Vec3::NEG_INFINITY, Vec3::max) - positions().fold(Vec3::INFINITY, Vec3::min);
@@ -312,7 +306,6 @@ impl<'a> Meshes<'a> {
         Ok(built)
     }
 
-    /// The triangles of a primitive with so many vertices.
     fn triangles(&self, part: &Part, count: usize) -> Result<Vec<[u32; 3]>, GltfError> {
         let indices = match part.primitive.indices {
             Some(accessor) => self.document.indices(accessor.value())?,
@@ -343,21 +336,21 @@ impl<'a> Meshes<'a> {
     }
 }
 
-/// A mesh that is being made of its primitives' vertices.
+/// A mesh under construction.
 #[derive(Default)]
 struct Whole {
     draft: Draft,
-    /// All sets of texture coordinates, for as many vertices as the last primitive that has them reaches to.
+    /// Texture coordinate sets, each up to the last primitive that has it.
     uvs: Vec<Vec<Vec2>>,
-    /// The first vertices of what primitives share, by the accessors that they are from, and how many there are.
+    /// First vertices by accessors, which primitives may share.
     known: HashMap<Vec<usize>, usize>,
     counts: HashMap<usize, usize>,
-    /// Vertices whose coordinates are not finite, or too large.
+    /// Vertices with non-finite or too large coordinates.
     unplaced: HashSet<usize>,
 }
 
 impl Whole {
-    /// Adds the vertices of a primitive, unless they are there; the number of the first.
+    /// Adds the vertices of a primitive unless known. Returns the first.
     fn vertices(
         &mut self,
         meshes: &Meshes,
@@ -368,7 +361,7 @@ impl Whole {
     ) -> Result<usize, GltfError> {
         let mut accessors = accessors(part.primitive);
         accessors.push(usize::from(used.tangents.is_some()));
-        // Rotated tangents make other vertices.
+        // Rotated tangents need separate vertices.
         let is_plain = used.tangents.as_ref().is_none_or(|slot| !slot.is_turned());
         if let Some(first) = self.known.get(&accessors).filter(|_| is_plain) {
             return Ok(*first);
@@ -395,7 +388,7 @@ impl Whole {
         Ok(first)
     }
 
-    /// Adds positions; vertices that are not finite or too far away are at the origin, without triangles.
+    /// Adds positions. Invalid ones are zero and in `unplaced`.
     fn add_positions(&mut self, first: usize, mut positions: Vec<DVec3>) {
         for (i, position) in positions.iter_mut().enumerate() {
             if !(position.is_finite() && position.abs().max_element() <= MAX_COORDINATE) {
@@ -439,15 +432,14 @@ impl Whole {
             }
             let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
             self.uvs[set].resize(first, Vec2::ZERO);
-            // The first row of an image is at v = 0 in glTF, and at v = 1 here.
+            // v of the first image row is 0 in glTF and 1 here.
             let uvs = vectors.into_iter().map(|[u, v]| Vec2::new(finite(u), 1.0 - finite(v)));
             self.uvs[set].extend(uvs);
         }
         Ok(())
     }
 
-    /// The vertices of a primitive with tangents, made where its material needs some and the file has none. Then the vertices are
-    /// its own: where its triangles have different tangents, more than one stands for one of the file.
+    /// Generates missing tangents. The primitive gets its own vertices, split where tangents differ.
     fn with_tangents(
         &mut self,
         part: &Part,
@@ -479,7 +471,7 @@ impl Whole {
             }
         }
         let origins = || made.origins.iter().map(|vertex| from(*vertex));
-        // Lists end where the last primitive that has them does.
+        // Lists end with the last primitive that has them.
         let reach = |length: usize| length >= first + count;
         if reach(self.draft.normals.len()) {
             self.draft.normals.resize(own, Vec3::ZERO);
@@ -501,7 +493,7 @@ impl Whole {
         (own, made.triangles)
     }
 
-    /// The mesh; None if no triangle has an area. `most` is the last set of texture coordinates that a material needs.
+    /// Finishes the mesh; `None` without area. `most` is the last required texture coordinate set.
     fn finish(mut self, most: Option<u32>) -> Result<Option<Mesh>, String> {
         let count = self.draft.positions.len();
         let fill = |list: &mut Vec<Vec2>| list.resize(count, Vec2::ZERO);
@@ -514,7 +506,6 @@ impl Whole {
         if !self.draft.tangents.is_empty() {
             self.draft.tangents.resize(count, Vec4::ZERO);
         }
-        // A texture needs coordinates: where there are none they are 0.
         let sets = most.map_or(0, |most| most as usize + 1).max(self.uvs.len().min(1));
         self.uvs.resize(sets, Vec::new());
         self.uvs.iter_mut().for_each(fill);
@@ -525,7 +516,7 @@ impl Whole {
     }
 }
 
-/// The accessors of a primitive's vertices.
+/// Returns the accessors of a primitive, and their uses.
 fn accessors(primitive: &Primitive) -> Vec<usize> {
     let none = usize::MAX;
     let attributes = primitive.attributes.iter();
@@ -534,7 +525,7 @@ fn accessors(primitive: &Primitive) -> Vec<usize> {
         let of = [target.positions, target.normals, target.tangents];
         all.extend(of.map(|accessor| accessor.map_or(none, |accessor| accessor.value())));
     }
-    // Two primitives may have the same accessors for different attributes.
+    // The same accessors may be different attributes.
     let names = primitive.attributes.keys().map(|name| match name {
         Checked::Valid(Semantic::Positions) => 0,
         Checked::Valid(Semantic::Normals) => 1,

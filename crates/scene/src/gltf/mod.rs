@@ -1,6 +1,5 @@
-//! glTF 2.0 files: what is in one, as parts of a scene. Coordinates become those of scenes, with +Z up: (x, y, z) becomes
-//! (x, -z, y). Section numbers are those of the
-//! specification (Khronos Group, "glTF 2.0 Specification", 2.0.1; ISO/IEC 12113:2022).
+//! Import of glTF 2.0 files, with +Z up: (x, y, z) becomes (x, -z, y). Section numbers refer to Khronos Group, "glTF
+//! 2.0 Specification", 2.0.1 (ISO/IEC 12113:2022).
 
 mod accessor;
 mod animation;
@@ -58,22 +57,21 @@ use crate::{
 pub use self::contents::ModelContents;
 pub use self::error::GltfError;
 
-/// The most instances of meshes, and the most groups of all instances together: each takes more than a kilobyte in a scene.
+/// Maximum number of instances, and of their groups. Each takes more than 1 KiB in a scene.
 const MOST_INSTANCES: usize = 1 << 20;
 
-/// The longest axis of an instance's transform.
+/// Maximum axis length of an instance's transform.
 const LONGEST_AXIS: f64 = 1e6;
 
-/// The message about a time of a file without animations.
 const STILL: &str = "the file has no animations";
 
-/// The rotation from the file's coordinates to the scene's: +Y becomes +Z.
+/// Rotation from glTF to scene space: +Y becomes +Z.
 pub const UPRIGHT: DAffine3 = DAffine3 {
     matrix3: DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
     translation: DVec3::ZERO,
 };
 
-/// What is taken of a file.
+/// The parts of a file to import.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choice {
     scene: Option<Selection>,
@@ -83,7 +81,7 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// What a shape says.
+    /// Returns the choice of a shape.
     pub fn of(shape: &GltfDescription) -> Result<Choice, Problem> {
         if let Some(time) = shape.time
             && !(TIMES.0..=TIMES.1).contains(&time)
@@ -99,16 +97,16 @@ impl Choice {
     }
 }
 
-/// What is in a file, with +Z up.
+/// An imported file, with +Z up.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Imported {
     /// The meshes.
     pub meshes: Vec<Arc<Mesh>>,
-    /// Their instances.
+    /// Mesh instances.
     pub instances: Vec<Placed>,
-    /// Image files by the names that textures have for them.
+    /// Encoded images, by name.
     pub images: BTreeMap<String, Arc<[u8]>>,
-    /// Why image files are missing, by the names that textures have for them.
+    /// Reasons for missing images, by name.
     pub absent: BTreeMap<String, String>,
     /// The materials.
     pub materials: Vec<ImportedMaterial>,
@@ -116,62 +114,61 @@ pub struct Imported {
     pub lights: Vec<LightDescription>,
     /// The cameras.
     pub cameras: Vec<ImportedCamera>,
-    /// Names of its parts.
+    /// Names of parts.
     pub contents: ModelContents,
-    /// How many animations it has.
+    /// Number of animations.
     pub animations: usize,
-    /// What a user should know of it.
+    /// Warnings for the user.
     pub notes: Vec<String>,
     /// Damaged parts.
     pub damage: Vec<Damage>,
-    /// The files that it is made of.
     files: BTreeSet<PathBuf>,
 }
 
-/// A damaged part of a file, for which a stand-in is rendered.
+/// A damaged part, replaced by a stand-in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
-    /// The place and what is wrong with it.
+    /// Location and damage.
     pub what: String,
-    /// What is rendered instead.
+    /// The stand-in.
     pub stand_in: &'static str,
 }
 
-/// A mesh in the scene.
+/// An instance of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
-    /// Its number among the meshes.
+    /// Index of the mesh.
     pub mesh: usize,
-    /// The transform from the space of the mesh.
+    /// Object to world transform.
     pub to_world: DAffine3,
-    /// For each of its groups the number of a material.
+    /// Material of each group.
     pub materials: Vec<usize>,
 }
 
-/// A material, and the textures that it names.
+/// A material and its textures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedMaterial {
-    /// Another one for each.
+    /// Unique name.
     pub name: String,
-    /// Its description.
+    /// Description.
     pub description: MaterialDescription,
-    /// The textures, by the names that the description has for them.
+    /// Textures by the names in the description.
     pub textures: BTreeMap<String, TextureDescription>,
 }
 
-/// A camera in the scene.
+/// A camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedCamera {
-    /// Its name, if it has one.
+    /// Name in the file.
     pub name: Option<String>,
-    /// Its description.
+    /// Description.
     pub description: CameraDescription,
-    /// Width over height of its picture, if the file says so.
+    /// Width over height, if given.
     pub aspect: Option<f64>,
 }
 
 impl Imported {
-    /// Points such that what holds them holds all that is there: the vertices, or corners of boxes where those are many.
+    /// Returns points that bound the scene: vertices, or box corners if too many.
     pub fn points(&self) -> Vec<DVec3> {
         const MOST: usize = 1 << 21;
         let vertices = self
@@ -189,7 +186,7 @@ impl Imported {
         points.collect()
     }
 
-    /// Corners of boxes around all that is there.
+    /// Returns the corners of the instances' bounding boxes.
     fn corners(&self) -> Vec<DVec3> {
         let corners = self.instances.par_iter().map(|placed| {
             let corners = self.meshes[placed.mesh].corners();
@@ -201,7 +198,7 @@ impl Imported {
     }
 }
 
-/// Returns the message about a name or number that the file does not have, with those that it has.
+/// Returns the message about an unavailable selection, with the available ones.
 pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String {
     const MOST: usize = 20;
     let told = |(i, name): (usize, &Option<&str>)| match name {
@@ -222,7 +219,7 @@ pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String
     }
 }
 
-/// Reads a file, unless it is in use with the same choice and none of its files has changed.
+/// Imports a file, or returns an import in use whose files have not changed.
 pub fn load(
     path: &Path,
     root: &Path,
@@ -241,7 +238,7 @@ pub fn load(
         }
     }
     let _span = tracing::debug_span!("gltf", path = %path.display()).entered();
-    // The stamp is taken first: a file that changes while it is read is read again.
+    // Stamped first, so that a change during the read is noticed.
     let before = stamp(path);
     let mut own = BTreeSet::new();
     let read = import(path, root, choice, &mut own);
@@ -263,10 +260,10 @@ pub fn load(
     Ok(imported)
 }
 
-/// Length and time of change of a file, if it is there.
+/// Length and modification time.
 type Stamp = Option<(u64, SystemTime)>;
 
-/// A file that was read.
+/// A cached import.
 struct Known {
     path: PathBuf,
     root: PathBuf,
@@ -288,7 +285,6 @@ fn stamp(path: &Path) -> Stamp {
     Some((data.len(), data.modified().ok()?))
 }
 
-/// Reads a file.
 fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBuf>) -> Result<Imported, GltfError> {
     let document = Document::open(path, root, files)?;
     let animations = document.animations(choice)?;
@@ -308,7 +304,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
         let Some(mesh) = node.mesh else { continue };
         let key = Key::of(&document, number, mesh.value(), &poses[number]);
         let global = match key.skin {
-            Some(_) => DAffine3::IDENTITY, // a skin has its own place
+            Some(_) => DAffine3::IDENTITY, // skins ignore the transform of the node
             None => nodes.globals[number],
         };
         let mut own_key = None;
@@ -356,7 +352,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
             *place = Some(imported.meshes.len());
             let mut mesh = built.mesh;
             for note in mesh.notes.drain(..) {
-                tracing::debug!(mesh = key.mesh, "{note}"); // meshes are many, and open by their nature
+                tracing::debug!(mesh = key.mesh, "{note}"); // debug: open meshes are common
             }
             imported.meshes.push(Arc::new(mesh));
             groups.push(built.materials);
@@ -386,7 +382,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
     }
     notes.extend(meshes.notes());
     imported.damage = meshes.damage();
-    // What is scaled to nothing may be so at this moment of an animation alone.
+    // A zero scale may be temporary.
     if imported.instances.is_empty() && flat == 0 {
         return Err(document.fault("scene", meshes.nothing()));
     }
@@ -413,7 +409,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
     Ok(imported)
 }
 
-/// Returns whether an instance of a scene may have this transform. Where it may not, the transform is applied to the vertices.
+/// Returns true if an instance can have this transform; otherwise it is applied to the vertices.
 fn is_placeable(map: &DAffine3) -> bool {
     let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
     let lengths = [x, y, z].map(DVec3::length);

@@ -1,4 +1,4 @@
-//! Nodes: where they are. Section 3.5.
+//! The glTF node hierarchy and its transforms (section 3.5).
 
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf_json::scene::Node;
@@ -6,20 +6,19 @@ use gltf_json::scene::Node;
 use super::document::Document;
 use super::error::GltfError;
 
-/// What a node is like at one time.
+/// Transform and morph weights of a node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose {
     pub translation: DVec3,
     pub rotation: DQuat,
     pub scale: DVec3,
-    /// In place of the three, where the file has one and no animation stands in for it.
+    /// Overrides the above.
     pub matrix: Option<DAffine3>,
-    /// The weights of its mesh's morph targets, if they are its own.
+    /// Overrides the weights of the mesh.
     pub weights: Option<Vec<f32>>,
 }
 
 impl Pose {
-    /// As the file has it.
     pub fn of(node: &Node) -> Pose {
         let vector =
             |of: Option<[f32; 3]>, default: DVec3| of.map_or(default, |of| DVec3::from_array(of.map(f64::from)));
@@ -42,7 +41,7 @@ impl Pose {
     }
 }
 
-/// A rotation of four numbers, made a unit quaternion; none where they are all 0.
+/// Normalizes a quaternion; zero becomes the identity.
 pub fn quaternion(of: [f32; 4]) -> DQuat {
     let of = DQuat::from_array(of.map(f64::from));
     let length = of.length();
@@ -52,9 +51,8 @@ pub fn quaternion(of: [f32; 4]) -> DQuat {
     }
 }
 
-/// The nodes of a file, of all its scenes.
 pub struct Nodes {
-    /// From each node's coordinates to the scene's.
+    /// Node to glTF world transforms.
     pub globals: Vec<DAffine3>,
     children: Vec<Vec<usize>>,
 }
@@ -93,7 +91,7 @@ impl Nodes {
         Ok(Nodes { globals, children })
     }
 
-    /// The nodes of a scene, those above before those below; all nodes if there is no scene.
+    /// Returns the nodes of a scene depth-first, or all nodes.
     pub fn of_scene(&self, document: &Document, scene: Option<usize>) -> Result<Vec<usize>, GltfError> {
         let Some(scene) = scene else {
             return Ok((0..self.globals.len()).collect());

@@ -1,4 +1,4 @@
-//! Tangents: those that a file has, and where it has none those of MikkTSpace, which section 3.7.2.1 asks for.
+//! Tangents of glTF meshes: MikkTSpace (section 3.7.2.1), and correction for texture transforms.
 
 use std::ops::Range;
 
@@ -8,15 +8,14 @@ use rayon::prelude::*;
 
 use super::texture::Slot;
 
-/// Vertices with tangents.
+/// Vertices with generated tangents.
 pub struct Made {
     pub triangles: Vec<[u32; 3]>,
-    /// Which vertex of the file each is.
+    /// Original index of each vertex.
     pub origins: Vec<u32>,
     pub tangents: Vec<Vec4>,
 }
 
-/// What tangents are made of.
 struct Corners<'a> {
     positions: &'a [DVec3],
     normals: &'a [Vec3],
@@ -62,7 +61,7 @@ impl Geometry for Corners<'_> {
     }
 }
 
-/// The tangents of a primitive's triangles; None where none can be made.
+/// Generates the tangents of a primitive.
 pub fn generated(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> Option<Made> {
     let parts = parts(positions, normals, uvs, triangles);
     let parts: Vec<Vec<[Vec4; 3]>> = (parts.into_par_iter())
@@ -83,7 +82,7 @@ pub fn generated(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles:
         origins: Vec::new(),
         tangents: Vec::new(),
     };
-    // The last vertex made of each of the file, and of each made one that before it.
+    // Linked lists of new vertices by origin: heads in `last`, links in `before`.
     let mut last = vec![u32::MAX; positions.len()];
     let mut before = Vec::new();
     for (triangle, tangents) in triangles.iter().zip(parts.iter().flatten()) {
@@ -107,15 +106,15 @@ pub fn generated(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles:
     Some(made)
 }
 
-/// Some of the triangles, of which `own` are to get tangents, and all that touch those, in their order: so sums are the same.
+/// The triangles `own` and those that touch them, in order, for reproducible sums.
 struct Part {
     own: Range<usize>,
     triangles: Vec<[u32; 3]>,
 }
 
-/// The triangles in parts, for several threads: what is made of a triangle depends on those alone with which it shares a vertex.
+/// Partitions triangles for threads. A tangent only depends on triangles that share a vertex.
 fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> Vec<Part> {
-    /// Triangles of a part.
+    /// Maximum triangles of a part.
     const MOST: usize = 1 << 16;
     if triangles.len() <= MOST {
         return vec![Part {
@@ -123,7 +122,7 @@ fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32;
             triangles: triangles.to_vec(),
         }];
     }
-    // Vertices that are equal are one.
+    // MikkTSpace merges equal vertices.
     let bits = |i: u32| {
         let i = i as usize;
         let position = positions[i].as_vec3().to_array().map(f32::to_bits);
@@ -164,9 +163,9 @@ fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32;
     chunks.into_par_iter().map(part).collect()
 }
 
-/// A tangent of a file for a texture that is turned or mirrored. The renderer turns normal maps with their texture; by glTF the
-/// file's tangents stand whatever a texture's transform is, so they are turned back. Where the texture's map has the second row
-/// (x, y), its own direction of u is y t - x b, for a tangent t and a bitangent b, up to a factor.
+/// Rotates a file's tangent back by the texture transform. The renderer rotates normal maps with their texture; in
+/// glTF the tangent frame ignores the transform. For the second row (x, y) of the transform, the tangent t and the
+/// bitangent b, the result is y t - x b up to a factor.
 pub fn unturned(tangent: Vec4, normal: Vec3, slot: &Slot) -> Vec4 {
     if !slot.is_turned() {
         return tangent;
@@ -187,7 +186,7 @@ mod tests {
 
     #[test]
     fn parts_have_the_tangents_of_the_whole() {
-        // A bent sheet whose texture is mirrored in one half, and each of its squares has vertices of its own.
+        // A curved sheet with a half-mirrored texture; squares have their own vertices.
         const SIDE: usize = 190;
         let mut positions = Vec::new();
         let (mut normals, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());

@@ -1,5 +1,4 @@
-//! Textures: images, how they are looked up, and where. Section 3.8; KHR_texture_basisu, KHR_texture_transform,
-//! EXT_texture_webp.
+//! glTF textures (section 3.8) with KHR_texture_basisu, KHR_texture_transform and EXT_texture_webp.
 
 use std::io::Cursor;
 
@@ -14,17 +13,17 @@ use super::error::{GltfError, plain};
 use crate::ktx2;
 use crate::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
 
-/// The smallest factor of a texture coordinate, and the largest factor and addend.
+/// Minimum scale, and maximum scale and offset of texture coordinates.
 const FACTORS: (f64, f64) = (1e-6, 1e6);
 
-/// The last set of texture coordinates that may be named.
+/// Maximum texture coordinate set.
 pub(super) const LAST_SET: u32 = 7;
 
-/// Where a material names a texture.
+/// A texture reference of a material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slot {
     pub texture: usize,
-    /// Which of a mesh's sets of texture coordinates.
+    /// Texture coordinate set.
     pub set: u32,
     pub transform: Transform,
 }
@@ -50,7 +49,7 @@ impl Default for Transform {
     }
 }
 
-/// A texture as an extension names it.
+/// A texture of an extension.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Info {
@@ -63,7 +62,7 @@ struct Info {
 }
 
 impl Slot {
-    /// What a material of the core specification names.
+    /// Returns a core texture.
     pub fn new(
         document: &Document,
         place: &str,
@@ -98,21 +97,21 @@ impl Slot {
         })
     }
 
-    /// What an extension names, with its `scale` if it is a normal map.
+    /// Returns an extension's texture, and the `scale` of a normal map.
     pub fn of_value(document: &Document, place: &str, value: &Value) -> Result<(Slot, f64), GltfError> {
         let info = Info::deserialize(value).map_err(|error| document.fault(place, plain(&error)))?;
         let slot = Slot::new(document, place, (info.index, info.tex_coord), Some(&info.extensions))?;
         Ok((slot, info.scale.unwrap_or(1.0)))
     }
 
-    /// The second row of the linear part of the texture's map, and the sign of its determinant.
+    /// Returns the second row of the transform, and the sign of its determinant.
     pub fn second_row(&self) -> ([f64; 2], f64) {
         let Transform { rotation, scale, .. } = self.transform;
         let (sin, cos) = rotation.sin_cos();
         ([sin * scale[0], cos * scale[1]], scale[0] * scale[1])
     }
 
-    /// Whether it is turned or mirrored.
+    /// Returns true for rotations and mirroring.
     pub fn is_turned(&self) -> bool {
         let Transform { rotation, scale, .. } = self.transform;
         rotation != 0.0 || scale.iter().any(|scale| *scale < 0.0)
@@ -120,8 +119,8 @@ impl Slot {
 }
 
 impl Document {
-    /// How a texture's image is looked up. An image of glTF has its first row at v = 0, one of a scene at v = 1; so both its
-    /// coordinates and the mesh's are turned upside down.
+    /// Returns the lookup. v of the first row is 0 in glTF and 1 here, so the transform is flipped like the mesh's
+    /// coordinates.
     pub(super) fn lookup(
         &self,
         slot: &Slot,
@@ -169,7 +168,7 @@ impl Document {
     }
 }
 
-/// Whether an image file has an alpha channel; no, if it cannot be read, which is told when it is decoded.
+/// Returns true for images with alpha. Unreadable ones are reported by the decoder.
 pub(super) fn has_alpha(bytes: &[u8]) -> bool {
     if let Some(has_alpha) = ktx2::has_alpha(bytes) {
         return has_alpha;

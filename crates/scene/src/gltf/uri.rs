@@ -1,4 +1,4 @@
-//! URIs in glTF files: data URIs (RFC 2397), and relative paths of files inside the asset root (specification, section 2.8).
+//! URIs in glTF files: data URIs (RFC 2397) and relative paths (specification, section 2.8).
 
 use std::borrow::Cow;
 use std::fs::{self, File};
@@ -12,7 +12,7 @@ use percent_encoding::percent_decode_str;
 use super::error::shown;
 use wgray_image::memory::fallible;
 
-/// Base64 as writers have it, with padding or without.
+/// Base64 with or without padding.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &base64::alphabet::STANDARD,
     GeneralPurposeConfig::new()
@@ -20,12 +20,11 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// Whether the data are in the URI.
 pub(super) fn is_data(uri: &str) -> bool {
     uri.get(..5).is_some_and(|start| start.eq_ignore_ascii_case("data:"))
 }
 
-/// The bytes of a data URI. The error is the rule that it breaks.
+/// Decodes a data URI; the error is the rule.
 pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
     let rule = "a data URI must be data:[type][;base64],data";
     let (head, body) = uri.get(5..).and_then(|rest| rest.split_once(',')).ok_or(rule)?;
@@ -42,12 +41,12 @@ pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Why a file that a URI names is not read. The text is the value with the rule.
+/// Why a file is not read: the value and the rule.
 #[derive(Debug)]
 pub(super) enum Unfound {
-    /// It cannot be found.
+    /// Missing or unreadable.
     Absent(String),
-    /// Its name or its place breaks a rule.
+    /// Violates a rule.
     Refused(String),
 }
 
@@ -65,17 +64,16 @@ impl From<Unfound> for String {
     }
 }
 
-/// Where the files that a model names are.
 #[derive(Clone, Debug)]
 pub(super) struct Folder {
-    /// The folder that names are relative to, that of the model.
+    /// Folder of the model, which paths are relative to.
     pub folder: PathBuf,
-    /// The folder that files must lie in.
+    /// Asset root.
     pub root: PathBuf,
 }
 
 impl Folder {
-    /// Finds a file that a URI names; the path is without links.
+    /// Resolves a URI to a canonical path in the asset root.
     pub fn find(&self, uri: &str) -> Result<PathBuf, Unfound> {
         if let Some(scheme) = scheme(uri) {
             let rule = "it must be a relative path, or a data URI";
@@ -84,7 +82,7 @@ impl Folder {
         let decoded = percent_decode_str(uri)
             .decode_utf8()
             .map_err(|_| format!("{} must be UTF-8 where it is percent-encoded", shown(uri)))?;
-        // Some writers do not encode the percent signs of names, and some have the backslashes of Windows.
+        // Unencoded percent signs, and backslashes of Windows.
         let turned = decoded.replace('\\', "/");
         let names = [&*decoded, uri, &turned];
         for name in names {
@@ -117,7 +115,7 @@ impl Folder {
     }
 }
 
-/// What stands before a colon, if it is a URI's scheme (RFC 3986, section 3.1).
+/// Returns the scheme (RFC 3986, section 3.1).
 fn scheme(uri: &str) -> Option<&str> {
     let (scheme, _) = uri.split_once(':')?;
     let is_scheme = scheme.starts_with(|c: char| c.is_ascii_alphabetic())
@@ -125,9 +123,9 @@ fn scheme(uri: &str) -> Option<&str> {
     is_scheme.then_some(scheme)
 }
 
-/// Reads a file that has at most so many bytes. Pipes and folders are none.
+/// Reads a regular file of at most `most` bytes.
 pub(super) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    // Asked first, since opening a pipe waits for a writer.
+    // Checked first: opening a pipe waits for a writer.
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "it must be a file"));
     }
@@ -241,7 +239,6 @@ mod tests {
         assert!(told(".").ends_with("must be a file"));
         assert!(read(&root.join("a b.bin"), 2).is_err());
         assert!(read(&root, 9).is_err());
-        // A wider root allows more.
         let wide = Folder {
             folder: root,
             root: outer.path().to_owned(),

@@ -1,4 +1,4 @@
-//! How large the images of glTF files may be, so that all textures together fit what is there for them.
+//! Downscaling of glTF images to the texture memory.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,23 +8,22 @@ use super::super::texture::{levels, words};
 use super::super::validate::TEXEL_MEMORY;
 use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
 
-/// The most texels that are decoded of all images together, and how many more for a byte of their files: it takes long, and a small
-/// file may have many.
+/// Maximum number of decoded texels, and the addition per byte of the files. Bounds the decoding time.
 const TEXELS: (u64, u64) = (1 << 28, 64);
-/// What is left for other textures and surroundings, in bytes.
+/// Memory reserved for other textures and the environment, in bytes.
 const OTHERS: u64 = 128 << 20;
 
-/// An image, and how many times it is kept: as colours, as numbers, and for its alpha.
+/// An image, and its copies as colours, data and alpha.
 struct Kept {
     header: Header,
-    /// The bytes of its file.
+    /// Encoded size in bytes.
     length: u64,
     times: u64,
     has_levels: bool,
 }
 
 impl Kept {
-    /// The bytes that it takes where it is halved until no side is longer.
+    /// Returns the memory in bytes, halved until no side exceeds `longest`.
     fn bytes(&self, longest: u32) -> u64 {
         let Header { width, height, is_deep } = self.header;
         let halvings = (0..32).take_while(|i| width.max(height) >> i > longest).count();
@@ -34,8 +33,8 @@ impl Kept {
     }
 }
 
-/// The longest side of images such that they fit, and the bytes that they take as they are; None if they fit as they are. The
-/// error is the rule that they break.
+/// Returns the maximum side length that fits, and the memory in bytes at full size; `None` if that fits. The error is
+/// the rule.
 pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option<(u32, u64)>, String> {
     let kept = kept(description, assets);
     let texels = |of: &Kept| u64::from(of.header.width) * u64::from(of.header.height) * of.times;
@@ -68,7 +67,7 @@ fn kept(description: &Description, assets: &Assets) -> Vec<Kept> {
             _ => None,
         })
         .collect();
-    // The encodings of each file, and None for its alpha; and whether it is filtered.
+    // Encodings of each file (`None`: alpha), and whether it is filtered.
     let mut files: BTreeMap<&str, (BTreeSet<Option<bool>>, bool)> = BTreeMap::new();
     for (name, texture) in &description.textures {
         if let TextureDescription::Image(image) = texture {
@@ -92,11 +91,11 @@ fn kept(description: &Description, assets: &Assets) -> Vec<Kept> {
     kept.collect()
 }
 
-/// What an image's header says. Nothing, if it cannot be read, which is told when it is decoded.
+/// Returns the header. Unreadable images are reported by the decoder.
 fn header(bytes: &[u8]) -> Option<Header> {
     let format = Format::of(bytes)?;
     let seen = Cell::new(None);
-    // Nothing is decoded of what does not fit.
+    // Stops after the header.
     let _ = decode(bytes, format, |header| {
         seen.set(Some(header));
         Err(String::new())
@@ -132,7 +131,7 @@ mod tests {
                 ..ImageTextureDescription::new(file)
             })
         };
-        // A third more for its levels: 180 MB; the same a second time for its other encoding, and not for another texture.
+        // 180 MB with mip levels per encoding, however many textures.
         for (name, encoding) in [("a", Encoding::Srgb), ("b", Encoding::Linear), ("c", Encoding::Srgb)] {
             description.textures.insert(name.to_owned(), texture("large", encoding));
         }

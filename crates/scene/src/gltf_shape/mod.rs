@@ -1,5 +1,4 @@
-//! Shapes of type `gltf` as what they stand for: meshes in memory and their instances, textures of images in memory, materials
-//! and lights. What is behind this knows nothing of glTF.
+//! Expansion of `gltf` shapes into ordinary meshes, instances, textures, materials and lights.
 
 mod fitting;
 
@@ -24,40 +23,39 @@ use super::{
 use crate::gltf::{Choice, Imported, load};
 use crate::note::Note;
 
-/// A description without glTF files, and what it names.
+/// A description without `gltf` shapes, and its assets.
 pub struct Expanded {
     pub description: Description,
     pub assets: Assets,
-    /// What a user should know of the files.
+    /// Warnings for the user.
     pub notes: Vec<Note>,
-    /// The files as they were read, which are kept as long as the scene is.
+    /// The imports, which must outlive the scene.
     pub imported: Vec<Arc<Imported>>,
     origins: Vec<Origin>,
-    /// How many shapes name each file.
+    /// Number of shapes per file.
     numbers: BTreeMap<String, usize>,
     prefixes: BTreeSet<String>,
-    /// How many things shapes have brought, and some more for each: all, and those whose file another shape had named.
+    /// Imported parts plus [`SHAPE`] per shape: all, and of repeated files.
     brought: [usize; 2],
 }
 
-/// The most things that all glTF files of a scene bring: instances, meshes, materials and lights, each as often as a shape names its file.
+/// Maximum number of instances, meshes, materials and lights of all shapes.
 const MOST_BROUGHT: usize = 1 << 21;
-/// The most of these that shapes bring whose file another shape has named. Each takes a kilobyte or more.
+/// Maximum number of these of repeated files. Each takes 1 KiB or more.
 const MOST_AGAIN: usize = 1 << 18;
-/// What a shape counts for besides what it brings.
+/// Cost of a shape in these counts.
 const SHAPE: usize = 16;
 
-/// What a shape brought.
+/// Parts of a shape.
 struct Origin {
     shape: usize,
-    /// With which the names of its meshes, materials and textures begin.
+    /// Prefix of the names of meshes, materials and textures.
     prefix: String,
     instances: Range<usize>,
     lights: Range<usize>,
 }
 
 impl Expanded {
-    /// Reads the files that shapes of type `gltf` name.
     pub fn of(description: &Description, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Expanded, Problem> {
         let mut expanded = Expanded {
             description: description.clone(),
@@ -91,7 +89,7 @@ impl Expanded {
         Ok(expanded)
     }
 
-    /// A problem of the expanded description, where it is in the one that was read.
+    /// Maps a problem from the expanded to the original description.
     pub fn place(&self, description: &Description, problem: Problem) -> Problem {
         let brought = self.origins.iter().find(|origin| match problem.key.0.as_slice() {
             [Segment::Key(list), Segment::Index(i), ..] if list == "instances" => origin.instances.contains(i),
@@ -211,7 +209,7 @@ impl Expanded {
         Ok(())
     }
 
-    /// What the names begin with that a file brings: another one for each shape.
+    /// Returns a unique prefix for a file's names.
     fn prefix(&mut self, file: &str) -> String {
         let number = self.numbers.entry(file.to_owned()).or_default();
         loop {
@@ -220,14 +218,14 @@ impl Expanded {
                 1 => format!("{file}/"),
                 i => format!("{file} ({i})/"),
             };
-            // Another file may have such a name.
+            // Another file may have this name.
             if self.prefixes.insert(prefix.clone()) {
                 return prefix;
             }
         }
     }
 
-    /// The names of the file's materials here: the scene's where it has others for them.
+    /// Returns the scene's names of a file's materials, some overridden by the shape.
     fn materials(&mut self, gltf: &GltfDescription, imported: &Imported, prefix: &str) -> Result<Vec<String>, Problem> {
         let known: BTreeSet<&str> = imported.materials.iter().map(|material| &*material.name).collect();
         for (name, own) in &gltf.materials {
@@ -265,14 +263,13 @@ impl Expanded {
     }
 }
 
-/// The rows of a map.
 fn rows(map: &DAffine3) -> Vec<[f64; 4]> {
     let rows = map.matrix3.transpose();
     let row = |i: usize| rows.col(i).extend(map.translation[i]).to_array();
     vec![row(0), row(1), row(2)]
 }
 
-/// A light in other coordinates. What it sends out stays.
+/// Transforms a light; its emission is unchanged.
 fn moved(light: &LightDescription, map: &DAffine3) -> LightDescription {
     let turned = |direction: DVec3| map.transform_vector3(direction);
     let mut light = light.clone();
@@ -283,12 +280,12 @@ fn moved(light: &LightDescription, map: &DAffine3) -> LightDescription {
             spot.position = map.transform_point3(spot.position);
             spot.direction = spot.direction.map(turned);
         }
-        LightDescription::Rectangle(_) => {} // glTF has none
+        LightDescription::Rectangle(_) => {} // not in glTF
     }
     light
 }
 
-/// A material whose textures have a prefix.
+/// Prefixes the textures of a material.
 fn renamed(material: &MaterialDescription, prefix: &str) -> MaterialDescription {
     let mut material = material.clone();
     let MaterialDescription::Principled(of) = &mut material else {

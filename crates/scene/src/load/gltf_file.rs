@@ -1,5 +1,4 @@
-//! glTF files as scenes: one is described as a shape of type `gltf`, with a camera and light around it, and rendered as what
-//! that shape stands for.
+//! glTF files as scenes: a shape of type `gltf` with a camera, and an environment if the file has no lights.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -20,30 +19,30 @@ use crate::{CameraDescription, Description, Framing, GltfDescription, Scene, Sel
 /// Sine of the smallest angle to +z at which a view is not vertical.
 const VERTICAL: f64 = 1e-6;
 
-/// Whether a file of this name is a glTF file: it ends in `.gltf` or `.glb`.
+/// Returns true if a file name ends in `.gltf` or `.glb`.
 pub fn is_gltf(name: &Path) -> bool {
     let ending = name.extension();
     ending.is_some_and(|ending| ["gltf", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
 impl Scene {
-    /// Whether it has a glTF file with animations, of which [`GltfChoice::time`] shows a moment.
+    /// Returns true if a glTF file of the scene has animations, of which [`GltfChoice::time`] selects the time.
     pub fn has_animations(&self) -> bool {
         self.imported.iter().any(|imported| imported.animations > 0)
     }
 
-    /// Returns the names in each of its glTF files.
+    /// Returns the names in each glTF file.
     pub fn models(&self) -> impl Iterator<Item = &ModelContents> {
         self.imported.iter().map(|imported| &imported.contents)
     }
 
-    /// Whether it has a glTF file with cameras.
+    /// Returns true if a glTF file of the scene has cameras.
     pub fn has_model_cameras(&self) -> bool {
         self.imported.iter().any(|imported| !imported.cameras.is_empty())
     }
 }
 
-/// A glTF file as a scene of its own, and the file, which is kept until the scene has it.
+/// Describes a glTF file as a scene. The caller keeps the imported file alive until the scene has it.
 pub(crate) fn describe(
     path: &Path,
     overrides: &Overrides,
@@ -122,7 +121,8 @@ pub(crate) fn describe(
     Ok((description, imported))
 }
 
-/// Returns a camera whose orbit is horizontal: `up` is +z, unless the view is vertical. glTF cameras have an `up` across their view.
+/// Makes the orbit of a camera horizontal: `up` becomes +z unless the view is vertical. That of glTF cameras is
+/// perpendicular to the view.
 fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
     let (position, look_at, up) = match &mut camera {
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, &mut camera.up),
@@ -136,7 +136,7 @@ fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
     camera
 }
 
-/// The camera that is asked for, or the first.
+/// Returns the selected camera, or the first.
 fn chosen<'a>(
     cameras: &'a [ImportedCamera],
     wanted: Option<&Selection>,
@@ -150,7 +150,7 @@ fn chosen<'a>(
     found.map(Some).ok_or_else(unknown)
 }
 
-/// A size of this aspect.
+/// Returns the image size for an aspect ratio.
 fn size(aspect: Option<f64>) -> (u32, u32) {
     let side = |ratio: f64| (f64::from(SIDE) * ratio).round().clamp(1.0, f64::from(SIDE)) as u32;
     match aspect {

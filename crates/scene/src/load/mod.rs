@@ -1,4 +1,4 @@
-//! From a scene file to a checked [`Scene`], with other values in place of some of the file's.
+//! Scene files and model files, loaded with overrides and validated to a [`Scene`].
 
 mod file;
 mod gltf_choice;
@@ -26,8 +26,8 @@ use crate::problem::{Problem, Problems};
 use crate::{Description, Scene};
 
 impl Scene {
-    /// Reads and checks a scene file. The format follows from the file name: `.json` is JSON, `.gltf` and `.glb` are glTF, `.obj`, `.ply` and
-    /// `.stl` are meshes, and everything else is TOML.
+    /// Loads and validates a scene file. The file name determines the format: `.json` is JSON, `.gltf` and `.glb` are
+    /// glTF, `.obj`, `.ply` and `.stl` are meshes, and everything else is TOML.
     ///
     /// # Errors
     ///
@@ -36,17 +36,17 @@ impl Scene {
         Scene::load_with(path, &Overrides::default())
     }
 
-    /// Reads and checks a scene file, with other values in place of some of the file's.
+    /// Loads and validates a scene file with overrides.
     ///
     /// # Errors
     ///
-    /// The errors of [`Scene::load`], and bad overrides.
+    /// The errors of [`Scene::load`], and invalid overrides.
     pub fn load_with(path: impl AsRef<Path>, overrides: &Overrides) -> Result<Scene, SceneError> {
         Scene::load_described(path, overrides).map(|(scene, _)| scene)
     }
 
-    /// [`Scene::load_with`], and what the file describes, with the other values in their places; files that it names are relative to the file's
-    /// folder. A glTF file or a mesh file is described as one shape, with a camera and what lights it.
+    /// Returns the scene of [`Scene::load_with`], and its description with the overrides applied; file names are
+    /// relative to the file's folder. A model file is described as one shape with a camera and lighting.
     ///
     /// # Errors
     ///
@@ -55,7 +55,7 @@ impl Scene {
         Scene::load_and_list(path.as_ref(), overrides, &mut BTreeSet::new())
     }
 
-    /// [`Scene::load_described`]. What files the scene is made of is told even if it breaks a rule.
+    /// Like [`Scene::load_described`], and adds all files of the scene to `files`, even on failure.
     pub fn load_and_list(
         path: &Path,
         overrides: &Overrides,
@@ -72,8 +72,8 @@ impl Scene {
         parse_beside(&text, &path.display().to_string(), folder_of(path), overrides, files)
     }
 
-    /// Reads and checks the text of a scene file; `origin` is the file's name in messages, which says by `.json` that
-    /// it is JSON, and files that the scene names are beside it.
+    /// Parses and validates the text of a scene file. `origin` is its path in messages and for relative file names; the
+    /// text is JSON if it ends in `.json`.
     ///
     /// # Errors
     ///
@@ -82,18 +82,18 @@ impl Scene {
         Scene::parse_with(text, origin, &Overrides::default())
     }
 
-    /// Reads and checks the text of a scene file, with other values in place of some of its own.
+    /// Parses and validates the text of a scene file with overrides.
     ///
     /// # Errors
     ///
-    /// The errors of [`Scene::parse`], and bad overrides.
+    /// The errors of [`Scene::parse`], and invalid overrides.
     pub fn parse_with(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
         let folder = folder_of(Path::new(origin));
         parse_beside(text, origin, folder, overrides, &mut BTreeSet::new()).map(|(scene, _)| scene)
     }
 }
 
-/// A glTF file as a scene of its own, with the values in place.
+/// Loads a glTF file as a scene.
 fn load_gltf(
     path: &Path,
     overrides: &Overrides,
@@ -105,7 +105,7 @@ fn load_gltf(
         description = description.defined(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
-    // Messages about the shape are about the file, whose name stands before them.
+    // Messages about the shape are about the file, whose name precedes them.
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let place = format!("{name}: ");
     let own = |message: &str| {
@@ -137,7 +137,7 @@ fn load_gltf(
     Ok((scene, description))
 }
 
-/// A mesh file as a scene of its own, with the values in place.
+/// Loads a mesh file as a scene.
 fn load_mesh(
     path: &Path,
     overrides: &Overrides,
@@ -176,19 +176,19 @@ fn parse_beside(
     Draft::read(text, origin, folder, overrides)?.check(files)
 }
 
-/// A scene file's text that has been read, and not checked.
+/// A parsed scene file that is not validated.
 pub struct Draft<'a> {
     text: &'a str,
     origin: &'a str,
     folder: &'a Path,
     overrides: &'a Overrides,
     defines: Defines<'a>,
-    /// What it describes, with the other values in their places.
+    /// The description with the overrides applied.
     pub description: Description,
 }
 
 impl<'a> Draft<'a> {
-    /// Reads the text of a file of this name, beside which the files lie that it names.
+    /// Parses the text of a file `origin`; file names are relative to `folder`.
     pub fn read(
         text: &'a str,
         origin: &'a str,
@@ -208,8 +208,9 @@ impl<'a> Draft<'a> {
         draft.overridden()
     }
 
-    /// Reads a text that differs from one that was read as `before` inside of one table alone, that at the first two steps of a path.
-    /// Where that table has a header of its own nothing else is read again. Also where the text's parts are, if that was found.
+    /// Parses a text that differs from that of `before` only in the table at the first two segments of a path. If this
+    /// table has its own header, only it is parsed again. Also returns the locations of the parts of the text, if they
+    /// were found.
     pub fn change(
         text: &'a str,
         origin: &'a str,
@@ -229,7 +230,7 @@ impl<'a> Draft<'a> {
             defines,
             description: change.description,
         };
-        // The options stand in for values outside of the parts, and are in their places still where these were not read again.
+        // Overrides of values outside of the parts are still applied, unless these were parsed again.
         if change.is_rest {
             draft = draft.overridden()?;
         }
@@ -247,7 +248,7 @@ impl<'a> Draft<'a> {
         Ok(self)
     }
 
-    /// Checks every value. What files the scene is made of is told even if it breaks a rule.
+    /// Validates the scene. Adds its files to `files`, even if it fails.
     pub fn check(self, files: &mut BTreeSet<PathBuf>) -> Result<(Scene, Description), SceneError> {
         let Draft {
             text,

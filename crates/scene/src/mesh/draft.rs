@@ -1,4 +1,4 @@
-//! What the readers of all formats make: triangles as the file has them, in the file's coordinates.
+//! Raw mesh data, as read from a file of any format.
 
 use crate::note::Note;
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -8,42 +8,41 @@ use super::error::{Fault, Place, shown_number};
 use super::polygon::Polygon;
 use super::{Group, MAX_COORDINATE, MOST, Mesh, finish};
 
-/// A mesh as its file has it.
+/// A mesh in file coordinates.
 #[derive(Default)]
 pub(crate) struct Draft {
     pub positions: Vec<DVec3>,
-    /// A unit normal for each vertex, zero where the file has none that is one; or empty.
+    /// Unit normal of each vertex (zero if invalid), or empty.
     pub normals: Vec<Vec3>,
-    /// For each vertex, or empty.
+    /// Texture coordinates of each vertex, or empty.
     pub uvs: Vec<Vec2>,
-    /// Further sets of texture coordinates, each for each vertex.
     pub more_uvs: Vec<Vec<Vec2>>,
-    /// Linear RGB and opacity for each vertex, or empty.
+    /// Linear RGB and opacity of each vertex, or empty.
     pub colors: Vec<Vec4>,
-    /// For each vertex, or empty, as [`Mesh::tangents`](super::Mesh::tangents) has them.
+    /// In the format of [`Mesh::tangents`](super::Mesh::tangents), or empty.
     pub tangents: Vec<Vec4>,
     pub triangles: Vec<[u32; 3]>,
-    /// The fans among the triangles that stand for polygons of more than three corners.
+    /// Fans of polygons with more than three corners.
     pub(super) polygons: Vec<Polygon>,
     pub groups: Vec<Group>,
-    /// The first triangles of runs of one group each, and their groups.
+    /// First triangle and group of each run.
     pub runs: Vec<(usize, u32)>,
-    /// What a user should know.
+    /// Warnings for the user.
     pub notes: Vec<Note>,
-    /// Why the file may have no triangles.
+    /// Why a file without triangles has none.
     pub(super) without_triangles: Option<&'static str>,
     pub(super) damages: Damages,
 }
 
 impl Draft {
-    /// Adds triangles to another group from here on.
+    /// Assigns the following triangles to a group.
     pub fn begin(&mut self, group: u32) {
         if self.runs.last().is_none_or(|(_, last)| *last != group) {
             self.runs.push((self.triangles.len(), group));
         }
     }
 
-    /// The mesh, with the normals that are there; None if no triangle has an area. The error is what rule is broken.
+    /// Builds the mesh with its normals; `None` without area. The error is the rule.
     pub(crate) fn finish(self) -> Result<Option<Mesh>, String> {
         match finish::finish(self, None) {
             Ok(mesh) => Ok(Some(mesh)),
@@ -52,7 +51,7 @@ impl Draft {
         }
     }
 
-    /// Adds a face of three corners or more as a fan from its first corner.
+    /// Adds a face as a triangle fan.
     #[inline]
     pub(super) fn face(&mut self, corners: &[u32], place: Place) -> Result<(), Fault> {
         let &[first, ref others @ ..] = corners else {
@@ -74,13 +73,11 @@ impl Draft {
     }
 }
 
-/// A number of things for a note: as one thing is told, or as several are.
 pub(super) fn counted(count: usize, one: &str, several: &str) -> Note {
     format!("{count} {}", if count == 1 { one } else { several }).into()
 }
 
-/// Checks a coordinate of a position. Zero loses its sign, so that equal coordinates have equal bits. The error is the
-/// value and the rule.
+/// Checks a coordinate. -0 becomes +0, so that equal values have equal bits. The error is the value and the rule.
 #[inline]
 pub(super) fn coordinate(x: f64) -> Result<f64, String> {
     if x.abs() <= MAX_COORDINATE {
@@ -90,7 +87,7 @@ pub(super) fn coordinate(x: f64) -> Result<f64, String> {
     }
 }
 
-/// Checks a texture coordinate. The error is the value and the rule.
+/// Checks a texture coordinate.
 #[inline]
 pub(super) fn texture_coordinate(x: f64) -> Result<f32, String> {
     if (x as f32).is_finite() {
@@ -100,12 +97,12 @@ pub(super) fn texture_coordinate(x: f64) -> Result<f32, String> {
     }
 }
 
-/// A normal of length 1; zero where there is none.
+/// Normalizes a vector; invalid ones become zero.
 pub(crate) fn unit(normal: DVec3) -> Vec3 {
     let largest = normal.abs().max_element();
     if !(largest > 0.0 && normal.is_finite()) {
         return Vec3::ZERO;
     }
-    // Neither the smallest nor the largest numbers have squares.
+    // Scaled, as squares can overflow or underflow.
     (normal / largest).normalize().as_vec3()
 }

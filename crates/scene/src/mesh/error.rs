@@ -1,43 +1,43 @@
-//! What can be wrong with a mesh file, and where.
+//! Errors of mesh files, with their locations.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why there is no mesh. Every message begins with the place: `bunny.obj:17: vertex 9 of the face does not exist; there are 8
-/// so far`.
+/// An error of a mesh file. Messages begin with its location: `bunny.obj:17: vertex 9 of the face does not exist;
+/// there are 8 so far`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// The file cannot be read.
-    // The field is not named `source`: its text is in the message, and must not be printed twice.
+    /// Unreadable file.
+    // Not named `source`: error chains would print its text twice.
     #[error("{}: cannot be read: {error}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The I/O error.
         error: io::Error,
     },
-    /// A line of a text breaks a rule.
+    /// Invalid line of a text file.
     #[error("{}:{line}: {message}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// Counted from 1.
+        /// Line from 1.
         line: usize,
         /// The value and the rule.
         message: String,
     },
-    /// A byte of a binary file breaks a rule.
+    /// Invalid byte of a binary file.
     #[error("{}: byte {offset}: {message}", path.display())]
     Byte {
         /// The file.
         path: PathBuf,
-        /// Counted from 0.
+        /// Offset from 0.
         offset: usize,
         /// The value and the rule.
         message: String,
     },
-    /// The file as a whole breaks a rule.
+    /// Invalid file.
     #[error("{}: {message}", path.display())]
     File {
         /// The file.
@@ -48,7 +48,7 @@ pub enum MeshError {
 }
 
 impl MeshError {
-    /// Returns the file.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         match self {
             MeshError::Read { path, .. }
@@ -58,7 +58,7 @@ impl MeshError {
         }
     }
 
-    /// Returns the line, counted from 1, if the error has one.
+    /// Returns the line from 1, if known.
     pub fn line(&self) -> Option<usize> {
         match self {
             MeshError::Line { line, .. } => Some(*line),
@@ -66,7 +66,6 @@ impl MeshError {
         }
     }
 
-    /// Returns the error with another path to the same file.
     pub(crate) fn at(mut self, other: &Path) -> MeshError {
         match &mut self {
             MeshError::Read { path, .. }
@@ -78,23 +77,22 @@ impl MeshError {
     }
 }
 
-/// An error before it knows its file.
+/// An error without its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Fault {
     pub place: Place,
     pub message: String,
-    /// True if the file has no triangle to render.
+    /// No triangles to render.
     pub is_empty: bool,
 }
 
-/// A place in a file.
+/// A location in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// All of it.
     File,
-    /// A line of a text, counted from 1.
+    /// Line from 1.
     Line(usize),
-    /// A byte of a binary file, counted from 0.
+    /// Byte offset.
     Byte(usize),
 }
 
@@ -109,7 +107,7 @@ impl Place {
 }
 
 impl Fault {
-    /// Returns the fault of a file without triangles. `reason` continues the message.
+    /// Returns the error for a file without triangles; `reason` is appended.
     pub fn empty(reason: &str) -> Fault {
         Fault {
             is_empty: true,
@@ -127,7 +125,7 @@ impl Fault {
     }
 }
 
-/// A word of a file for a message: quoted, without its middle where it is long.
+/// Quotes a word for a message, eliding the middle if long.
 pub(super) fn shown(word: &[u8]) -> String {
     const LONGEST: usize = 60;
     if word.len() <= LONGEST {
@@ -140,7 +138,7 @@ pub(super) fn shown(word: &[u8]) -> String {
     )
 }
 
-/// A number for a message, without rows of zeros.
+/// Formats a number without long runs of zeros.
 pub(super) fn shown_number(x: f64) -> String {
     match x == 0.0 || (1e-5..1e15).contains(&x.abs()) {
         true => format!("{x}"),

@@ -1,4 +1,4 @@
-//! From what a file says to a mesh: 32-bit positions around a centre, triangles that have an area, normals.
+//! Mesh construction: 32-bit positions, removal of degenerate triangles, and normals.
 
 use crate::note::Note;
 use glam::{DVec3, DVec4, Vec3, Vec4};
@@ -10,7 +10,6 @@ use super::error::{Fault, Place};
 use super::neighbours::Neighbours;
 use super::{MAX_COLOR, MOST, Mesh, Normals, polygon};
 
-/// Makes the mesh.
 pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fault> {
     polygon::triangulate(&mut draft);
     let mut mesh = Mesh {
@@ -35,7 +34,7 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
             mesh.group_of.resize(end, *group);
         }
     }
-    // NaN is 0 too.
+    // NaN becomes 0.
     let bounded = |x: f32, most: f32| if x > 0.0 { x.min(most) } else { 0.0 };
     for color in &mut mesh.colors {
         let most = Vec4::new(MAX_COLOR, MAX_COLOR, MAX_COLOR, 1.0);
@@ -67,7 +66,7 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
         ));
     }
 
-    // For a million triangles this and the edges take 0.05 s, a third of the load of a binary PLY file.
+    // With the edges 0.05 s for a million triangles, a third of a binary PLY load.
     let mut neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
     let edges = neighbours.edges(&mesh.triangles, &mesh.group_of);
     if !edges.repeated.is_empty() {
@@ -116,17 +115,17 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     Ok(mesh)
 }
 
-/// Rounds positions to 32 bits, from the centre of those that triangles have.
+/// Converts positions to 32 bits around their centre.
 fn round(mesh: &mut Mesh, positions: &[DVec3]) {
     let used = used(&mesh.triangles, positions.len());
     mesh.center = center(positions.iter().zip(&used).filter(|(_, used)| **used).map(|(p, _)| *p));
     let center = mesh.center;
-    // A zero has no sign, so that equal positions have equal bits.
+    // -0 becomes +0, so that equal positions have equal bits.
     let rounded = |p: &DVec3| (*p - center).as_vec3() + Vec3::ZERO;
     mesh.positions = positions.iter().map(rounded).collect();
 }
 
-/// Which of so many vertices triangles have.
+/// Returns the vertices in use.
 fn used(triangles: &[[u32; 3]], vertices: usize) -> Vec<bool> {
     let mut used = vec![false; vertices];
     for vertex in triangles.iter().flatten() {
@@ -135,7 +134,6 @@ fn used(triangles: &[[u32; 3]], vertices: usize) -> Vec<bool> {
     used
 }
 
-/// Leaves out vertices of no triangle.
 fn drop_unused(mesh: &mut Mesh) {
     let used = used(&mesh.triangles, mesh.positions.len());
     if !used.contains(&false) {
@@ -158,21 +156,21 @@ fn drop_unused(mesh: &mut Mesh) {
     keep(&mut mesh.tangents, &used);
 }
 
-/// Keeps what is marked of a list that may be empty.
+/// Keeps the marked elements of a list that may be empty.
 fn keep<T>(list: &mut Vec<T>, marks: &[bool]) {
     let mut marks = marks.iter();
     list.retain(|_| marks.next() == Some(&true));
 }
 
-/// Adds what a vertex has of a list that may be empty once more, for its copy.
+/// Duplicates an element of a list that may be empty.
 fn repeat<T: Copy>(list: &mut Vec<T>, vertex: usize) {
     if let Some(value) = list.get(vertex).copied() {
         list.push(value);
     }
 }
 
-/// A point near the middle of all positions: on the grid whose cells are at least as large as the mesh, a power of 2. So a
-/// mesh around the origin keeps its coordinates, and no coordinate gets more digits.
+/// Returns the centre, rounded to a grid with the extent, rounded up to a power of 2, as cell size. Meshes around the
+/// origin keep their coordinates, and no coordinate needs more bits.
 fn center(positions: impl Iterator<Item = DVec3>) -> DVec3 {
     let (low, high) = positions.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
         (low.min(p), high.max(p))
@@ -181,12 +179,12 @@ fn center(positions: impl Iterator<Item = DVec3>) -> DVec3 {
     let below = f64::from_bits(extent.to_bits() & !((1 << 52) - 1));
     let cell = if below < extent { 2.0 * below } else { below };
     let middle = (low + high) / 2.0;
-    // A mesh from 0 to 1 has the origin at its edge, and keeps its coordinates.
+    // Ties to even: a mesh from 0 to 1 is kept.
     DVec3::from_array(middle.to_array().map(|x| (x / cell).round_ties_even() * cell + 0.0))
 }
 
-/// Twice the area of a triangle along its normal. It is zero only where the area is zero in exact arithmetic: Shewchuk,
-/// "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997.
+/// Returns the triangle normal, of twice the area. It is zero only if the exact area is (Shewchuk, "Adaptive Precision
+/// Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997).
 fn area([a, b, c]: [Vec3; 3]) -> DVec3 {
     let along = |x: usize, y: usize| {
         let [a, b, c] = [a, b, c].map(|p| Coord {
@@ -205,7 +203,6 @@ fn drop_degenerate(mesh: &mut Mesh) {
     mesh.positions = positions;
 }
 
-/// Keeps the triangles of which a condition is true.
 fn keep_triangles(mesh: &mut Mesh, condition: impl Fn(&[u32; 3]) -> bool + Send + Sync) {
     let marks: Vec<bool> = mesh.triangles.par_iter().map(condition).collect();
     if marks.contains(&false) {
@@ -214,7 +211,7 @@ fn keep_triangles(mesh: &mut Mesh, condition: impl Fn(&[u32; 3]) -> bool + Send 
     }
 }
 
-/// Drops triangles that are there again: nothing is seen of them, and no box of a tree keeps them apart.
+/// Removes duplicates, which are invisible and inseparable in a BVH.
 fn drop_repeated(mesh: &mut Mesh, repeated: &[u32]) {
     let mut marks = vec![true; mesh.triangles.len()];
     for triangle in repeated {
@@ -227,7 +224,6 @@ fn drop_repeated(mesh: &mut Mesh, repeated: &[u32]) {
     mesh.notes.push(removed(repeated.len(), marks.len(), one, several));
 }
 
-/// Returns the note that some of all triangles were removed, and why.
 fn removed(count: usize, all: usize, one: &str, several: &str) -> Note {
     let (why, were) = match count {
         1 => (one, "was"),
@@ -237,8 +233,8 @@ fn removed(count: usize, all: usize, one: &str, several: &str) -> Note {
     format!("{count} of {all} {triangles} {why} and {were} removed").into()
 }
 
-/// Normals of the vertices by the triangles around, weighted by their angles: Thürmer and Wüthrich, "Computing Vertex
-/// Normals from Polygonal Facets", Journal of Graphics Tools 3(1), 1998. Zero where they cancel.
+/// Returns angle-weighted vertex normals (Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets",
+/// Journal of Graphics Tools 3(1), 1998); zero if they cancel.
 fn smooth(mesh: &Mesh, neighbours: &Neighbours) -> Vec<Vec3> {
     let normal = |point: usize| {
         let sum: DVec4 = neighbours
@@ -265,7 +261,7 @@ fn smooth(mesh: &Mesh, neighbours: &Neighbours) -> Vec<Vec3> {
     neighbours.points.iter().map(|point| normals[*point as usize]).collect()
 }
 
-/// Gives vertices without a normal that of their triangle; where triangles differ, each gets a vertex of its own.
+/// Fills in missing normals from triangles, splitting vertices if these differ.
 fn fill_normals(mesh: &mut Mesh) -> Result<(), Fault> {
     let missing: Vec<bool> = mesh.normals.iter().map(|normal| *normal == Vec3::ZERO).collect();
     if !missing.contains(&true) {

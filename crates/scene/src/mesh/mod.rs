@@ -1,6 +1,4 @@
-//! Triangle meshes: what a mesh file holds, in memory, and how it is read.
-//!
-//! [`Mesh::load`] reads Wavefront OBJ, PLY and STL files.
+//! Triangle meshes and their files. [`Mesh::load`] reads Wavefront OBJ, PLY and STL files.
 
 mod cache;
 mod check;
@@ -35,54 +33,53 @@ use self::error::{Fault, Place};
 pub use self::tangents::{Tangents, VertexTangents};
 use crate::note::Note;
 
-/// The largest file, in bytes.
+/// Maximum size of a mesh file in bytes.
 const LARGEST_FILE: u64 = 8 << 30;
-/// The largest file of materials, in bytes.
+/// Maximum size of an MTL file in bytes.
 const LARGEST_LIBRARY: u64 = 16 << 20;
-/// The most triangles, and the most vertices: three times as many are numbered by 32 bits.
+/// Maximum number of triangles and of vertices; three times as many fit 32-bit indices.
 const MOST: usize = 1 << 30;
-/// The largest red, green or blue of a vertex.
+/// Maximum colour component of a vertex.
 const MAX_COLOR: f32 = 1e6;
-/// The largest coordinate of a position.
+/// Maximum magnitude of a coordinate.
 pub(crate) const MAX_COORDINATE: f64 = 1e9;
 
-/// A mesh of triangles that share vertices. Positions count from [`Mesh::center`], so that one far from the origin keeps its
-/// digits.
+/// A triangle mesh with shared vertices. Positions are relative to [`Mesh::center`], for precision far from the
+/// origin.
 ///
-/// A mesh made in code is checked when a scene is made of it. Its BVH is kept in it from the first use on, and is built again for a mesh that
-/// was cloned or taken out of its `Arc`; `Arc::get_mut` returns `None` from then on.
+/// Meshes made in code are validated with their scene. The BVH is cached in the mesh on first use, and rebuilt after
+/// it was cloned or taken out of its `Arc`; `Arc::get_mut` returns `None` from then on.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Mesh {
-    /// Where positions are counted from, in the file's coordinates.
+    /// Origin of the positions, in the file's coordinates.
     pub center: DVec3,
-    /// The vertices.
+    /// Vertex positions.
     pub positions: Vec<Vec3>,
-    /// A unit normal for each vertex, outwards; empty if there are none.
+    /// Outward unit normals, or empty.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates of each vertex; empty if there are none.
+    /// Texture coordinates, or empty.
     pub uvs: Vec<Vec2>,
-    /// Further sets of texture coordinates: of set k + 1 each vertex's. Empty if there are none.
+    /// Further sets of texture coordinates, from set 1.
     pub more_uvs: Vec<Vec<Vec2>>,
-    /// A colour for each vertex, linear RGB from 0 to 1e6 and opacity from 0 to 1; empty if there are none.
+    /// Linear RGB (0 to 1e6) and opacity (0 to 1), or empty.
     pub colors: Vec<Vec4>,
-    /// For each vertex the unit tangent along which u grows, and 1 or -1 as a factor of normal x tangent, along which v grows. 0 where
-    /// there is none, and then it is made from the texture coordinates; empty if there are none.
+    /// Unit tangents in the direction of u, or empty. `w` is 1 or -1: v increases along w (normal × tangent). Zero
+    /// tangents are derived from the texture coordinates.
     pub tangents: Vec<Vec4>,
-    /// Each triangle's vertices, counter-clockwise as seen from outside.
+    /// Vertices of the triangles, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// The parts that may have a material of their own, at least one.
+    /// Parts with separate materials; at least one.
     pub groups: Vec<Group>,
-    /// Each triangle's group; empty if there is one group alone.
+    /// Group of each triangle; empty for a single group.
     pub group_of: Vec<u32>,
-    /// The files of materials that come with the file, for groups to name. They are what the groups look like where a scene
-    /// says nothing else.
+    /// MTL files. Groups use their materials unless the scene overrides them.
     pub libraries: Vec<Library>,
-    /// Warnings about the file, with the action taken: `1 of 12 triangles is a duplicate and was removed`.
+    /// Warnings, with the action taken: `1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
-    /// Damage to the file, as the errors that it is where damage is refused.
+    /// Damage, which is an error in strict mode.
     pub(crate) damage: Vec<Fault>,
-    /// Values derived from it, such as its bounding box and BVH.
+    /// Bounding box, BVH and other derived data.
     cache: Cache,
 }
 
@@ -90,72 +87,72 @@ pub struct Mesh {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct Group {
-    /// Its name in the file; empty if it has none.
+    /// Name in the file, or empty.
     pub name: String,
-    /// The name of its material in the file.
+    /// Name of the material.
     pub material: Option<String>,
 }
 
-/// A file of materials that an OBJ file names: an MTL file.
+/// An MTL file of an OBJ file.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Library {
-    /// The file, in the folder of the mesh, whether or not it can be read.
+    /// The file, in the folder of the mesh; it may not exist.
     pub file: PathBuf,
-    /// Its materials, in their order.
+    /// Materials in file order.
     pub materials: Vec<MtlMaterial>,
-    /// Why it is not read, if it is not.
+    /// Why the file was not read.
     pub problem: Option<String>,
 }
 
-/// A material of an MTL file, as the file has it: what is not there is None.
+/// A material of an MTL file. Missing values are `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct MtlMaterial {
-    /// Its name: `newmtl`.
+    /// Name: `newmtl`.
     pub name: String,
-    /// The line of its name, counted from 1.
+    /// Line of `newmtl`, from 1.
     pub line: usize,
-    /// The diffuse reflectance: `Kd`.
+    /// Diffuse reflectance: `Kd`.
     pub diffuse: Option<[f64; 3]>,
-    /// The specular reflectance: `Ks`.
+    /// Specular reflectance: `Ks`.
     pub specular: Option<[f64; 3]>,
-    /// The exponent of the highlight: `Ns`.
+    /// Phong exponent: `Ns`.
     pub shininess: Option<f64>,
-    /// What it emits: `Ke`.
+    /// Emission: `Ke`.
     pub emission: Option<[f64; 3]>,
-    /// How opaque it is, from 0 to 1: `d`, or 1 - `Tr`.
+    /// Opacity from 0 to 1: `d`, or 1 - `Tr`.
     pub opacity: Option<f64>,
-    /// The index of refraction: `Ni`.
+    /// Index of refraction: `Ni`.
     pub index_of_refraction: Option<f64>,
-    /// The number of the illumination model: `illum`.
+    /// Illumination model: `illum`.
     pub illumination: Option<u8>,
-    /// The file of the diffuse reflectance, without options: `map_Kd`.
+    /// Texture of the diffuse reflectance, without options: `map_Kd`.
     pub diffuse_map: Option<String>,
-    /// How metallic it is, from 0 to 1: `Pm`.
+    /// Metallic factor from 0 to 1: `Pm`.
     pub metallic: Option<f64>,
-    /// How rough it is, from 0 to 1: `Pr`.
+    /// Roughness from 0 to 1: `Pr`.
     pub roughness: Option<f64>,
-    /// The file of the emission: `map_Ke`.
+    /// Texture of the emission: `map_Ke`.
     pub emission_map: Option<String>,
-    /// The file of the opacity: `map_d`.
+    /// Texture of the opacity: `map_d`.
     pub opacity_map: Option<String>,
-    /// The file of heights, or of normals as some exporters have it: `map_Bump` or `bump`.
+    /// Texture of heights, or normals of some exporters: `map_Bump` or `bump`.
     pub bump_map: Option<String>,
-    /// The file of normals: `norm`.
+    /// Texture of normals: `norm`.
     pub normal_map: Option<String>,
-    /// The file of the metalness: `map_Pm`.
+    /// Texture of the metallic factor: `map_Pm`.
     pub metallic_map: Option<String>,
-    /// The file of the roughness: `map_Pr`.
+    /// Texture of the roughness: `map_Pr`.
     pub roughness_map: Option<String>,
-    /// The statements that have no effect: other maps, and options of maps.
+    /// Statements without effect: other maps, and options.
     pub others: Vec<String>,
-    /// The lines of the keywords, and of the statements that have no effect, counted from 1.
+    /// Lines of keywords and statements without effect, from 1.
     pub(crate) lines: BTreeMap<String, usize>,
 }
 
 impl MtlMaterial {
-    /// Returns the files of all maps.
+    /// Returns the texture files.
     pub(crate) fn maps(&self) -> impl Iterator<Item = &String> {
         let maps = [
             &self.diffuse_map,
@@ -170,35 +167,34 @@ impl MtlMaterial {
     }
 }
 
-/// Which normals a mesh has: what its surface looks like under light, not where it is.
+/// Shading normals of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Normals {
-    /// Made from the triangles around each position, weighted by their angles there.
+    /// Angle-weighted averages of the adjacent triangles.
     Smooth,
-    /// Each triangle's own: [`Mesh::normals`] is empty.
+    /// Triangle normals; [`Mesh::normals`] is empty.
     Flat,
-    /// The file's. A file without any is an error.
+    /// Normals of the file, which must have some.
     File,
 }
 
 impl Mesh {
-    /// Reads a mesh from a file whose name ends in `.obj`, `.ply` or `.stl`.
+    /// Reads a mesh from a `.obj`, `.ply` or `.stl` file.
     ///
-    /// Without a word on normals they are the file's if it has any for its vertices (OBJ, PLY), else flat ones.
+    /// By default, normals are the file's vertex normals (OBJ, PLY), otherwise flat.
     ///
-    /// - Polygons become triangles. Triangles without an area are dropped.
-    /// - OBJ files have a vertex for each different combination of position, texture coordinates and normal at a corner,
-    ///   and a group for each different combination of `g` or `o`, the later one, with `usemtl`. The files that `mtllib`
-    ///   names are read if they are in the folder of the mesh or in one below. Colors of vertices are sRGB. Smoothing groups (`s`),
-    ///   fourth coordinates, lines and curves are ignored.
-    /// - PLY files have the vertices that their triangles share. Colours of vertices that are whole numbers are sRGB, those that are floats
-    ///   linear.
-    /// - STL files have a vertex for each different position, and a group for each `solid`. Normals of facets are looked at
-    ///   for [`Normals::File`] alone, and then tell vertices apart.
+    /// - Polygons are triangulated. Degenerate triangles are removed.
+    /// - OBJ files have a vertex for each combination of position, texture coordinates and normal, and a group for
+    ///   each combination of the last `g` or `o` with `usemtl`. Files of `mtllib` are read if they are in the folder
+    ///   of the mesh or below. Vertex colours are sRGB. Smoothing groups (`s`), fourth coordinates, lines and curves
+    ///   are ignored.
+    /// - PLY files keep their vertices. Integer vertex colours are sRGB, floats linear.
+    /// - STL files have a vertex for each position, and a group for each `solid`. Facet normals are only used for
+    ///   [`Normals::File`], and then separate vertices.
     ///
-    /// Damaged parts are left out. [`Mesh::notes`] has warnings about them, and about other oddities.
+    /// Damaged parts are skipped. [`Mesh::notes`] has warnings about them and about other defects.
     pub fn load(path: &Path, normals: Option<Normals>) -> Result<Mesh, MeshError> {
         let _span = tracing::debug_span!("mesh", path = %path.display()).entered();
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
@@ -231,7 +227,7 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// Reads the files of materials of one line: one whose name may have blanks, or several.
+    /// Reads the MTL files of a line: one whose name may have blanks, or several.
     fn load_libraries(&mut self, mesh: &Path, names: &str) {
         let folder = match mesh.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -245,13 +241,13 @@ impl Mesh {
         }
     }
 
-    /// Reads an MTL file. [`Library::problem`] has the reason if that fails.
+    /// Reads an MTL file, or sets [`Library::problem`].
     fn load_library(&mut self, folder: &Path, name: &str) {
         let mut library = Library {
             file: file_beside(folder, name),
             ..Library::default()
         };
-        // Each is read once, however often it is named, and no more of them than lines may name.
+        // Each file is read once, and their number is limited.
         let is_known = self.libraries.iter().any(|known| known.file == library.file);
         if is_known || self.libraries.len() >= obj::MOST_LIBRARIES {
             return;
@@ -280,18 +276,18 @@ impl Mesh {
 }
 
 impl Mesh {
-    /// Returns the value of type `T` that is computed from the mesh on the first call, and kept with it. Each type has one value.
+    /// Returns the value of type `T`, computed on the first call. A mesh has one value per type.
     pub fn cached<T: Any + Send + Sync>(self: &Arc<Self>, compute: impl FnOnce(&Mesh) -> T) -> Arc<T> {
         self.cache.get_or_init(self, || compute(self))
     }
 
-    /// Returns the first rule that the mesh breaks. Meshes that were read from files break none.
+    /// Returns the first rule that the mesh violates; none for meshes from files.
     pub(crate) fn broken_rule(self: &Arc<Self>) -> Option<String> {
         struct BrokenRule(Option<String>);
         self.cached(|mesh| BrokenRule(check::check(mesh).err())).0.clone()
     }
 
-    /// Returns the corners of the bounding box, in the file's coordinates.
+    /// Returns the corners of the bounding box in file coordinates.
     pub fn corners(self: &Arc<Self>) -> impl Iterator<Item = DVec3> + use<> {
         struct Bounds([Vec3; 2]);
         let bounds = self.cached(|mesh| {
@@ -317,7 +313,7 @@ enum Format {
     Stl,
 }
 
-/// Reads a mesh, the names of its MTL files, and the damage that was dealt with, from the bytes of a file.
+/// Returns the mesh, its MTL files and the damage.
 fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh, Vec<String>, Vec<Fault>), Fault> {
     if bytes.is_empty() {
         return Err(Place::File.fault("the file is empty"));
@@ -343,9 +339,9 @@ fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh,
     Ok((mesh, libraries, damage))
 }
 
-/// The bytes of a file; None if it is too large.
+/// Reads a file; `None` if it is too large.
 fn read_file(path: &Path, largest: u64) -> io::Result<Option<Vec<u8>>> {
-    // A pipe could keep its reader waiting for ever.
+    // Opening a pipe waits for a writer.
     let data = fs::metadata(path)?;
     if !data.is_file() {
         return Err(io::Error::other("it must be a file"));
@@ -358,7 +354,7 @@ fn read_file(path: &Path, largest: u64) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= largest))
 }
 
-/// The bytes of a file of materials; or why there are none.
+/// Reads an MTL file in the folder of the mesh.
 fn read_library(folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
     let told = |error: io::Error| error.to_string();
     let path = file.canonicalize().map_err(told)?;
@@ -371,10 +367,10 @@ fn read_library(folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Returns a file that another one in a folder names. If it does not exist, as with a path of another machine, this is the file of that
-/// name in the folder itself, then one whose name differs in the case of letters only.
+/// Resolves a file name in a folder. If missing, as with paths of another machine, tries its last component, then
+/// names in other case.
 pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
-    let slashes = name.replace('\\', "/"); // written on Windows
+    let slashes = name.replace('\\', "/"); // Windows paths
     let last = slashes.rsplit('/').next().unwrap_or(&slashes);
     let tried = [name, &slashes, last].map(|name| folder.join(name));
     let [_, plain, _] = &tried;
@@ -385,7 +381,7 @@ pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
         .unwrap_or_else(|| plain.clone())
 }
 
-/// Returns an existing file in a folder whose path differs in the case of letters only.
+/// Returns an existing file of the same name, ignoring case.
 pub(crate) fn in_other_case(folder: &Path, path: &str) -> Option<PathBuf> {
     let (parents, name) = path.rsplit_once('/').unwrap_or(("", path));
     let mut folder = folder.to_owned();

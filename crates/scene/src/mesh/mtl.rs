@@ -1,28 +1,28 @@
-//! The materials that an OBJ file names: MTL files (Wavefront Technologies, "Advanced Visualizer Manual", 1995). A line that
-//! cannot be read is reported and ignored. Keywords may have any case, as many exporters write them.
+//! Parser of MTL files, the materials of OBJ files (Wavefront Technologies, "Advanced Visualizer Manual", 1995).
+//! Invalid lines are reported and ignored. Keywords are case-insensitive, as exporters differ.
 
 use super::MtlMaterial;
 use super::error::{Fault, shown};
 use super::words::{Words, number};
 
-/// Maximum number of materials of a file: one takes some hundred bytes, and more for its keywords, but may have only nine in the file.
+/// Maximum number of materials of a file. A material takes hundreds of bytes in memory but as few as nine in the file.
 pub(super) const MAX_MATERIALS: usize = 1 << 16;
-/// Maximum number of reported lines that cannot be read.
+/// Maximum number of reported invalid lines.
 const MAX_PROBLEMS: usize = 100;
-/// Maximum number of reported statements of a material that have no effect.
+/// Maximum number of reported statements without effect per material.
 const MAX_IGNORED: usize = 16;
 
-/// The contents of a file.
+/// The contents of an MTL file.
 #[derive(Debug, Default)]
 pub(super) struct Mtl {
     pub materials: Vec<MtlMaterial>,
-    /// The first lines that cannot be read, each with the rule.
+    /// The first invalid lines, with the rules.
     pub problems: Vec<String>,
-    /// The number of lines that cannot be read.
+    /// Number of invalid lines.
     pub problem_count: usize,
 }
 
-/// Reads the materials of a file. Messages begin with the line. The error is a rule that the whole file breaks.
+/// Parses a file. Problems begin with the line; the error is of the whole file.
 pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
     let mut words = Words::new(bytes);
     let mut materials: Vec<MtlMaterial> = Vec::new();
@@ -55,7 +55,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
     })
 }
 
-/// The keywords of a material in lower case, as they are usually written.
+/// Lower-case keywords and their usual spelling.
 const KEYWORDS: [(&str, &str); 24] = [
     ("bump", "map_Bump"),
     ("d", "d"),
@@ -83,7 +83,7 @@ const KEYWORDS: [(&str, &str); 24] = [
     ("tr", "Tr"),
 ];
 
-/// Sets a field of a material by a line. The error is the line, the keyword and the rule.
+/// Applies a line. The error is the line, keyword and rule.
 fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<(), String> {
     let is_keyword = |(lower, _): &&(&str, &str)| lower.as_bytes().eq_ignore_ascii_case(keyword);
     let Some((_, keyword)) = KEYWORDS.iter().find(is_keyword) else {
@@ -98,7 +98,7 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
             false => Err(format!("{line}: {keyword}: {x} must be finite")),
         }
     };
-    // One number stands for three.
+    // A single number is a grey value.
     let color = |words: &mut Words| -> Result<[f64; 3], String> {
         let red = finite(words)?;
         match words.on_line() {
@@ -117,7 +117,7 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
         "Ni" => material.index_of_refraction = Some(finite(words)?),
         "d" => material.opacity = Some(finite(words)?),
         "Tr" => {
-            // MeshLab writes 1 for opaque materials, and an invisible one has no use.
+            // MeshLab writes 1 for opaque materials, and an invisible material has no use.
             let opacity = 1.0 - finite(words)?;
             if opacity != 0.0 {
                 material.opacity = Some(opacity);
@@ -140,7 +140,6 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
     Ok(())
 }
 
-/// Returns the file of a map. Its options have no effect.
 fn map(material: &mut MtlMaterial, words: &mut Words, keyword: &str) -> Option<String> {
     let line = words.line();
     let (file, options) = map_file(&words.name());
@@ -154,7 +153,7 @@ fn map(material: &mut MtlMaterial, words: &mut Words, keyword: &str) -> Option<S
     Some(file).filter(|file| !file.is_empty())
 }
 
-/// Records a statement that has no effect. A material has few of them, whatever its file has.
+/// Records a statement without effect, up to a limit.
 fn ignore(material: &mut MtlMaterial, what: String, line: usize) {
     if material.others.len() < MAX_IGNORED && !material.others.contains(&what) {
         material.lines.insert(what.clone(), line);
@@ -162,7 +161,7 @@ fn ignore(material: &mut MtlMaterial, what: String, line: usize) {
     }
 }
 
-/// Returns the file of a map, which follows its options, and the options.
+/// Splits a map's arguments into file and options.
 fn map_file(line: &str) -> (String, Vec<String>) {
     let mut words = line.split(' ').peekable();
     let mut options = Vec::new();
@@ -176,7 +175,7 @@ fn map_file(line: &str) -> (String, Vec<String>) {
             _ => 1,
         };
         for i in 0..numbers {
-            // Of three numbers the first must be there.
+            // The first number is required.
             if i == 0 || words.peek().is_some_and(|word| word.parse::<f64>().is_ok()) {
                 words.next();
             }

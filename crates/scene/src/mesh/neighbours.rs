@@ -1,5 +1,4 @@
-//! What lies around each point of a mesh, whatever the number of vertices there: vertices of one position may differ in
-//! normal and texture coordinates, and are one point.
+//! Mesh adjacency by point: vertices of equal position, whatever their other attributes.
 
 use std::hash::BuildHasher;
 
@@ -7,20 +6,20 @@ use glam::Vec3;
 use hashbrown::{DefaultHashBuilder, HashTable};
 use rayon::prelude::*;
 
-/// The points of a mesh and the triangles around each.
+/// The points of a mesh and their adjacent triangles.
 pub(super) struct Neighbours {
-    /// Each vertex's point.
+    /// Point of each vertex.
     pub points: Vec<u32>,
-    /// Where in `around` each point's triangles begin, and the end.
+    /// Ranges of the points in `around`.
     starts: Vec<u32>,
     around: Vec<u32>,
 }
 
 impl Neighbours {
-    /// Positions must have no negative zeros.
+    /// Positions must not contain -0.
     pub fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Neighbours {
         let (points, count) = points(positions);
-        // A counting sort of all corners by their points: triangles keep their order.
+        // Stable counting sort of corners by point.
         let mut starts = vec![0u32; count + 1];
         for vertex in triangles.iter().flatten() {
             starts[points[*vertex as usize] as usize] += 1;
@@ -41,18 +40,16 @@ impl Neighbours {
         Neighbours { points, starts, around }
     }
 
-    /// How many points there are.
     pub fn count(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// The triangles around a point, in their order.
+    /// Returns the triangles at a point, ascending.
     pub fn around(&self, point: usize) -> &[u32] {
         &self.around[self.starts[point] as usize..self.starts[point + 1] as usize]
     }
 
-    /// Finds edges that the triangles do not make a surface around, and triangles that are there again. For each triangle
-    /// there is a group, or all are of one.
+    /// Finds non-manifold edges, inconsistent winding and duplicate triangles. Empty `group_of`: one group.
     pub fn edges(&self, triangles: &[[u32; 3]], group_of: &[u32]) -> Edges {
         (0..self.count())
             .into_par_iter()
@@ -61,12 +58,12 @@ impl Neighbours {
                 || (Edges::default(), Vec::new()),
                 |(mut edges, mut others), point| {
                     let (mut crowded, mut turned) = self.odd(triangles, point, &[], &mut others);
-                    // Triangles that are there again are odd at each of their edges, and are told for themselves.
+                    // Edges are counted without duplicates, which make them irregular.
                     if crowded + turned > 0 {
                         let repeated = self.repeated(triangles, group_of, point);
                         if !repeated.is_empty() {
                             (crowded, turned) = self.odd(triangles, point, &repeated, &mut others);
-                            // Each triangle is told of at its lowest point.
+                            // Each duplicate is reported at its lowest point.
                             let lowest = |triangle: &u32| self.points_of(triangles, *triangle).iter().min().copied();
                             edges
                                 .repeated
@@ -87,7 +84,7 @@ impl Neighbours {
             })
     }
 
-    /// The numbers of crowded and of turned edges whose lower point this is, without some triangles, which are in order.
+    /// Counts crowded and turned edges with lower point `point`, without some sorted triangles.
     #[inline]
     fn odd(
         &self,
@@ -120,8 +117,7 @@ impl Neighbours {
         })
     }
 
-    /// The triangles around a point, in their order, that have the points of another one with a lower number, in the same
-    /// direction, and are of its group.
+    /// Returns the triangles at a point that repeat an earlier one's points, winding and group.
     fn repeated(&self, triangles: &[[u32; 3]], group_of: &[u32], point: usize) -> Vec<u32> {
         let mut all: Vec<_> = (self.around(point).iter())
             .map(|triangle| {
@@ -148,26 +144,25 @@ impl Neighbours {
     }
 }
 
-/// What is odd about edges.
+/// Irregular edges and duplicate triangles.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Edges {
-    /// The number of those that belong to more than two triangles.
+    /// Edges of more than two triangles.
     pub crowded: usize,
-    /// The number of those that both of their triangles pass in the same direction.
+    /// Edges with the same direction in both triangles.
     pub turned: usize,
-    /// The triangles, in no order, that have the points of another one with a lower number, in the same direction, and are
-    /// of its group. They are not counted with their edges.
+    /// Repeat an earlier triangle's points, winding and group. Unsorted; not counted in the edges.
     pub repeated: Vec<u32>,
 }
 
-/// A number for each vertex, the same one where positions are, and how many there are.
+/// Returns the point of each vertex, and the number of points.
 fn points(positions: &[Vec3]) -> (Vec<u32>, usize) {
     let hasher = DefaultHashBuilder::default();
     let bits = |vertex: usize| {
         let [x, y, z] = positions[vertex].to_array().map(f32::to_bits);
         (x, y, z)
     };
-    // The first vertex of each point; its number is in `points`.
+    // First vertices of points.
     let mut table: HashTable<u32> = HashTable::with_capacity(positions.len());
     let mut points = Vec::with_capacity(positions.len());
     let mut count = 0;
@@ -220,12 +215,12 @@ mod tests {
 
     #[test]
     fn repeated_triangles_are_found() {
-        // Vertex 4 is where vertex 0 is.
+        // Vertex 4 is at vertex 0.
         let triangles = [[0, 1, 2], [0, 2, 3], [1, 2, 4], [2, 0, 1], [3, 0, 2]];
         assert_eq!(odd(&triangles, &[]), (0, 0, vec![2, 3, 4]));
-        // Of another group is another one: three triangles at two edges, three of one group and one more at the third.
+        // In different groups they are not duplicates: two edges with three triangles, and one with four.
         assert_eq!(odd(&triangles, &[0, 1, 1, 0, 1]), (1, 2, vec![3, 4]));
-        // And so is one that looks the other way.
+        // With opposite winding they are not duplicates.
         assert_eq!(odd(&[[0, 1, 2], [2, 1, 0], [1, 2, 0]], &[]), (0, 0, vec![2]));
     }
 

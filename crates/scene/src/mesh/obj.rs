@@ -1,7 +1,8 @@
-//! Wavefront OBJ files: Wavefront Technologies, "Advanced Visualizer Manual", appendix B, 1995.
+//! Wavefront OBJ files (Wavefront Technologies, "Advanced Visualizer Manual", appendix B, 1995), without smoothing
+//! groups (`s`).
 //!
-//! Not by `tobj` 4, which joins no lines at a backslash, tells no lines in its errors, and takes 0.6 s for a million
-//! triangles; a whole load takes 0.25 s here. Smoothing groups (`s`) are ignored.
+//! The crate `tobj` 4 does not join lines at backslashes, reports no lines, and takes 0.6 s for a million triangles; a
+//! whole load takes 0.25 s here.
 
 use std::collections::{BTreeMap, HashMap};
 use std::hash::BuildHasher;
@@ -16,20 +17,18 @@ use super::{Group, MOST};
 use super::{damage, words};
 use wgray_image::color::srgb_to_linear;
 
-/// No number of a vertex.
+/// Missing index of a vertex attribute.
 const NONE: u32 = u32::MAX;
-/// How many unknown keywords are told apart.
+/// Maximum number of unknown keywords counted.
 const MOST_KEYWORDS: usize = 100;
-/// How many lines may name files of materials, and how many names of a line are looked at.
+/// Maximum number of `mtllib` lines, and of names per line.
 pub(super) const MOST_LIBRARIES: usize = 100;
 
-/// A mesh, and the names of its files of materials.
 pub(super) struct Obj {
     pub draft: Draft,
     pub libraries: Vec<String>,
 }
 
-/// Reads a file. Normals are kept if they are wanted.
 pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Obj, Fault> {
     let mut words = Words::new(bytes);
     let mut reader = Reader {
@@ -49,17 +48,17 @@ struct Reader {
     positions: Vec<DVec3>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
-    /// For each position, or empty where no vertex has a color.
+    /// Colour of each position, or empty.
     colors: Vec<Vec4>,
     vertices: Vertices,
-    /// The corners of the face that is being read.
+    /// Corners of the current face.
     corners: Vec<[u32; 3]>,
     face: Vec<u32>,
     draft: Draft,
     numbers: HashMap<Group, u32>,
-    /// The group of what follows.
+    /// Group of the following faces.
     group: Group,
-    /// Whether `group` is not yet begun.
+    /// `group` has not been started.
     is_new: bool,
     libraries: Vec<String>,
     unknown: BTreeMap<String, usize>,
@@ -150,7 +149,7 @@ impl Reader {
         self.draft.face(&self.face, words.place())
     }
 
-    /// Reads the color that follows a position. It is sRGB, as MeshLab and Blender write it.
+    /// Reads the colour after a position, in sRGB as MeshLab and Blender write it.
     fn color(&mut self, words: &mut Words) {
         let mut values = [0.0; 3];
         let mut count = 0;
@@ -160,7 +159,7 @@ impl Reader {
             }
             count += 1;
         }
-        // One number is a weight, and a fourth one behind three is an opacity that no viewer shows.
+        // One number is a weight; viewers ignore a fourth one, opacity.
         if count < 3 {
             if !self.colors.is_empty() {
                 self.colors.push(Vec4::ONE);
@@ -179,7 +178,6 @@ impl Reader {
         self.colors.push(color);
     }
 
-    /// Begins the group of what follows.
     fn begin(&mut self) {
         let next = self.draft.groups.len() as u32;
         let number = match self.numbers.get(&self.group) {
@@ -194,7 +192,7 @@ impl Reader {
         self.is_new = false;
     }
 
-    /// Returns the position, texture coordinates and normal of a corner. The error is the value and the rule.
+    /// Returns the position, texture coordinate and normal indices of a corner. The error is the value and the rule.
     #[inline]
     fn corner(&mut self, word: &[u8], place: Place) -> Result<[u32; 3], String> {
         let mut parts = [&word[..0]; 3];
@@ -282,7 +280,7 @@ fn numbers(words: &mut Words) -> Result<DVec3, Fault> {
 
 fn uv(words: &mut Words) -> Result<Vec2, Fault> {
     let u = words.number("u")?;
-    // A texture may be a line, then v is left out.
+    // v is optional (1D textures).
     let v = match words.on_line() {
         Some(word) => words::number(word).ok_or_else(|| words.fault(format!("v: {} must be a number", shown(word))))?,
         None => 0.0,
@@ -298,7 +296,7 @@ fn has_room(count: usize, words: &Words) -> Result<(), Fault> {
     }
 }
 
-/// The number, from 0 on, that a part of a corner is, among `count` lines above; None if it is no number.
+/// Parses an index among `count` elements, returned from 0; `None` if not an integer.
 #[inline]
 fn index(part: &[u8], count: usize, what: &str) -> Option<Result<u32, String>> {
     let (is_negative, digits) = match part {
@@ -315,7 +313,7 @@ fn index(part: &[u8], count: usize, what: &str) -> Option<Result<u32, String>> {
         }
         n = n.saturating_mul(10).saturating_add(usize::from(digit - b'0'));
     }
-    // From 1 to `count`, forwards or backwards.
+    // 1 to `count`, in either direction.
     let found = n.wrapping_sub(1) < count;
     Some(match (found, is_negative) {
         (true, false) => Ok((n - 1) as u32),
@@ -337,19 +335,16 @@ fn no_corner(word: &[u8]) -> String {
     format!("{} must be a corner of a face: v, v/t, v//n or v/t/n", shown(word))
 }
 
-/// The vertices: one for each different corner.
 #[derive(Default)]
 struct Vertices {
     corners: Vec<[u32; 3]>,
-    /// For each position, the first vertex there.
+    /// First vertex of each position.
     first: Vec<u32>,
-    /// All other vertices.
     others: HashTable<u32>,
     hasher: DefaultHashBuilder,
 }
 
 impl Vertices {
-    /// The number of the vertex with this corner.
     #[inline]
     fn number(&mut self, corner: [u32; 3]) -> u32 {
         let next = self.corners.len() as u32;

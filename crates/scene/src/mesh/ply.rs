@@ -1,6 +1,6 @@
-//! PLY files: Greg Turk, "The PLY Polygon File Format", 1994; ASCII, and binary of either byte order.
+//! PLY files (Greg Turk, "The PLY Polygon File Format", 1994), ASCII or binary.
 //!
-//! Not by `ply-rs-bw` 4, which makes a map of every row: a million triangles take it more than 1 s, and a whole load takes
+//! The crate `ply-rs-bw` 4 builds a map per row and takes more than 1 s for a million triangles; a whole load takes
 //! 0.15 s here.
 
 mod header;
@@ -17,14 +17,13 @@ use super::words::Words;
 use super::{Group, MOST};
 use wgray_image::color::srgb_to_linear;
 
-/// Reads a file. Normals are kept if they are wanted.
 pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
     let mut words = Words::new(bytes);
     let mut damages = Damages::default();
     let header = header(&mut words, &mut damages)?;
     match header.format {
         Format::Ascii => {
-            // As other readers do; unless a line must have several rows.
+            // One row per line as in other readers, unless lines are too few.
             let by_lines = words.lines_left() as u128 >= header.rows();
             body(&header, Ascii { words, by_lines }, normals_wanted, damages)
         }
@@ -54,7 +53,7 @@ fn body(header: &Header, mut values: impl Values, normals_wanted: bool, damages:
     };
     draft.groups.push(Group::default());
     draft.begin(0);
-    // A name that stands there twice is skipped the second time.
+    // Repeated elements are skipped.
     let (mut seen_vertices, mut seen_faces) = (false, false);
     for element in &header.elements {
         check_size(element, &values)?;
@@ -66,7 +65,7 @@ fn body(header: &Header, mut values: impl Values, normals_wanted: bool, damages:
                 read_faces(element, &mut values, vertices.count, &mut draft)?
             }
             _ => {
-                // An element without properties has no bytes.
+                // Rows without properties have no values.
                 let rows = if element.properties.is_empty() {
                     0
                 } else {
@@ -85,7 +84,7 @@ fn body(header: &Header, mut values: impl Values, normals_wanted: bool, damages:
     Ok(draft)
 }
 
-/// Refuses counts that the rest of the file has no bytes for.
+/// Rejects counts beyond the rest of the file.
 fn check_size(element: &Element, values: &impl Values) -> Result<(), Fault> {
     let fewest = |property: &Property| values.fewest_bytes(property.count.unwrap_or(property.scalar));
     let row = element.properties.iter().map(fewest).sum::<usize>();
@@ -101,7 +100,7 @@ fn check_size(element: &Element, values: &impl Values) -> Result<(), Fault> {
     }
 }
 
-/// Ends a row, whose line may have values that the header does not declare.
+/// Ends a row; extra values on its line are damage.
 #[inline]
 fn end_row(values: &mut impl Values, draft: &mut Draft) {
     if let Some(place) = values.end_row() {
@@ -122,7 +121,7 @@ fn skip(property: &Property, values: &mut impl Values) -> Result<(), Fault> {
 fn list_length(count: Scalar, property: &Property, values: &mut impl Values) -> Result<usize, Fault> {
     let place = values.place();
     let length = values.next(count)?;
-    // No file has more than 2^52 values.
+    // Larger than any file.
     match length >= 0.0 && length.fract() == 0.0 && length < (1u64 << 52) as f64 {
         true => Ok(length as usize),
         false => Err(place.fault(format!(
@@ -133,7 +132,7 @@ fn list_length(count: Scalar, property: &Property, values: &mut impl Values) -> 
     }
 }
 
-/// The names of the columns of a vertex: position, normal, texture coordinates, colour.
+/// Property names by column: position, normal, texture coordinates, colour.
 const COLUMNS: [&[&str]; 12] = [
     &["x"],
     &["y"],
@@ -149,8 +148,8 @@ const COLUMNS: [&[&str]; 12] = [
     &["alpha"],
 ];
 
-/// What a value of a colour is as linear light, or as opacity: whole numbers reach from 0 to the largest of their type, by the curve of
-/// IEC 61966-2-1 but for opacity; floats are what they are.
+/// Converts a colour component to linear RGB or opacity. Integers are normalized sRGB (IEC 61966-2-1), except for
+/// linear opacity; floats are unchanged.
 fn color_value(value: f64, scalar: Scalar, is_opacity: bool) -> f32 {
     let Some(largest) = scalar.largest() else {
         return value as f32;
@@ -168,7 +167,7 @@ fn read_vertices(
     normals_wanted: bool,
     draft: &mut Draft,
 ) -> Result<(), Fault> {
-    // For each property the column that it is, and for each column whether it is there.
+    // Column of each property, and presence of each column.
     let mut has = [false; 12];
     let columns: Vec<Option<usize>> = element
         .properties

@@ -1,7 +1,7 @@
-//! STL files: 3D Systems, "StereoLithography Interface Specification", 1989. Facets are turned into shared vertices.
+//! STL files (3D Systems, "StereoLithography Interface Specification", 1989), with merged vertices.
 //!
-//! Not by `stl_io` 0.11, which reads one solid of a text, tells no lines, and takes every file that begins with `solid`
-//! for a text. A million triangles take it 0.3 s, and a whole load takes 0.4 s here.
+//! The crate `stl_io` 0.11 reads one solid of a text, reports no lines, and takes every file that begins with `solid`
+//! for text. It takes 0.3 s for a million triangles; a whole load takes 0.4 s here.
 
 use std::hash::BuildHasher;
 
@@ -14,11 +14,10 @@ use super::draft::{Draft, coordinate, counted, unit};
 use super::error::{Fault, Place, shown};
 use super::words::Words;
 
-/// Bytes in front of the triangles of a binary file, the last four their count, and bytes of one triangle.
+/// Sizes in bytes: the binary header, which ends with the triangle count, and a triangle.
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
-/// Reads a file. The facets' normals are kept if they are wanted.
 pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
     let count = bytes
         .get(HEADER - 4..HEADER)
@@ -32,7 +31,7 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
         ..Facets::default()
     };
     match size {
-        // The size tells, as binary files may begin with "solid" too.
+        // By size, as binary files may begin with "solid" too.
         Some(size) if size == bytes.len() as u64 || (!is_text && size < bytes.len() as u64) => {
             binary(&bytes[HEADER..size as usize], &mut facets)?;
             let more = bytes.len() as u64 - size;
@@ -67,7 +66,7 @@ fn binary(bytes: &[u8], facets: &mut Facets) -> Result<(), Fault> {
     facets.draft.begin(0);
     let count = bytes.len() / TRIANGLE;
     facets.draft.triangles.reserve(count);
-    // Closed meshes have half as many vertices as triangles.
+    // Closed meshes have half as many vertices.
     facets.draft.positions.reserve(count / 2);
     facets.vertices = HashTable::with_capacity(count / 2);
     for (i, bytes) in bytes.chunks_exact(TRIANGLE).enumerate() {
@@ -140,7 +139,7 @@ fn expect(words: &mut Words, keyword: &str) -> Result<(), Fault> {
     }
 }
 
-/// Triangles whose vertices are shared where their bits are equal.
+/// Triangles with shared, bitwise equal vertices.
 #[derive(Default)]
 struct Facets {
     normals_wanted: bool,
@@ -150,7 +149,7 @@ struct Facets {
 }
 
 impl Facets {
-    /// Returns a vertex, or NaN for a facet to be left out. The fault is made of the axis and the rule.
+    /// Returns a vertex; NaN skips the facet. `fault` gets the axis and the rule.
     fn position(&mut self, p: DVec3, fault: impl FnOnce(usize, String) -> Fault) -> DVec3 {
         for axis in 0..3 {
             if let Err(rule) = coordinate(p[axis]) {
@@ -158,7 +157,7 @@ impl Facets {
                 return DVec3::NAN;
             }
         }
-        p + DVec3::ZERO // a zero has no sign, so that equal positions have equal bits
+        p + DVec3::ZERO // -0 becomes +0, so that equal positions have equal bits
     }
 
     fn push(&mut self, normal: DVec3, vertices: [DVec3; 3], place: Place) -> Result<(), Fault> {
@@ -170,7 +169,6 @@ impl Facets {
         self.draft.face(&triangle, place)
     }
 
-    /// The number of the vertex with this position and normal.
     fn number(&mut self, position: DVec3, normal: Vec3) -> u32 {
         let Draft { positions, normals, .. } = &mut self.draft;
         let bits = |p: DVec3, n: Vec3| {

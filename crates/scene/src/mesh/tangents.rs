@@ -1,10 +1,9 @@
-//! The tangents of a smooth mesh's vertices, for its normal maps: along which directions its texture coordinates grow.
+//! Vertex tangents for normal maps of smooth meshes.
 //!
-//! Those of a triangle are the derivatives of its position by u and by v. A vertex has the mean of its triangles', each in the
-//! plane of the vertex's normal, without its length, and weighted by the triangle's angle there: Mikkelsen, "Simulation of
-//! Wrinkled Surfaces Revisited", University of Copenhagen, 2008, whose tangents (MikkTSpace) glTF prescribes. Unlike there, the
-//! derivative by v is kept too, so that a texture may be turned on a surface where the two are not at right angles.
-//! Tangents that the mesh has of its own stand as they are.
+//! The tangents of a triangle are the derivatives of its position by u and v. A vertex has the mean of its triangles',
+//! projected to the plane of its normal, jointly normalized and weighted by angle (Mikkelsen, "Simulation of Wrinkled
+//! Surfaces Revisited", University of Copenhagen, 2008; MikkTSpace of glTF). Unlike there, the derivative by v is
+//! kept, so that textures can be rotated where the two are not perpendicular. Tangents of the mesh are used unchanged.
 
 use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
@@ -12,39 +11,37 @@ use rayon::prelude::*;
 use super::Mesh;
 use super::neighbours::Neighbours;
 
-/// Of more vertices at one point none are joined, as each would be compared with each.
+/// Maximum number of vertices at a point to join, which compares all pairs.
 const MOST_JOINED: usize = 64;
-/// The cosine of the largest angle between normals that count as one: 1 degree.
+/// Cosine of the maximum angle between equal normals: 1 degree.
 const ONE_NORMAL: f64 = 0.9998;
-/// The cosine of the largest angle between tangents that are joined: 60 degrees.
+/// Cosine of the maximum angle between joined tangents: 60 degrees.
 const ONE_DIRECTION: f64 = 0.5;
-/// By how much texture coordinates that differ by whole numbers may be off, as files round them.
+/// Tolerance of integer offsets between texture coordinates, which files round.
 const WHOLE: f64 = 1e-4;
 
-/// The tangents of a mesh's vertices. No vertex has triangles of both hands, those whose texture is seen from its front and
-/// those that mirror it.
+/// Tangents of a mesh, whose vertices are split between triangles with plain and with mirrored texture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VertexTangents {
-    /// The mesh's triangles; of a vertex that has triangles of both hands, those that mirror have its copy.
+    /// Triangles; mirrored ones use the copies.
     pub triangles: Vec<[u32; 3]>,
-    /// The vertices that are copied; the copies are numbered after all vertices.
+    /// Originals of the copies, which are numbered after all vertices.
     pub copies: Vec<u32>,
-    /// The tangents of each vertex, and of each copy.
+    /// Tangents of vertices, then copies.
     pub tangents: Vec<Tangents>,
 }
 
-/// Derivatives of the position by u and v, up to a common factor: the sum of their squares is 1. They are zero where the
-/// triangles have none, or where those cancel.
+/// Derivatives of the position, scaled to a sum of squares of 1; zero if undefined.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tangents {
-    /// By u.
+    /// Derivative by u.
     pub u: Vec3,
-    /// By v.
+    /// Derivative by v.
     pub v: Vec3,
 }
 
 impl VertexTangents {
-    /// None if the mesh has no texture coordinates, or is flat.
+    /// Returns `None` if the mesh is flat or lacks texture coordinates.
     pub fn of(mesh: &Mesh) -> Option<VertexTangents> {
         if mesh.uvs.is_empty() || mesh.normals.is_empty() {
             return None;
@@ -72,7 +69,7 @@ impl VertexTangents {
     }
 }
 
-/// The tangents that a mesh has itself at a vertex with this normal, as glTF has them (glTF 2.0, 3.7.2.1); None where it has none.
+/// Converts a glTF tangent (glTF 2.0, 3.7.2.1); `None` if zero.
 fn given(tangent: Vec4, normal: Vec3) -> Option<Tangents> {
     let u = tangent.truncate().as_dvec3().try_normalize()?;
     let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
@@ -84,12 +81,12 @@ fn given(tangent: Vec4, normal: Vec3) -> Option<Tangents> {
     })
 }
 
-/// Twice the area of a triangle in texture coordinates, negative where the texture is mirrored.
+/// Returns twice the area in texture space, negative if mirrored.
 fn texture_area([a, b, c]: [DVec2; 3]) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
-/// The triangles such that no vertex has some of both hands, and the vertices that are copied for that.
+/// Splits vertices of plain and mirrored triangles. Returns the triangles, and the originals of copies.
 fn parted(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
     const PLAIN: u8 = 1;
     const MIRRORED: u8 = 2;
@@ -123,7 +120,7 @@ fn parted(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
     (triangles, copies)
 }
 
-/// What the triangles at a vertex add up to.
+/// Sum over a vertex's triangles.
 #[derive(Clone, Copy, Debug)]
 struct Sum {
     vertex: u32,
@@ -131,7 +128,7 @@ struct Sum {
     normal: DVec3,
     u: DVec3,
     v: DVec3,
-    /// The sums of the lengths of what was added to `u` and `v`.
+    /// Sums of the lengths added to `u` and `v`.
     lengths: DVec2,
 }
 
@@ -145,8 +142,8 @@ impl Sum {
         }
     }
 
-    /// Whether a texture that repeats goes on from one vertex to another at the same point, as where u goes from 1 to 0 around
-    /// a sphere. Where pieces of an atlas meet, each keeps its own tangents, as MikkTSpace has them: maps are made with those.
+    /// Returns true if a repeating texture is continuous between two vertices at a point, as where u jumps from 1 to 0
+    /// on a sphere. Atlas charts keep their own tangents as in MikkTSpace, which normal maps are baked with.
     fn goes_on_in(&self, other: &Sum) -> bool {
         let apart = self.uv - other.uv;
         let repeats = (apart - apart.round()).abs().max_element() < WHOLE;
@@ -168,7 +165,7 @@ impl Sum {
     }
 }
 
-/// What a triangle adds at its corner k; nothing if its texture coordinates have no area.
+/// Returns the contribution of corner k; `None` without texture area.
 fn at_corner(mesh: &Mesh, triangle: [u32; 3], k: usize, vertex: u32) -> Option<Sum> {
     let corners = [0, 1, 2].map(|i| triangle[(k + i) % 3] as usize);
     let [p, next, previous] = corners.map(|corner| mesh.positions[corner].as_dvec3());
@@ -192,7 +189,6 @@ fn at_corner(mesh: &Mesh, triangle: [u32; 3], k: usize, vertex: u32) -> Option<S
     })
 }
 
-/// The tangents of the vertices at a point.
 fn at_point(mesh: &Mesh, triangles: &[[u32; 3]], neighbours: &Neighbours, point: usize) -> Vec<(u32, Tangents)> {
     let at_triangle = |i: &u32| {
         let triangle = mesh.triangles[*i as usize];
@@ -220,7 +216,7 @@ mod tests {
 
     use super::*;
 
-    /// A mesh in the plane of x and y, with texture coordinates by its points.
+    /// A mesh in the xy plane.
     fn plane(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, uv: impl Fn(Vec3) -> Vec2) -> Mesh {
         Mesh {
             uvs: positions.iter().copied().map(uv).collect(),
@@ -231,7 +227,7 @@ mod tests {
         }
     }
 
-    /// Two triangles that share a corner alone.
+    /// Two triangles with one shared corner.
     fn bow(uv: impl Fn(Vec3) -> Vec2) -> Mesh {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y];
         plane(positions, vec![[0, 1, 2], [0, 3, 4]], uv)
@@ -250,7 +246,7 @@ mod tests {
 
     #[test]
     fn neither_size_nor_number_of_triangles_counts() {
-        // To the left of the origin, where x is negative, the texture lies in another direction.
+        // The texture direction changes at x = 0.
         let at_origin = |rim: &[Vec3]| {
             let positions: Vec<Vec3> = [Vec3::ZERO].iter().chain(rim).copied().collect();
             let triangles = (1..rim.len() as u32).map(|i| [0, i, i + 1]).collect();
@@ -278,7 +274,7 @@ mod tests {
 
     #[test]
     fn tangents_that_cancel_are_zero() {
-        // The texture is turned by half a turn on the second triangle.
+        // The texture of the second triangle is rotated by 180 degrees.
         let mesh = bow(|p| p.truncate().abs());
         let found = VertexTangents::of(&mesh).unwrap().tangents;
         assert_eq!(found[0], Tangents::default());
@@ -296,7 +292,7 @@ mod tests {
 
     #[test]
     fn where_very_many_vertices_meet_each_is_by_itself() {
-        // A disk whose triangles have a middle each.
+        // A disk of triangles with separate centre vertices.
         let at_middle = |count: u32| {
             let rim = |i: u32| Vec2::from_angle(std::f32::consts::TAU * i as f32 / count as f32).extend(0.0);
             let positions = (0..2 * count).map(|i| if i < count { rim(i) } else { Vec3::ZERO });
@@ -308,7 +304,7 @@ mod tests {
                 .u
                 .normalize()
         };
-        // The texture is bent: the first triangle's own direction is another one than the mean.
+        // A bent texture: the first triangle's direction is not the mean.
         assert!(at_middle(64).y.abs() < 0.01);
         assert!(at_middle(65).y.abs() > 0.05);
     }

@@ -1,10 +1,10 @@
-//! The words of a text file, with the lines that they stand in.
+//! Tokenizer of text formats: words and their lines.
 
 use std::borrow::Cow;
 
 use super::error::{Fault, Place, shown};
 
-/// Returns a text as UTF-8: one that begins with the byte order mark of UTF-16 is converted.
+/// Returns UTF-8, converted from UTF-16 with a byte order mark.
 pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     let unit: fn([u8; 2]) -> u16 = match bytes {
         [0xfe, 0xff, ..] => u16::from_be_bytes,
@@ -17,20 +17,20 @@ pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text.into_bytes())
 }
 
-/// A text as words between blanks. `#` in front of a word makes the rest of the line a comment; a backslash at the end of a
-/// line joins it with the next one, and is nothing at the end of the text.
+/// Words between blanks. `#` at the start of a word begins a comment. A backslash at the end of a line joins it with
+/// the next one.
 pub(super) struct Words<'a> {
     bytes: &'a [u8],
     at: usize,
     line: usize,
-    /// The last byte of a line.
+    /// Line terminator.
     end: u8,
 }
 
 impl<'a> Words<'a> {
     pub fn new(bytes: &'a [u8]) -> Words<'a> {
-        let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 }; // the mark of UTF-8
-        // A text without line feeds has lines as on old Macs, if it has any.
+        let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 }; // UTF-8 byte order mark
+        // Old Mac text has carriage returns only.
         let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
         Words {
             bytes,
@@ -40,13 +40,12 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// The next word of the line, if there is another one.
     #[inline]
     pub fn on_line(&mut self) -> Option<&'a [u8]> {
         self.find_word().then(|| self.take_word())
     }
 
-    /// Goes to the next word of the line; false at its end.
+    /// Advances to the next word of the line; false if none.
     #[inline]
     fn find_word(&mut self) -> bool {
         loop {
@@ -81,7 +80,7 @@ impl<'a> Words<'a> {
         &self.bytes[start..self.at]
     }
 
-    /// Where the next line begins, if the backslash here is the last of its line.
+    /// Returns the start of the next line, if joined by this backslash.
     fn joined(&self, backslash: usize) -> Option<usize> {
         match self.bytes[backslash + 1..] {
             [] => Some(backslash + 1),
@@ -91,13 +90,12 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// The next word of the file, if there is another one.
     #[inline]
     pub fn anywhere(&mut self) -> Option<&'a [u8]> {
         self.find_word_anywhere().then(|| self.take_word())
     }
 
-    /// Goes to the next word of the file; false at its end.
+    /// Advances to the next word; false at the end.
     #[inline]
     pub fn find_word_anywhere(&mut self) -> bool {
         while !self.find_word() {
@@ -108,7 +106,7 @@ impl<'a> Words<'a> {
         true
     }
 
-    /// The rest of the line as a name: its words with one blank between them. Names may have `#`.
+    /// Returns the rest of the line, single-spaced. Names may contain `#`.
     pub fn name(&mut self) -> String {
         let mut name = String::new();
         loop {
@@ -124,14 +122,14 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Goes to the next line; false at the end of the file.
+    /// Advances to the next line; false at the end of the file.
     #[inline]
     pub fn next_line(&mut self) -> bool {
         while self.on_line().is_some() {}
         self.skip_line()
     }
 
-    /// Goes to the next line, whatever this one ends with.
+    /// Advances to the next line, ignoring a backslash.
     pub fn skip_line(&mut self) -> bool {
         let rest = &self.bytes[self.at..];
         match rest.iter().position(|byte| *byte == self.end) {
@@ -147,20 +145,20 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Goes to the end of the line. Returns whether there was another word.
+    /// Advances to the end of the line; returns true if words were skipped.
     pub fn skip_rest(&mut self) -> bool {
         let has_more = self.on_line().is_some();
         while self.on_line().is_some() {}
         has_more
     }
 
-    /// Returns the number of lines that are left and have a character that is not a blank.
+    /// Returns the number of non-blank lines left.
     pub fn lines_left(&self) -> usize {
         let lines = self.bytes[self.at..].split(|byte| *byte == self.end);
         lines.filter(|line| line.iter().any(|byte| *byte > b' ')).count()
     }
 
-    /// The next number of the line.
+    /// Reads a number. `what` names it in errors.
     #[inline]
     pub fn number(&mut self, what: &str) -> Result<f64, Fault> {
         match self.on_line() {
@@ -169,12 +167,12 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// How many bytes have been read.
+    /// Returns the number of bytes read.
     pub fn offset(&self) -> usize {
         self.at
     }
 
-    /// How many bytes are left.
+    /// Returns the number of bytes left.
     pub fn left(&self) -> usize {
         self.bytes.len() - self.at
     }
@@ -183,7 +181,6 @@ impl<'a> Words<'a> {
         Place::Line(self.line)
     }
 
-    /// The line, counted from 1.
     pub fn line(&self) -> usize {
         self.line
     }
@@ -193,7 +190,6 @@ impl<'a> Words<'a> {
     }
 }
 
-/// The number that a word is.
 #[inline]
 pub(super) fn number(word: &[u8]) -> Option<f64> {
     std::str::from_utf8(word).ok()?.parse().ok()
@@ -232,7 +228,7 @@ mod tests {
         assert_eq!(lines("a  b\t\r\n\n c"), [line(1, "a b"), line(3, "c")]);
         assert_eq!(lines("\u{feff}a\n"), [line(1, "a")]);
         assert_eq!(lines("\n\n"), []);
-        // Lines as on old Macs.
+        // Line terminators of old Macs.
         assert_eq!(lines("a b\r\rc # d\re"), [line(1, "a b"), line(3, "c"), line(4, "e")]);
         assert_eq!(lines("a\rb\n"), [line(1, "a b")]);
     }

@@ -1,4 +1,4 @@
-//! Reading again what a small change of a scene file's text touches: of a hundred thousand shapes one.
+//! Incremental parsing after a small change of a scene file, such as one of 100,000 shapes.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -14,8 +14,7 @@ use crate::problem::At;
 use crate::{CameraDescription, Description};
 
 impl Description {
-    /// What a text says after a change inside of the table at the first two steps of a path; `before` is what it said.
-    /// `None` if all of it has to be read.
+    /// Parses a text after a change of the table at the first two segments of a path; `before` is the state before. Returns `None` if the whole text must be parsed.
     pub(crate) fn parse_change(
         text: &str,
         origin: &str,
@@ -48,7 +47,7 @@ impl Description {
         }
     }
 
-    /// The camera that a text describes, without other values.
+    /// Returns the camera of a text, without overrides.
     pub fn parse_camera(text: &str, origin: &str) -> Result<CameraDescription, SceneError> {
         let parts = Parts::of(text);
         let rest = parts.read_rest().map_err(|broken| broken.into_error(text, origin))?;
@@ -62,28 +61,26 @@ impl Description {
     }
 }
 
-/// What was read again of a text.
+/// The result of incremental parsing.
 pub struct Change {
-    /// What the text says.
     pub description: Description,
-    /// Whether that was read again which is outside of the parts.
+    /// True if the text outside of the parts was parsed again.
     pub is_rest: bool,
-    /// Where the parts are.
     pub places: Places,
 }
 
-/// Where the parts of a text are, once it has been looked through.
+/// Locations of the parts of a text.
 #[derive(Debug)]
 pub struct Places(Vec<Part>);
 
 impl Places {
-    /// Those of a text.
+    /// Finds the parts of a text.
     pub fn of(text: &str) -> Places {
         Places(Parts::of(text).parts.into_owned())
     }
 }
 
-/// The description after a change in one of the parts; `None` if that is no table by itself.
+/// Parses a changed part. Returns `None` if it is not a standalone table.
 fn read_changed_part(
     parts: &Parts,
     part: &Part,
@@ -115,12 +112,11 @@ fn read_changed_part(
     Ok(done)
 }
 
-/// Puts what a table says in place of what was there.
 fn replace<T>(place: Option<&mut T>, table: Table, read: fn(Table) -> Read<T>) -> Option<Read<()>> {
     place.map(|place| read(table).map(|new| *place = new))
 }
 
-/// The description after a change outside of the parts; `None` if kinds of them are there too.
+/// Parses a change outside of the parts. Returns `None` if it contains elements of parts.
 fn read_changed_rest(
     parts: &Parts,
     defines: &mut Defines,
@@ -142,17 +138,16 @@ fn read_changed_rest(
     })))
 }
 
-/// A part of a text that is a document by itself: a table with a header of its own, or all that is outside of such tables.
+/// A standalone part of a text: a table with its header, or everything outside of such tables.
 pub struct Piece<'a> {
-    /// Its text.
     pub text: Cow<'a, str>,
-    /// The way in it to what was asked for.
+    /// Path in the piece of the requested value.
     pub path: KeyPath,
     place: Result<usize, Rest>,
 }
 
 impl Piece<'_> {
-    /// Where a byte of it is in the whole text.
+    /// Returns the offset of a byte in the whole text.
     pub fn place(&self, at: usize) -> usize {
         match &self.place {
             Ok(start) => start + at,
@@ -165,23 +160,23 @@ impl Piece<'_> {
 pub struct Pieces<'a>(Parts<'a>);
 
 impl<'a> Pieces<'a> {
-    /// Those of a text.
+    /// Finds the pieces of a text.
     pub fn of(text: &'a str) -> Pieces<'a> {
         Pieces(Parts::of(text))
     }
 
-    /// Those of a text whose parts are known.
+    /// Returns the pieces of a text whose parts are known.
     pub fn known(text: &'a str, places: &'a Places) -> Pieces<'a> {
         let parts = places.0.as_slice().into();
         Pieces(Parts { text, parts })
     }
 
-    /// The whole text.
+    /// Returns the whole text.
     pub fn whole(&self) -> &'a str {
         self.0.text
     }
 
-    /// The piece that a path leads into.
+    /// Returns the piece that contains a path.
     pub fn find(&self, path: &KeyPath) -> Piece<'a> {
         match self.0.find(path) {
             Some((part, path)) => Piece {

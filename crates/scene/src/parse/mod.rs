@@ -234,7 +234,7 @@ fn read_sections(file: Table) -> Result<(Sections, Result<(), Problems>), Proble
     }
 }
 
-/// Adds the section that has a key to the problem of this key outside of a section.
+/// Adds the name of the section to the problem of a key outside of sections.
 fn with_section(problem: Problem) -> Problem {
     let [Segment::Key(key)] = problem.key.0.as_slice() else {
         return problem;
@@ -260,7 +260,6 @@ fn with_section(problem: Problem) -> Problem {
     }
 }
 
-/// Returns true if a section has a key.
 fn has_key<T: DeserializeOwned>(name: &str) -> bool {
     let table = Table::from_iter([(name.to_owned(), Value::from(0))]);
     // An unknown key is reported before a missing one and a wrong type.
@@ -403,7 +402,6 @@ fn read_list<T>(tables: Vec<Table>, read: fn(Table) -> Read<T>) -> Result<Vec<T>
     found.end(all)
 }
 
-/// Parses a table with the key `type`.
 fn tagged<T: Tagged>(table: Table) -> Read<T> {
     read_tagged(table, None)
 }
@@ -485,7 +483,6 @@ fn explains(other: &[Segment], missing: &[Segment]) -> bool {
     other.starts_with(missing) || other.split_last().is_some_and(|(_, others)| others == table)
 }
 
-/// Returns the value at a path.
 fn find<'a>(table: &'a Table, path: &[Segment]) -> Option<&'a Value> {
     let (Segment::Key(key), path) = path.split_first()? else {
         return None;
@@ -520,8 +517,7 @@ fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
 
-/// Returns an error that lists the allowed names. For values other than strings serde does not list them, so the value is replaced by a
-/// string and parsed again.
+/// Returns an error that lists the allowed names. serde only lists them for strings, so the value is replaced by one and parsed again.
 fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
     if !error.inner().message().ends_with(NAMES_EXPECTED) {
         return error;
@@ -619,7 +615,6 @@ fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator
     }
 }
 
-/// Converts the segments of serde's path.
 pub fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
     use serde_path_to_error::Segment as Step;
     let steps = path.iter().filter_map(|segment| match segment {

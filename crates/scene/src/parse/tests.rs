@@ -1,4 +1,4 @@
-//! What is told of bad text, and the page that describes the format.
+//! Tests of the errors of invalid text, and of the page on the format.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::*;
 
 const PAGE: &str = include_str!("../../../../docs/scene-format.md");
 
-/// A text that is one of a scene but for what stands at its end.
+/// The start of a valid text.
 const START: &str = "\
 [image]
 width = 4
@@ -28,7 +28,7 @@ fn message(text: &str) -> String {
 #[test]
 fn bad_text_is_told_with_its_line() {
     Scene::parse(START, "s.toml").unwrap();
-    // What is added, the line in it, and what is told.
+    // The appended text, the line of the error in it, and the message.
     for (added, line, told) in [
         (
             "far = 3",
@@ -327,7 +327,7 @@ fn the_example_of_the_page_is_a_scene() {
     assert_eq!(scene.shapes.len(), 1);
 }
 
-/// The part of the page under a heading, without its subsections.
+/// Returns the section of the page under a heading, without its subsections.
 fn section(heading: &str) -> &'static str {
     let (_, rest) = PAGE
         .split_once(&format!("\n{heading}\n"))
@@ -335,15 +335,15 @@ fn section(heading: &str) -> &'static str {
     rest.split("\n#").next().unwrap()
 }
 
-/// The names, with their quotes, that the first column of a section's tables has.
+/// Returns the names, including quotes, in the first column of a section's tables.
 fn rows(heading: &str) -> Vec<&'static str> {
     let lines = section(heading).lines();
     let names = lines.filter_map(|line| Some(line.strip_prefix("| `")?.split_once('`')?.0));
     names.collect()
 }
 
-/// Whether the page has a row for every key that is allowed at the end of the text, and for no other: an
-/// unknown key there makes the reader list them.
+/// Checks that the page has rows for exactly the keys that are allowed at the end of the text: the error of an unknown
+/// key lists them.
 fn check_keys(text: &str, heading: &str) {
     let message = message(&format!("{text}\n'?' = 1"));
     let (_, keys) = message
@@ -394,7 +394,7 @@ fn the_page_has_the_defaults_of_a_render() {
         .filter(|(_, default)| default != "none")
         .map(|(key, default)| format!("{key} = {default}\n"))
         .collect();
-    // Those of paths alone are no values of a description, which says nothing of them.
+    // Keys of the path integrator have no value in the default description.
     let (text, of_paths) = text.split_at(text.find("rr_depth").unwrap());
     let written: RenderDescription = toml::from_str(text).unwrap();
     assert_eq!(written, RenderDescription::default());

@@ -1,5 +1,4 @@
-//! The values of an object of a scene file that can be changed one by one, as the schema tells them: of what kind each is, its
-//! unit, its range, and what stands for it where it is absent.
+//! Editable values of an object of a scene file, with kind, unit, range and default from the schema.
 
 use std::sync::OnceLock;
 
@@ -11,63 +10,63 @@ use super::{SPLIT, definition, of_files};
 use crate::CameraDescription;
 use crate::key_path::{KeyPath, Segment, cut};
 
-/// A value that can be changed, or is shown.
+/// A value that is shown, and can be edited unless it is fixed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Field {
-    /// The way to it from the top of the file.
+    /// Path from the top of the file.
     pub path: String,
-    /// The way to it from its object.
+    /// Path from the object.
     pub name: String,
-    /// What it is.
+    /// Kind of the value.
     pub kind: Kind,
-    /// How many numbers a list has; 1 of what is none.
+    /// Number of elements of a list; otherwise 1.
     pub length: usize,
-    /// As the file has it.
+    /// The value in the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<Json>,
-    /// What stands for it where it is absent.
+    /// The default of an absent value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub default: Option<Json>,
-    /// What numbers are counted in.
+    /// Unit of the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<&'static str>,
-    /// The smallest and the largest number that it may be.
+    /// Minimum and maximum of the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<(f64, f64)>,
-    /// Between these, the ends left out, it may not be.
+    /// Range of invalid values, both ends excluded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<(f64, f64)>,
-    /// Whether it must be the square of a whole number.
+    /// True if it must be a square number.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub squares: bool,
-    /// A smaller range, around what it is; of a colour that shines around its strength, the largest of its numbers.
+    /// Range of a slider around the value; for an emitter's color, around its largest component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slider: Option<Slider>,
-    /// What a choice may be; the first of them where they are many.
+    /// The allowed names, truncated if they are many.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub choices: Vec<String>,
-    /// What it does.
+    /// Description of the key.
     pub about: String,
-    /// Whether it must be there.
+    /// True if the key must not be removed.
     pub required: bool,
-    /// Why it cannot be changed, if it cannot.
+    /// Reason why it cannot be edited.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fixed: Option<String>,
 }
 
-/// What a value is.
+/// The kind of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// Any number.
     Number,
-    /// A whole number.
+    /// An integer.
     Whole,
     /// Linear red, green and blue.
     Color,
     /// A list of numbers.
     Vector,
-    /// One of some texts.
+    /// One of several names.
     Choice,
     /// True or false.
     Switch,
@@ -75,20 +74,20 @@ pub enum Kind {
     Text,
 }
 
-/// What a slider goes over.
+/// The range of a slider.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Slider {
-    /// Its left end.
+    /// Left end.
     pub from: f64,
-    /// Its right end.
+    /// Right end.
     pub to: f64,
-    /// How far its steps are apart, where it is linear.
+    /// Step of a linear slider.
     pub step: f64,
-    /// Whether equal ways are equal factors.
+    /// True if equal distances are equal factors.
     pub logarithmic: bool,
 }
 
-/// The names that a scene has for what others name.
+/// The names that keys of a scene may refer to.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
     /// `[materials.NAME]`
@@ -99,13 +98,13 @@ pub struct Names {
     pub meshes: Vec<String>,
 }
 
-/// So many choices are told.
+/// Maximum number of choices.
 const MOST_CHOICES: usize = 200;
-/// So many elements of a list of lists or tables are looked into.
+/// Maximum number of elements of a list of lists or tables that get fields.
 const MOST_ELEMENTS: usize = 32;
 
 impl Names {
-    /// The section whose names a key's text must be one of.
+    /// Returns the section that contains the allowed names of a key.
     pub fn section(path: &KeyPath) -> Option<&'static str> {
         let key = |segment: &Segment| match segment {
             Segment::Key(key) => Some(key.clone()),
@@ -114,7 +113,7 @@ impl Names {
         let [.., around, last] = path.0.as_slice() else {
             return None;
         };
-        // In a table `materials` of a shape every key names one.
+        // In a table `materials` of a shape, every value is the name of a material.
         if path.0.len() > 2 && key(around).as_deref() == Some("materials") {
             return Some("materials");
         }
@@ -126,7 +125,7 @@ impl Names {
         }
     }
 
-    /// Those that a key's text must be one of.
+    /// Returns the allowed names of a key.
     fn of(&self, path: &[Segment]) -> Option<&[String]> {
         match Names::section(&KeyPath(path.to_vec()))? {
             "materials" => Some(&self.materials),
@@ -136,7 +135,8 @@ impl Names {
     }
 }
 
-/// The fields of the object at a path, `[shapes, 3]` or `[camera]`, whose table this is; none of what is no object.
+/// Returns the fields of the object at a path, such as `[shapes, 3]` or `[camera]`, with this table; empty for other
+/// values.
 pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
     static SCHEMA: OnceLock<Json> = OnceLock::new();
     let whole = SCHEMA.get_or_init(of_files);
@@ -162,7 +162,7 @@ pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
     found.fields
 }
 
-/// The schema of an object: of its type, where it has one.
+/// Returns the schema of an object, according to its `type`.
 fn schema_of<'a>(whole: &'a Json, object: &KeyPath, table: &Value) -> Option<&'a Json> {
     let Segment::Key(section) = object.0.first()? else {
         return None;
@@ -183,7 +183,6 @@ fn schema_of<'a>(whole: &'a Json, object: &KeyPath, table: &Value) -> Option<&'a
     whole.get("$defs")?.get(definition(section.trim_end_matches('s'), tag))
 }
 
-/// What is known of the place of a value.
 struct Place<'a> {
     value: Option<&'a Value>,
     default: Option<&'a Json>,
@@ -193,7 +192,7 @@ struct Place<'a> {
 
 struct Found<'a> {
     names: &'a Names,
-    /// How long the object's own path is.
+    /// Length of the object's path.
     object: usize,
     fields: Vec<Field>,
 }
@@ -219,7 +218,7 @@ impl Found<'_> {
             Some("string") => self.add(Kind::Text, chosen, path, &place),
             _ => {}
         }
-        // What may be any text besides is no number to be moved.
+        // A number that can also be any text has no slider.
         let is_free = |branch: &&Json| branch.get("type") == Some(&json!("string")) && branch.get("enum").is_none();
         if branches.len() > 1
             && branches.iter().any(is_free)
@@ -235,9 +234,9 @@ impl Found<'_> {
         let required = required_keys(schema, table);
         for (key, of_key) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
             if of_key.get("const").is_some() {
-                continue; // its type
+                continue; // `type`
             }
-            // A table that is not there is made with one key.
+            // A missing table can be created by one key only.
             if table.is_none() && required.iter().any(|name| name != key) {
                 continue;
             }
@@ -319,7 +318,7 @@ impl Found<'_> {
         };
         let is_choice = choices.is_some();
         if value.is_none() && choices.as_ref().is_some_and(Vec::is_empty) {
-            return; // there is nothing to name
+            return; // no target exists
         }
         let kind = if is_choice { Kind::Choice } else { kind };
         let mut choices = choices.unwrap_or_default();
@@ -361,7 +360,7 @@ impl Found<'_> {
     }
 }
 
-/// Returns the keys that a table must keep. Where a schema has alternatives, these are the keys that all the satisfied ones require.
+/// Returns the keys that a table must keep: with alternatives, those that all satisfied ones require.
 fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
     let keys_of = |schema: &'a Json| -> Vec<&'a str> {
         let list = schema.get("required").and_then(Json::as_array).into_iter().flatten();
@@ -385,15 +384,15 @@ fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
     required
 }
 
-/// Why a text cannot be changed: it may name a file.
+/// Reason why a text cannot be edited: it may name a file.
 const FREE_TEXT: &str = "names and files can only be changed in the scene file";
 
 impl Field {
-    /// A value that was sent, as a scene file has it.
+    /// Converts an edited value to TOML.
     ///
     /// # Errors
     ///
-    /// The rule that it breaks: that of its kind. Ranges are the scene's own matter.
+    /// A value of the wrong kind. Ranges are validated with the scene.
     pub fn value_of(&self, given: &Json, names: &Names) -> Result<Value, String> {
         if let Some(why) = &self.fixed {
             return Err(why.clone());
@@ -431,7 +430,7 @@ impl Field {
     }
 }
 
-/// The alternatives of a schema, or itself.
+/// Collects the alternatives of a schema, or the schema itself.
 fn alternatives<'a>(schema: &'a Json, found: &mut Vec<&'a Json>) {
     match (schema.get("type"), schema.get("anyOf").and_then(Json::as_array)) {
         (None, Some(all)) => all.iter().for_each(|one| alternatives(one, found)),
@@ -439,7 +438,7 @@ fn alternatives<'a>(schema: &'a Json, found: &mut Vec<&'a Json>) {
     }
 }
 
-/// The alternative that a value is of, or its default; the first of them if there is neither.
+/// Returns the alternative for a value or its default, else the first.
 fn choose<'a>(branches: &[&'a Json], place: &Place) -> Option<&'a Json> {
     let named = |branch: &Json, names: &[&str]| {
         let name = branch.get("type").and_then(Json::as_str);
@@ -462,16 +461,15 @@ fn choose<'a>(branches: &[&'a Json], place: &Place) -> Option<&'a Json> {
     branches.iter().find(|branch| named(branch, types)).copied()
 }
 
-/// How the words of colours begin.
+/// Start of the words of colors.
 const COLOR: &str = "linear red";
 
-/// The words of a kind, and its range.
+/// Returns the words of a kind, and its range.
 fn kind_of(schema: &Json) -> (&str, &str) {
     let title = schema.get("title").and_then(Json::as_str).unwrap_or_default();
     title.split_once(SPLIT).unwrap_or((title, ""))
 }
 
-/// What the numbers of a kind are counted in.
 fn unit_of(schema: &Json) -> Option<&'static str> {
     let (words, _) = kind_of(schema);
     let units = [
@@ -489,7 +487,7 @@ fn unit_of(schema: &Json) -> Option<&'static str> {
         .map(|(_, unit)| unit)
 }
 
-/// Whether the colour at a path is light, which has no natural end, and not a share of it.
+/// Returns true for colors of emitters, which are not limited to 1.
 fn shines(path: &[Segment]) -> bool {
     let is_any = |segment: Option<&Segment>, names: &[&str]| match segment {
         Some(Segment::Key(key)) => names.contains(&key.as_str()),
@@ -498,10 +496,9 @@ fn shines(path: &[Segment]) -> bool {
     is_any(path.first(), &["lights", "environment", "render"]) || is_any(path.last(), &["emission"])
 }
 
-/// Where a range leaves its ends out, those that are told are inside of it by this part of its width.
+/// Distance of the displayed from the excluded ends of a range, relative to its width.
 const INSIDE: f64 = 1e-3;
 
-/// The ends of a schema of numbers.
 fn ends(schema: &Json) -> Option<(f64, f64)> {
     if let Some(only) = schema.get("const").and_then(Json::as_f64) {
         return Some((only, only));
@@ -513,7 +510,6 @@ fn ends(schema: &Json) -> Option<(f64, f64)> {
     }
 }
 
-/// The ranges that a number may be in.
 fn ranges(schema: &Json) -> Vec<(f64, f64)> {
     match schema.get("anyOf").and_then(Json::as_array) {
         Some(all) => all.iter().filter_map(ends).collect(),
@@ -527,20 +523,18 @@ fn range_of(schema: &Json) -> Option<(f64, f64)> {
     ends.filter(|(low, high)| low < high)
 }
 
-/// What is left out between two ranges.
 fn gap_of(schema: &Json) -> Option<(f64, f64)> {
     let [a, b] = ranges(schema).try_into().ok()?;
     Some(if a.0 < b.0 { (a.1, b.0) } else { (b.1, a.0) })
 }
 
-/// The widest range that a linear slider goes over as a whole.
+/// Maximum width of a range that a linear slider covers.
 const WIDE: f64 = 1000.0;
-/// From this ratio of its ends on a range is gone over by factors.
+/// Minimum ratio of the ends of a logarithmic range.
 const RATIO: f64 = 50.0;
-/// A slider goes to so many times a value, or to that part of it.
+/// Maximum factor from a value to the ends of its slider.
 const FACTOR: f64 = 100.0;
 
-/// A slider for a number that is `now`.
 fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Option<f64>) -> Option<Slider> {
     let at = now.unwrap_or(0.0);
     let ranges = ranges(schema);
@@ -576,7 +570,7 @@ fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Option<f64>) -
     linear(low.max(-reach), high.min(reach))
 }
 
-/// 1, 2 or 5 times a power of ten that is not below a number.
+/// Rounds up to 1, 2 or 5 times a power of ten.
 fn round_up(x: f64) -> f64 {
     let power = 10f64.powf(x.log10().floor());
     let found = [1.0, 2.0, 5.0, 10.0]
@@ -586,7 +580,6 @@ fn round_up(x: f64) -> f64 {
     found.unwrap_or(x)
 }
 
-/// A value of TOML as JSON.
 fn json_of(value: &Value) -> Json {
     match value {
         Value::String(text) => json!(text),

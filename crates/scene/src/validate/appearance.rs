@@ -1,4 +1,4 @@
-//! The rules of materials and textures.
+//! Validation of materials and textures.
 
 use std::sync::Arc;
 
@@ -23,11 +23,11 @@ use super::{
     At, BTreeMap, BTreeSet, Checked, Collector, Color, Problem, Problems, between, check, color, number, show_pair,
 };
 
-/// What all texels together may take, in bytes, as they are rendered from.
+/// Memory limit of all texels in their render format, in bytes.
 pub(crate) const TEXEL_MEMORY: u64 = 1 << 30;
 
-/// Returns the textures, and the indices of those that a constant stands in for: the factor of a damaged image, and any color for
-/// a texture that has a problem or is not read.
+/// Returns the textures, and the indices of those that are replaced by a constant: the factor of a damaged image, or
+/// any color for an invalid or unread texture.
 pub(super) fn textures(
     descriptions: &BTreeMap<String, TextureDescription>,
     images: &mut Images,
@@ -52,7 +52,6 @@ pub(super) fn textures(
     (textures, replaced, found.end(()))
 }
 
-/// Returns a texture of one colour.
 fn constant(color: DVec3) -> Texture {
     Texture {
         kind: TextureKind::Constant(color),
@@ -61,21 +60,20 @@ fn constant(color: DVec3) -> Texture {
     }
 }
 
-/// The images so far: each file is read and kept once, whatever its names and however many textures have it.
+/// Cache of images: each file is read and stored once.
 pub(super) struct Images<'a> {
     pub(super) assets: &'a Assets,
-    /// False if the scene has problems already: images of one texel stand in for those of files then.
+    /// False if the scene is invalid already: 1 x 1 images then replace those of files.
     reads_files: bool,
-    /// By their place, with the words that each takes.
+    /// Images by location, each with its size in 32-bit words.
     files: BTreeMap<Place, Vec<(File, u64)>>,
-    /// The memory of all of them, in bytes.
+    /// Size of all images in bytes.
     taken: u64,
-    /// Warnings about damage to their files, once for each.
+    /// Warnings about damaged files, without duplicates.
     pub(super) notes: Vec<String>,
 }
 
 impl<'a> Images<'a> {
-    /// None so far.
     pub(super) fn new(assets: &'a Assets, reads_files: bool) -> Images<'a> {
         Images {
             assets,
@@ -86,7 +84,7 @@ impl<'a> Images<'a> {
         }
     }
 
-    /// Warns of damage to a file, or returns it as an error ([`Assets::tolerate`]).
+    /// Warns of a damaged file, or returns it as an error ([`Assets::tolerate`]).
     fn tolerate(&mut self, damage: Problem, stand_in: &str) -> Checked<()> {
         let note = self.assets.tolerate(damage, stand_in)?;
         if !self.notes.contains(&note) {
@@ -104,14 +102,14 @@ impl<'a> Images<'a> {
         })
     }
 
-    /// The image that surrounds the scene: its texels lie apart from those of a texture of the same file.
+    /// Returns the environment map. Its texels are separate from those of a texture of the same file.
     pub(super) fn around(&mut self, file: &str) -> Checked<Arc<Image>> {
         let others = self.taken;
         let image = self.with_words(file, Part::Colors(None), |header| {
             words_around(header.width, header.height)
         })?;
         let words = words_around(image.width, image.height);
-        // A file that a texture has too was counted with the larger of both.
+        // The file was counted as that of a texture.
         if self.taken - others < 4 * words {
             let bytes = others + 4 * words;
             if bytes > TEXEL_MEMORY {
@@ -122,7 +120,7 @@ impl<'a> Images<'a> {
         Ok(image)
     }
 
-    /// Counts an image of the program's own that surrounds the scene.
+    /// Counts the memory of a built-in environment.
     pub(super) fn own(&mut self, name: &str, image: &Image) -> Result<(), String> {
         let bytes = 4 * words_around(image.width, image.height);
         if self.taken + bytes > TEXEL_MEMORY {
@@ -132,7 +130,7 @@ impl<'a> Images<'a> {
         Ok(())
     }
 
-    /// An image of a file or of memory, of which so many words are rendered from.
+    /// Returns an image. `wanted` is its size in 32-bit words.
     fn with_words(&mut self, file: &str, part: Part, wanted: impl Fn(Header) -> u64) -> Checked<Arc<Image>> {
         let place = self.assets.find(file)?;
         if !self.reads_files {
@@ -143,7 +141,7 @@ impl<'a> Images<'a> {
             }));
         }
         let taken = self.taken;
-        // With what it takes already.
+        // `before` is the size that is counted already.
         let fits = |header: Header, before: u64| {
             let words = wanted(header).max(before);
             let (bytes, others) = (4 * words, taken - 4 * before);
@@ -218,7 +216,6 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
     })
 }
 
-/// A texture of a part of an image.
 pub(super) fn image_texture(texture: &ImageTextureDescription, part: Part, images: &mut Images) -> Checked<Texture> {
     let max_anisotropy = between(texture.max_anisotropy, ANISOTROPIES).at("max_anisotropy")?;
     let transform = transform(texture.scale, texture.rotate, texture.offset)?;
@@ -246,7 +243,7 @@ pub(super) fn image_texture(texture: &ImageTextureDescription, part: Part, image
     })
 }
 
-/// (u, v) is first scaled, then turned, then moved.
+/// Returns the transform of (u, v): first the scale, then the rotation, then the offset.
 fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 2]> {
     let valid = scale.iter().all(|s| (SCALES.0..=SCALES.1).contains(&s.abs()));
     check(valid, || {
@@ -271,20 +268,19 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
     ])
 }
 
-/// The textures that materials may name.
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],
-    /// Those of the alpha of images, which lie behind the others, by their names; or what is wrong with them.
+    /// Alpha textures of images, which follow the others, by name, or their errors.
     pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
-    /// Those that a constant stands in for.
+    /// Textures that are replaced by a constant.
     pub(super) replaced: BTreeSet<usize>,
-    /// Which materials there are depends on it.
+    /// Determines the valid materials.
     pub(super) integrator: Integrator,
     pub(super) suggestions: Suggestions,
 }
 
-/// Adds the textures of the alpha of images that materials ask for by `channel = "a"`.
+/// Adds the alpha textures of images that materials use by `channel = "a"`.
 pub(super) fn alphas<'a>(
     materials: &'a BTreeMap<String, MaterialDescription>,
     descriptions: &BTreeMap<String, TextureDescription>,
@@ -322,7 +318,7 @@ impl Textures<'_> {
 
     fn find_name(&self, name: &str) -> Checked<usize> {
         let unknown = || Problem::new(self.suggestions.unknown("texture", name, self.names.iter().copied()));
-        // The names are sorted, as those of a map.
+        // The names are sorted: they are the keys of a map.
         self.names.binary_search(&name).map_err(|_| unknown())
     }
 
@@ -333,7 +329,7 @@ impl Textures<'_> {
         })
     }
 
-    /// The factor of a surface that cannot give more light than it gets.
+    /// Validates a factor that must conserve energy.
     pub(super) fn tint(&self, description: &ColorDescription) -> Checked<Color> {
         if let ColorDescription::Plain(tint) = description {
             for x in tint.to_array() {
@@ -349,7 +345,6 @@ impl Textures<'_> {
         Ok(color)
     }
 
-    /// The factor of a texture's colours.
     fn factor_of(&self, texture: usize) -> DVec3 {
         match self.textures[texture].kind {
             TextureKind::Image { factor, .. } => factor,
@@ -384,7 +379,7 @@ impl Textures<'_> {
         Ok(Some(NormalMap { texture, strength }))
     }
 
-    /// An image of directions.
+    /// Validates an image of directions.
     pub(super) fn direction(&self, description: &Option<TextureReference>) -> Checked<Option<usize>> {
         let Some(TextureReference { texture: name }) = description else {
             return Ok(None);
@@ -431,12 +426,12 @@ impl Textures<'_> {
         };
         needs_path(self.integrator)?;
         let color = self.color(emission)?;
-        // Only parts of a surface shine, as a rule: its factor alone would light the whole scene.
+        // Usually only parts of a surface emit; the factor alone would make all of it an emitter.
         let is_replaced = matches!(color, Color::Texture(texture) if self.replaced.contains(&texture));
         Ok(if is_replaced { Color::BLACK } else { color })
     }
 
-    /// Only paths have this type.
+    /// Validates a type that needs the path integrator.
     fn of_path(&self, tag: &str) -> Checked<()> {
         let named = |problem: Problem| Problem::new(format!("{tag:?} {}", problem.message));
         needs_path(self.integrator).map_err(named).at("type")
@@ -546,14 +541,13 @@ impl Textures<'_> {
     }
 }
 
-/// Checks a texture's factor where the product must be from 0 to 1.
+/// Validates a texture's factor if the product must be from 0 to 1.
 fn bounded_factor(factor: f64) -> Checked<()> {
     check(factor <= 1.0, || {
         format!("the texture's factor of {} must be from 0 to 1 here", number(factor))
     })
 }
 
-/// Whether the camera sees a material.
 fn is_visible(description: &MaterialDescription) -> bool {
     let visible = match description {
         MaterialDescription::Phong(material) => material.visible,
@@ -581,7 +575,7 @@ fn absorption(absorption: DVec3) -> Checked<DVec3> {
     Ok(absorption)
 }
 
-/// What a conductor says of its index: no more than one way.
+/// Returns the index of a conductor. Only one kind of key may set the reflectance.
 fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> {
     let other = |own: &str| {
         let said = [

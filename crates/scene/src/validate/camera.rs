@@ -1,4 +1,4 @@
-//! The rules of a camera, and of its path.
+//! Validation of cameras and their paths.
 
 use glam::DVec3;
 
@@ -8,28 +8,29 @@ use crate::limits::{APERTURES, BLADES, F_NUMBERS, FOVS, FRAMES, LENGTHS, TURNS};
 use crate::problem::{At, Collector, Problem, Problems, both};
 use crate::{Camera, CameraDescription, CameraKeyDescription, Lens, PerspectiveDescription, Projection};
 
-/// How far apart keys must be at least, in frames: slopes between them stay finite.
+/// Minimum distance of keys in frames, which keeps slopes finite.
 const CLOSEST: f64 = 1e-6;
-/// The up vector of a camera that looks straight up or down without another one.
+/// Up vector of a vertical view along the default `up`.
 const VERTICAL_UP: DVec3 = DVec3::Y;
 
 impl CameraDescription {
-    /// Checks a camera by itself, as it stands; its path is checked with the scene.
+    /// Validates the camera without its path.
     ///
     /// # Errors
     ///
-    /// The first value that breaks a rule.
+    /// The first invalid value.
     pub fn validate(&self) -> Result<Camera, Problem> {
         camera(self, VERTICAL_UP).map_err(|problems| problems.first)
     }
 
-    /// Validates the camera at one frame of its path. A view along `up` is an error, because another `up` would be a jump.
+    /// Validates the camera at a frame of its path. A view along `up` is an error, because another `up` would be a
+    /// jump.
     pub(crate) fn validate_frame(&self) -> Result<Camera, Problem> {
         camera(self, DVec3::Z).map_err(|problems| problems.first)
     }
 }
 
-/// Returns the camera. `vertical_up` replaces an `up` of +z, which is the default, if the view is along it.
+/// Returns the camera. `vertical_up` replaces the default `up`, +z, of a view along it.
 fn camera(description: &CameraDescription, vertical_up: DVec3) -> Result<Camera, Problems> {
     let (position, look_at, up) = match description {
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, camera.up),
@@ -81,7 +82,7 @@ fn camera(description: &CameraDescription, vertical_up: DVec3) -> Result<Camera,
     })
 }
 
-/// Returns the lens of a camera, if it has one, not yet focused.
+/// Returns the lens of a camera, not yet focused.
 fn lens_of(camera: &PerspectiveDescription) -> Result<Option<Lens>, Problems> {
     let mut found = Collector::default();
     let focal_length = found.or_default(length(camera.focal_length).at("focal_length"));
@@ -113,7 +114,7 @@ fn aperture(diameter: f64) -> Checked<f64> {
     between(diameter, APERTURES)
 }
 
-/// Checks a camera and its path, if it has one: each key by itself, the camera as it stands, and the camera at all keys.
+/// Validates a camera and its path: each key, the camera without the path, and the camera at all keys.
 pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Option<CameraPath>), Problems> {
     let Some(path) = description.path() else {
         return Ok((camera(description, VERTICAL_UP)?, None));
@@ -127,7 +128,7 @@ pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Opti
         found.value(key(each, description, before).at(i));
         before = Some(each.frame);
     }
-    // First, because the camera may have its values from them.
+    // First, because the camera may use their values.
     found.end(()).at("keys").at("path")?;
     let still = camera(description, VERTICAL_UP)?;
     let moving = CameraPath::of(description);
@@ -139,7 +140,7 @@ pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Opti
     Ok((still, moving))
 }
 
-/// Checks a key by itself, and that it is behind the one before.
+/// Validates a key, and that its frame is greater than that of the previous one.
 fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f64>) -> Checked<()> {
     let CameraKeyDescription {
         frame,
@@ -199,7 +200,7 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
     )
 }
 
-/// Names with a word before the last: "a", "b" or "c".
+/// Joins names, with a word before the last: "a", "b" or "c".
 fn all_of(names: &[&str], word: &str) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
     match quoted.split_last() {
@@ -218,7 +219,7 @@ mod tests {
         Projection, Scene, SceneError,
     };
 
-    /// A scene whose camera has these lines; the first of them is line 2.
+    /// Returns a scene with these lines for the camera, from line 2.
     fn scene(camera: &str) -> Result<Scene, SceneError> {
         let text = format!("image = {{ width = 4, height = 4 }}\n{camera}");
         Scene::parse(&text, "s.toml")
@@ -254,7 +255,7 @@ mod tests {
                 panic!("another projection");
             };
             assert!((found - fov.to_radians()).abs() < 1e-14, "{frame}: {found}");
-            // One key has it: it is so everywhere.
+            // A value of one key applies to all frames.
             assert!(camera.up.x > 0.5, "{frame}: {}", camera.up);
         }
     }
@@ -270,7 +271,6 @@ mod tests {
         assert_eq!((down.right, down.up), (DVec3::X, DVec3::Y));
         let up = camera([0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
         assert_eq!((up.right, up.up), (-DVec3::X, DVec3::Y));
-        // An `up` that was chosen is not replaced.
         let told = camera([0.0, 5.0, 0.0], [0.0, 1.0, 0.0]).unwrap_err().to_string();
         assert_eq!(
             told,
@@ -322,7 +322,7 @@ mod tests {
             let told = at(Some(frame)).unwrap_err().to_string();
             assert_eq!(told, format!("frame: {frame} must be finite"));
         }
-        // One that is built in code has no line.
+        // A camera built in code has no line.
         let keys = [[0.0, -4.0, 0.0], [0.0, 4.0, 0.0]].map(|position| CameraKeyDescription {
             position: Some(position.into()),
             ..CameraKeyDescription::new(position[1])

@@ -1,4 +1,4 @@
-//! The rules of what surrounds a scene.
+//! Validation of the environment.
 
 use std::sync::Arc;
 
@@ -13,11 +13,11 @@ use super::mesh::turn;
 use super::path::needs_path;
 use super::{At, Checked, Description, Environment, Integrator, Problem, between, check, color, show};
 
-/// Where the sun stands, in degrees, and how hazy it is, if nothing is said.
+/// Default elevation of the sun in degrees, and turbidity.
 const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
 
-/// The surroundings: under the path tracer the section's, or the background, if they shine or are seen.
+/// Returns the environment, from its section or the background, if it emits or is visible.
 pub(super) fn environment(
     description: &Description,
     integrator: Integrator,
@@ -95,7 +95,7 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
     }
 }
 
-/// The sky that is described; its keys belong to nothing else.
+/// Validates the keys of a sky, which apply to nothing else.
 fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     let is_sky = description.name == Some(EnvironmentName::Sky);
     let value = |key: &str, value: Option<f64>, default: f64, limits: (f64, f64)| {
@@ -110,7 +110,7 @@ fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     })
 }
 
-/// What is told of an image that is no panorama.
+/// Returns the warning about an image with the wrong aspect ratio.
 pub(super) fn note(description: &Description, environment: Option<&Environment>) -> Option<String> {
     let file = description.environment.as_ref()?.file.as_ref()?;
     let Image { width, height, .. } = *environment?.image.as_ref()?.image;

@@ -1,4 +1,4 @@
-//! The rules of meshes.
+//! Validation of meshes and instances.
 
 use crate::note::Note;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,35 +20,33 @@ use super::mtl::Looks;
 use super::{At, Checked, Collector, FLATTEST, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, Normals};
 
-/// The most groups of all meshes' instances together.
+/// Maximum number of groups of all shapes.
 const MOST_GROUPS: usize = 1 << 24;
 
-/// What shapes name: the scene's materials, and files.
+/// The materials and files that shapes refer to.
 pub(super) struct SceneLookup<'a> {
     pub names: &'a BTreeMap<&'a str, usize>,
     pub looks: Looks<'a>,
     pub assets: &'a Assets,
-    /// False if the scene has problems already: no mesh is needed then.
+    /// False if the scene is invalid already: meshes are then not needed.
     pub reads_files: bool,
     pub suggestions: Suggestions,
 }
 
 impl SceneLookup<'_> {
-    /// The index of a material of the scene.
     pub fn material(&self, name: &str) -> Checked<usize> {
         let unknown = || Problem::new(self.suggestions.unknown("material", name, self.names.keys().copied()));
         self.names.get(name).copied().ok_or_else(unknown)
     }
 }
 
-/// A mesh that instances name.
+/// A mesh for instances.
 pub(super) struct NamedMesh<'a> {
-    /// `None` if it cannot be read, or is not needed.
+    /// `None` if it is invalid, or not needed.
     mesh: Option<Arc<Mesh>>,
     description: &'a MeshFileDescription,
 }
 
-/// What places a mesh, and what it is made of.
 struct Placement<'a> {
     material: Option<&'a String>,
     materials: &'a BTreeMap<String, String>,
@@ -59,7 +57,7 @@ struct Placement<'a> {
 }
 
 impl<'a> NamedMesh<'a> {
-    /// Reads a mesh of `[meshes.NAME]`. If that fails, its problem is kept.
+    /// Reads a mesh of `[meshes.NAME]`. Problems are added to `found`.
     pub fn read(
         description: &'a MeshFileDescription,
         name: &str,
@@ -74,7 +72,6 @@ impl<'a> NamedMesh<'a> {
     }
 }
 
-/// A shape of type `mesh`.
 pub(super) fn mesh(shape: &MeshDescription, known: &mut SceneLookup) -> Checked<Option<Shape>> {
     let mesh = load(&shape.file, shape.normals, known)?;
     let placement = Placement {
@@ -88,7 +85,6 @@ pub(super) fn mesh(shape: &MeshDescription, known: &mut SceneLookup) -> Checked<
     placed(mesh, shape.up, &shape.file, &placement, known)
 }
 
-/// One of `[[instances]]`.
 pub(super) fn instance(
     instance: &InstanceDescription,
     meshes: &BTreeMap<&str, NamedMesh<'_>>,
@@ -111,7 +107,7 @@ pub(super) fn instance(
     placed(mesh.clone(), file.up, &file.file, &placement, known)
 }
 
-/// The words of all groups have to be numbered.
+/// Checks the number of groups: their words must have 32-bit indices.
 pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
     let groups = shapes.iter().map(|shape| match &shape.geometry {
         Geometry::Mesh { materials, .. } => materials.len(),
@@ -123,7 +119,7 @@ pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
     })
 }
 
-/// What is odd about the mesh files, each file's once.
+/// Returns the warnings about mesh files, once per file.
 pub(super) fn notes(
     descriptions: &[ShapeDescription],
     shapes: &[Shape],
@@ -147,7 +143,7 @@ pub(super) fn notes(
     notes.into_iter().collect()
 }
 
-/// Returns a mesh; `None` if no files are read.
+/// Returns a mesh, or `None` if no files are read.
 fn load(file: &str, normals: Option<Normals>, known: &mut SceneLookup) -> Checked<Option<Arc<Mesh>>> {
     if let Some(mesh) = known.assets.meshes.get(file) {
         return match mesh.broken_rule() {
@@ -172,7 +168,7 @@ fn load(file: &str, normals: Option<Normals>, known: &mut SceneLookup) -> Checke
     Ok(Some(mesh))
 }
 
-/// Returns a placed mesh; without a mesh only the values of its placement are checked.
+/// Returns a placed mesh; without a mesh, only the placement is validated.
 fn placed(
     mesh: Option<Arc<Mesh>>,
     up: Up,
@@ -222,7 +218,7 @@ fn placed(
     }))
 }
 
-/// For each group of a mesh the index of its material: what the scene says, else what the mesh's own file does.
+/// Returns the material index of each group: from the scene, else from the mesh's file.
 fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut SceneLookup) -> Checked<Vec<usize>> {
     let named = |name: &String| -> Checked<usize> {
         let index = known.material(name)?;
@@ -265,7 +261,7 @@ fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Sc
     Ok(indices)
 }
 
-/// Reports materials that the file names and no file describes.
+/// Returns the warning about materials that are named in a file but not defined.
 fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String {
     /// Maximum number of names in the message.
     const MOST_NAMES: usize = 8;
@@ -295,12 +291,12 @@ fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String
     format!("{file}: no material {names}: {why}")
 }
 
-/// The names by which a file's group may be told: its own, and that of the material which the file gives it.
+/// Returns the names that identify a group: its own, and that of its material in the file.
 fn names(group: &Group) -> impl Iterator<Item = &str> {
     std::iter::once(group.name.as_str()).chain(group.material.as_deref())
 }
 
-/// Whether what a material looks like depends on texture coordinates.
+/// Returns true if a material depends on texture coordinates.
 fn has_textures(material: &Material) -> bool {
     let is_streaked = match &material.reflection {
         Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,
@@ -309,7 +305,7 @@ fn has_textures(material: &Material) -> bool {
     is_streaked || !material.textures().is_empty()
 }
 
-/// Returns the map that turns an axis of a file upwards.
+/// Returns the rotation of an up axis to +z.
 pub(crate) fn turned_up(up: Up) -> DAffine3 {
     DAffine3::from_mat3(match up {
         Up::X => DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
@@ -318,7 +314,6 @@ pub(crate) fn turned_up(up: Up) -> DAffine3 {
     })
 }
 
-/// What keys of a placement say.
 pub(crate) fn placement(
     translate: Option<DVec3>,
     rotate: Option<Rotation>,
@@ -374,7 +369,7 @@ pub(super) fn turn(rotation: &Rotation) -> Checked<DMat3> {
     })
 }
 
-/// A rotation. Of a quarter turn about an axis of the coordinates the numbers are whole.
+/// Returns a rotation, exact for quarter turns about coordinate axes.
 fn turn_about(axis: DVec3, degrees: f64) -> DMat3 {
     let quarters = degrees / 90.0;
     let is_axis = DVec3::AXES.iter().any(|a| a.abs() == axis.abs());

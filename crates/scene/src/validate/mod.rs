@@ -1,6 +1,6 @@
-//! From a [`Description`] to a [`Scene`]: every rule that a value of a scene file must keep.
+//! Validation of a [`Description`] to a [`Scene`]: all rules for the values of scene files.
 //!
-//! The limits keep all that is computed from a scene, squares of lengths included, inside the range of `f32`.
+//! The limits keep all derived values, including squared lengths, in the range of `f32`.
 
 mod appearance;
 mod camera;
@@ -43,16 +43,16 @@ pub(crate) use self::integrator::note as integrator_note;
 pub(super) use self::mesh::{placement, turned_up};
 pub(super) use self::path::LIGHT_SAMPLES;
 
-/// From which bounce on a path may end at random, if nothing is said.
+/// Default of the first bounce with Russian roulette.
 const RR_DEPTH: u32 = 5;
-/// The sine of the smallest angle between directions that are not parallel; likewise the smallest height of a
-/// triangle or tetrahedron relative to its longest edge.
+/// Sine of the minimum angle between directions that are not parallel; also the minimum height of a triangle or
+/// tetrahedron relative to its longest edge.
 const FLATTEST: f64 = 1e-6;
 
 type Checked<T> = Result<T, Problem>;
 
 impl Description {
-    /// Validates the sections that name no files.
+    /// Validates the sections without file names.
     pub(crate) fn settings(&self, integrator: Integrator) -> Result<Settings, Problems> {
         let image = both(
             image(&self.image).at("image"),
@@ -72,8 +72,8 @@ impl Description {
         })
     }
 
-    /// Validates a description without glTF files. If the settings have problems, files are not read, because no scene can be made of
-    /// them; all other values are checked nevertheless.
+    /// Validates a description without glTF files. If the settings are invalid, no files are read, but all other values
+    /// are validated.
     pub(crate) fn validate_plain(
         &self,
         settings: Result<Settings, Problems>,
@@ -81,7 +81,7 @@ impl Description {
         assets: &Assets,
         files: &mut BTreeSet<PathBuf>,
     ) -> Result<Scene, Problems> {
-        // A map is sorted: a material's index is its place among the names.
+        // The map is sorted: the index of a material is that of its name.
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
         let reads_files = settings.is_ok();
@@ -180,7 +180,6 @@ impl Description {
     }
 }
 
-/// The sections of a scene that name no files.
 pub(crate) struct Settings {
     width: u32,
     height: u32,
@@ -191,7 +190,6 @@ pub(crate) struct Settings {
     lights: Vec<Light>,
 }
 
-/// Returns the size of an image, and how it is displayed.
 fn image(image: &ImageDescription) -> Result<((u32, u32), ViewSettings), Problems> {
     let size = both(side(image.width).at("width"), side(image.height).at("height"));
     both(size, view(image))
@@ -205,7 +203,7 @@ pub(super) fn view(image: &ImageDescription) -> Checked<ViewSettings> {
     })
 }
 
-/// Checks all entries of a list. `check` returns `None` where files are not read.
+/// Validates all elements of a list. `check` returns `None` if files are not read.
 fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<Option<T>>) -> Result<Vec<T>, Problems> {
     let mut found = Collector::default();
     let descriptions = descriptions.iter().enumerate();
@@ -215,12 +213,10 @@ fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<Option<T>
     found.end(all)
 }
 
-/// The number of pixels along a side.
 pub(super) fn side(pixels: u32) -> Checked<u32> {
     count_to_most(pixels)
 }
 
-/// The number of samples of a pattern.
 pub(super) fn sample_count(pattern: Pattern, count: u32) -> Checked<u32> {
     count_to_most(count)?;
     let valid = !pattern.needs_square() || count.isqrt().pow(2) == count;
@@ -258,7 +254,7 @@ fn render(description: &RenderDescription, integrator: Integrator) -> Result<Ren
     let rr_depth = found.or_default(of_path(integrator, description.rr_depth, rr_depth).at("rr_depth"));
     let clamp = found.or_default(of_path(integrator, description.clamp, clamp).at("clamp"));
     let alpha = found.or_default(of_path(integrator, description.alpha, Ok).at("alpha"));
-    // Adaptive sampling depends on the samples of pixels.
+    // Adaptive sampling depends on `pixel_samples`.
     let pixel_samples = samples(&description.pixel_samples, integrator).at("pixel_samples");
     let pixels = pixel_samples.and_then(|samples| {
         let adaptive = description.adaptive.as_ref();
@@ -297,12 +293,11 @@ fn filter(description: &PixelFilterDescription) -> Checked<PixelFilter> {
     Ok(PixelFilter { kind, radius })
 }
 
-/// The error that adaptive sampling aims at.
 pub(super) fn adaptive_error(error: f64) -> Checked<f64> {
     between(error, SHARES)
 }
 
-/// Adaptive sampling, of pixels with these samples.
+/// Validates adaptive sampling of pixels with these samples.
 pub(super) fn adaptive(
     description: &AdaptiveDescription,
     pixel_samples: &SamplesDescription,
@@ -324,7 +319,7 @@ pub(super) fn adaptive(
     let error = adaptive_error(description.error).at("error")?;
     let most = description.max_samples;
     let most = most.unwrap_or(count.saturating_mul(16).min(MOST));
-    let least = count.max(LEAST_ADAPTIVE); // one sample tells nothing of an error
+    let least = count.max(LEAST_ADAPTIVE); // one sample gives no error estimate
     check((least..=MOST).contains(&most), || {
         format!("{most} must be from {least} to {MOST}, and at least the count of pixel_samples")
     })
@@ -352,7 +347,7 @@ fn clamp(most: f64) -> Checked<f64> {
     between(most, CLAMPS)
 }
 
-/// A value of a key that only paths have, if it is there.
+/// Validates the value of an optional key of the path integrator.
 fn of_path<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<T>) -> Checked<Option<T>> {
     let Some(value) = value else { return Ok(None) };
     path::needs_path(integrator)?;
@@ -380,7 +375,7 @@ pub(super) fn color(c: DVec3) -> Checked<DVec3> {
     Ok(c)
 }
 
-/// A direction of any length, made a unit vector.
+/// Normalizes a direction.
 fn unit(direction: DVec3) -> Checked<DVec3> {
     let length = point(direction)?.length();
     check(length >= LENGTHS.0, || {
@@ -413,7 +408,7 @@ fn check(valid: bool, message: impl FnOnce() -> String) -> Checked<()> {
     }
 }
 
-/// A number as a person would write it.
+/// Formats a number briefly.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e6).contains(&x.abs()) {
         x.to_string()

@@ -1,4 +1,4 @@
-//! What a scene has for the path tracer alone, and what it ignores.
+//! Validation and warnings that are specific to the path tracer.
 
 use super::super::{
     AlphaMode, Integrator, Principled, PrincipledDescription, Reflection, RenderDescription, Shadows, TextureKind,
@@ -6,21 +6,19 @@ use super::super::{
 };
 use super::{Checked, Color, DVec3, Material, Texture, check, cut, number};
 
-/// The most materials in a note.
+/// Maximum number of materials in a warning.
 const MOST_NAMES: usize = 8;
-/// How far above 1 a sum of two shares may be by its rounding.
+/// Tolerance of a sum of two fractions, for rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// What is told of `light_samples` that are ignored.
 pub(crate) const LIGHT_SAMPLES: &str =
     "render.light_samples: no effect with integrator = \"path\"; increase pixel_samples to reduce noise";
 
-/// The rule of what only paths have.
 pub(super) fn needs_path(integrator: Integrator) -> Checked<()> {
     check(integrator.follows_paths(), || "needs integrator = \"path\"".to_owned())
 }
 
-/// The largest value that a colour has in each component; of images that is not known.
+/// Returns the component-wise maximum of a color, or `None` for images.
 pub(super) fn most(color: &Color, textures: &[Texture]) -> Option<DVec3> {
     match *color {
         Color::Plain(color) => Some(color),
@@ -33,7 +31,7 @@ pub(super) fn most(color: &Color, textures: &[Texture]) -> Option<DVec3> {
     }
 }
 
-/// What the path tracer does not do as the file says.
+/// Returns the warnings about values that the path tracer ignores or changes.
 pub(super) fn notes(
     (render, integrator): (&RenderDescription, Integrator),
     (names, materials): (&[String], &[Material]),
@@ -59,7 +57,7 @@ pub(super) fn notes(
     notes
 }
 
-/// Which Phong materials would give more light than they get.
+/// Returns the Phong materials that do not conserve energy.
 fn too_bright(names: &[String], materials: &[Material], textures: &[Texture]) -> Option<String> {
     let share = |material: &Material| {
         let Reflection::Phong { diffuse, specular, .. } = &material.reflection else {
@@ -82,7 +80,6 @@ fn too_bright(names: &[String], materials: &[Material], textures: &[Texture]) ->
     ))
 }
 
-/// Which materials have an `alpha` that nothing asks.
 fn unused_alpha(names: &[String], materials: &[Material]) -> Option<String> {
     let is_unused = |principled: &Principled| {
         principled.alpha_mode == AlphaMode::Opaque && !matches!(principled.alpha, Value::Plain(1.0))
@@ -94,7 +91,6 @@ fn unused_alpha(names: &[String], materials: &[Material]) -> Option<String> {
     ))
 }
 
-/// Which materials have an `alpha_cutoff` that nothing asks.
 fn unused_cutoff(names: &[String], materials: &[Material]) -> Option<String> {
     let usual = PrincipledDescription::default().alpha_cutoff;
     let is_unused =
@@ -106,7 +102,7 @@ fn unused_cutoff(names: &[String], materials: &[Material]) -> Option<String> {
     ))
 }
 
-/// The names of the `principled` materials of which something is true.
+/// Returns the names of `principled` materials for which `is_true`.
 fn that(names: &[String], materials: &[Material], is_true: impl Fn(&Principled) -> bool) -> Option<String> {
     let found = (names.iter().zip(materials)).filter(|(_, material)| match &material.reflection {
         Reflection::Principled(principled) => is_true(principled),
@@ -115,7 +111,7 @@ fn that(names: &[String], materials: &[Material], is_true: impl Fn(&Principled) 
     several(found.map(|(name, _)| format!("{:?}", cut(name))))
 }
 
-/// `a, b and c`, the first of them where there are many; nothing of none.
+/// Joins names as `a, b and c`, truncated if they are many; `None` if empty.
 fn several(mut all: impl Iterator<Item = String>) -> Option<String> {
     let mut shown: Vec<String> = all.by_ref().take(MOST_NAMES).collect();
     match all.count() {

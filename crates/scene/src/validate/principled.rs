@@ -1,4 +1,4 @@
-//! The rules of the material `principled`.
+//! Validation of the material `principled`.
 
 use glam::DVec3;
 
@@ -48,7 +48,7 @@ impl Textures<'_> {
     }
 }
 
-/// Returns a rough dielectric of a color, with the defaults of the file's keys otherwise.
+/// Returns a rough dielectric of a color, with default values otherwise.
 pub(super) fn dielectric(base_color: Color, roughness: f64) -> Principled {
     Principled {
         base_color,
@@ -76,7 +76,7 @@ pub(super) fn dielectric(base_color: Color, roughness: f64) -> Principled {
     }
 }
 
-/// How much light is swallowed for each unit of length, where `color` is left of it after a distance.
+/// Returns the absorption coefficient per unit of length for a transmittance of `color` over a distance.
 fn absorption(color: DVec3, distance: Option<f64>) -> Checked<DVec3> {
     for x in color.to_array() {
         between(x, SHARES).at("attenuation_color")?;

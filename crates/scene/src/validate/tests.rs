@@ -1,4 +1,4 @@
-//! What a good scene becomes, and what is told of every bad value.
+//! Tests of a valid scene, and of the errors of all invalid values.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,7 +7,7 @@ use super::super::{Camera, Material, Projection, Reflection, SceneError};
 use super::*;
 use crate::{Geometry, Parallelogram};
 
-/// One of everything; every line is there once, so that a test can put another in its place.
+/// All features. Each line is unique, so that tests can replace it.
 const GOOD: &str = r#"
 [image]
 width = 8
@@ -88,7 +88,7 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml")
 }
 
-/// The good scene with a line changed.
+/// Returns the valid scene with one line changed.
 fn with(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
     assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
@@ -130,7 +130,7 @@ fn a_good_scene_is_what_its_file_says() {
     };
     let lights = [
         Light::Rectangle {
-            // The tangent's part along the normal is gone; the bitangent is -Z x X.
+            // The tangent is made orthogonal to the normal; the bitangent is -Z x X.
             rectangle: square(9.0, DVec3::X, DVec3::NEG_Y * 2.0),
             color: DVec3::new(1.0, 0.5, 0.0),
             visible: true,
@@ -174,7 +174,7 @@ fn faces_of_a_tetrahedron_look_outwards_however_it_is_given() {
     }
 }
 
-/// A line of the good scene, a bad one in its place, and what is told of it.
+/// A line of the valid scene, its invalid replacement, and the error.
 const BAD: &[(&str, &str, &str)] = &[
     ("width = 8", "width = 0", "image.width: 0 must be from 1 to 65536"),
     (
@@ -483,7 +483,6 @@ fn a_disk_has_the_radii_that_lengths_have() {
 #[test]
 fn a_cylinder_has_the_radii_and_heights_that_lengths_have() {
     let scene = |start: f64, end: f64, rest: &str| {
-        // TOML writes nan.
         let [start, end] = [start, end].map(|x| format!("{x:?}").to_lowercase());
         let text = format!(
             "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\
@@ -532,7 +531,7 @@ fn a_cylinder_has_the_radii_and_heights_that_lengths_have() {
     }
 }
 
-/// Returns the messages of a text, line by line.
+/// Returns the lines of a text's errors.
 fn errors(text: &str) -> Vec<String> {
     let error = Scene::parse(text, "s.toml").unwrap_err().to_string();
     error.lines().map(str::to_owned).collect()
@@ -624,7 +623,7 @@ blades = 1
         .map(|place| place.split(": ").take(2).collect::<Vec<_>>().join(": "))
         .collect();
     assert_eq!(places, wanted.map(|place| format!("s.toml:{place}")), "{found:#?}");
-    // `adaptive` depends on `pixel_samples`, and is checked once that is valid.
+    // `adaptive` is validated after `pixel_samples`.
     let found = errors(&text.replace("pixel_samples = 0", "pixel_samples = 9"));
     assert!(
         found
@@ -670,12 +669,12 @@ color = [1, 1, 1]
     for (found, wanted) in found.iter().zip(wanted) {
         assert!(found.starts_with(wanted), "{found}\n{wanted}");
     }
-    // The same without headers of their own, which is read as a whole.
+    // Without headers, the file is parsed as a whole.
     let text = format!("{SMALL}shapes = [{{ type = 'a' }}, {{ type = 'sphere', raduis = 1 }}]\n[render]\nseeds = 3\n");
     assert_eq!(errors(&text).len(), 3);
 }
 
-/// A texture, material or mesh with an error has no other errors follow from it.
+/// Tests that an invalid texture, material or mesh causes no further errors.
 #[test]
 fn an_error_is_reported_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -717,7 +716,7 @@ material = 'm'
             error.to_string().lines().count()
         }
     };
-    // The image is absent, or its description is invalid; the materials and shapes are valid.
+    // The image is missing, or its description is invalid; materials and shapes are valid.
     let texture = |more: &str| format!("[textures.t]\n{image}{more}\n{uses}");
     assert_eq!(count(&texture("")), 0, "a warning");
     assert_eq!(count(&texture("max_anisotropy = 99")), 1);
@@ -752,7 +751,7 @@ material = 'm'
     );
 }
 
-/// Files are not read if the sections without files have errors: a typo is reported before gigabytes are read.
+/// Tests that no files are read if sections without files are invalid: a typo is reported before gigabytes are read.
 #[test]
 fn files_are_not_read_for_a_scene_with_invalid_settings() {
     let folder = tempfile::tempdir().unwrap();
@@ -766,7 +765,7 @@ fn files_are_not_read_for_a_scene_with_invalid_settings() {
     let origin = folder.path().join("s.toml").display().to_string();
     let count = |text: &str| Scene::parse(text, &origin).unwrap_err().to_string().lines().count();
     assert_eq!(count(&text.replace("fov = 40", "fov = 400")), 1);
-    // A missing file is found without reading it.
+    // A missing file is reported without reading.
     assert_eq!(
         count(&text.replace("fov = 40", "fov = 400").replace("a.hdr", "b.hdr")),
         2
@@ -806,11 +805,11 @@ radius = 1
             "s.toml:12: shapes[0].material: 7 must be a string",
         ]
     );
-    // Also beside a section that is unknown.
+    // Also with an unknown section.
     let found = errors(&format!("{SMALL}{text}[shape]\n[environment]\nrotate = 'x'\n"));
     assert_eq!(found.len(), 9, "{found:#?}");
     assert_eq!(found[7], "s.toml:14: shape: unknown key; did you mean \"shapes\"?");
-    // A key that is missing may be one that is unknown.
+    // A missing key may be the misspelled one.
     assert_eq!(
         errors(&format!(
             "{SMALL}[[shapes]]\ntype = 'sphere'\ncentre = [0, 0, 0]\nradius = 'x'\nmaterial = 'm'\n"
@@ -835,7 +834,7 @@ fn of_many_errors_the_first_are_reported() {
         assert_eq!((errors.len(), more.as_deref()), (20, last));
         assert_eq!(errors[19].place().key.as_deref(), Some("shapes[19].material"));
     }
-    // Also if the errors of another section are before them in the file, or behind.
+    // Also with errors of another section before or after them.
     let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 0]\ncolor = [-1, 0, 0]\n";
     let [lights, shapes] = [light.repeat(15), shape.repeat(15)];
     for (text, key) in [
@@ -847,7 +846,7 @@ fn of_many_errors_the_first_are_reported() {
         assert_eq!((errors.len(), more.as_deref()), (20, Some("and 10 more errors")));
         assert_eq!(error.place().key.as_deref(), Some(key));
     }
-    // Similar names are searched for the first only: all of them would take minutes.
+    // Only the first error gets suggestions: those of all would take minutes.
     let materials = (0..50_000)
         .map(|i| format!("m{i}.type = 'mirror'\n"))
         .collect::<String>();
@@ -864,7 +863,6 @@ fn of_many_errors_the_first_are_reported() {
         "{}",
         errors[0]
     );
-    // Keys that are unknown.
     let error = Scene::parse(&format!("{SMALL}{}", "[[lights]]\nx = 1\n".repeat(5000)), "s.toml").unwrap_err();
     assert_eq!(error.to_string().lines().last(), Some("and 4980 more errors"));
 }

@@ -1,4 +1,4 @@
-//! OpenEXR files: all channels of all parts, each in its own type, at the largest level.
+//! OpenEXR decoding: all channels of all parts, each in its own type, at the highest resolution level.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -23,7 +23,7 @@ impl From<Error> for Unreadable {
     }
 }
 
-/// Block by block, so that nothing but the picture's own values is in memory.
+/// Decodes block by block, so that only the values of the image are in memory.
 pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let reader = exr::block::read(source, false)?;
@@ -60,7 +60,7 @@ pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture,
         planes.push(part);
     }
     let chunks = reader.filter_chunks(false, |_, _, block| (block.level.x(), block.level.y()) == (0, 0))?;
-    // a file may name one block twice and another one never
+    // A file may contain one block twice and lack another one.
     let (mut seen, mut area) = (BTreeSet::new(), 0);
     chunks.decompress_parallel(false, |_, block| {
         let damaged = || Error::Invalid("block".into());
@@ -102,7 +102,7 @@ pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture,
     })
 }
 
-/// The channels' names; of several parts with the part's name before it, if it is not there already.
+/// Returns the channel names. In multi-part files, the part name is prepended unless already present.
 fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
     let mut names = Vec::new();
     let mut known = BTreeSet::new();
@@ -128,7 +128,7 @@ fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
 }
 
 fn empty(columns: u32, rows: u32, samples: SampleType) -> Result<Plane, Unreadable> {
-    /// Which the system gives as they are touched: a header may lie.
+    /// Allocates zeroed memory, which the operating system maps on first use: a header may claim any size.
     fn zeros<T: Clone + Default>(width: u64, height: u64) -> Result<Vec<T>, Unreadable> {
         let count = width * height;
         drop(room::<T>(width, height, count)?);
@@ -146,7 +146,6 @@ fn bytes_of(plane: &Plane) -> usize {
     if matches!(plane, Plane::Halves(_)) { 2 } else { 4 }
 }
 
-/// Writes a line of a block, which lies inside of the picture.
 fn store(plane: &mut Plane, start: usize, line: &[u8]) {
     fn put<T, const N: usize>(to: &mut [T], line: &[u8], value: impl Fn([u8; N]) -> T) {
         for (to, bytes) in to.iter_mut().zip(line.as_chunks::<N>().0) {
@@ -157,6 +156,6 @@ fn store(plane: &mut Plane, start: usize, line: &[u8]) {
         Plane::Whole(values) => put(&mut values[start..], line, u32::from_ne_bytes),
         Plane::Halves(values) => put(&mut values[start..], line, u16::from_ne_bytes),
         Plane::Floats(values) => put(&mut values[start..], line, f32::from_ne_bytes),
-        Plane::Bytes(_) | Plane::Words(_) | Plane::One => {} // not in such files
+        Plane::Bytes(_) | Plane::Words(_) | Plane::One => {} // not in OpenEXR
     }
 }

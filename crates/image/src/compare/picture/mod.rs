@@ -1,4 +1,4 @@
-//! A picture as its file has it: channels by name, each in the type of values that the file stores.
+//! A decoded image: named channels, each in the value type of the file.
 
 mod exr;
 mod read;
@@ -10,61 +10,61 @@ use ::exr::prelude::f16;
 
 pub use read::Unreadable;
 
-/// What the values of a picture mean.
+/// Interpretation of the values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// What a screen shows, from 0 to 1, in steps of so many bits: PNG, JPEG, WebP.
+    /// Values encoded for display, 0 to 1: PNG, JPEG, WebP.
     Display {
-        /// 8 or 16.
+        /// Bits per value: 8 or 16.
         bits: u8,
     },
-    /// Numbers without bounds: OpenEXR, Radiance.
+    /// Unbounded linear values: OpenEXR, Radiance.
     Linear,
 }
 
-/// A picture in memory.
+/// An image in memory.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// Columns, one at least.
+    /// Number of columns, at least 1.
     pub width: u32,
-    /// Rows, one at least.
+    /// Number of rows, at least 1.
     pub height: u32,
-    /// The place of the first pixel, where the file tells it.
+    /// Position of the first pixel; (0, 0) unless the file specifies it.
     pub position: (i32, i32),
-    /// What the values mean.
+    /// Interpretation of the values.
     pub kind: Kind,
-    /// The channels in the order of the file. No two have one name, and each has a value for every pixel.
+    /// Channels in file order, with unique names and a value for each pixel.
     pub channels: Vec<Channel>,
 }
 
-/// A channel of a picture.
+/// A named channel.
 #[derive(Clone, Debug)]
 pub struct Channel {
-    /// `R`, `A`, `normal.X`.
+    /// For example `R`, `A`, `normal.X`.
     pub name: String,
-    /// The values, which channels of a gray picture share.
+    /// Values; the channels of a gray image share a plane.
     pub plane: Arc<Plane>,
 }
 
-/// The values of a channel, row by row from the top.
+/// Values of a channel by rows, from the top.
 #[derive(Clone, Debug)]
 pub enum Plane {
     /// 255 is 1.
     Bytes(Vec<u8>),
     /// 65,535 is 1.
     Words(Vec<u16>),
-    /// Whole numbers as they are.
+    /// Unscaled integers.
     Whole(Vec<u32>),
-    /// The bits of numbers of half precision.
+    /// Bits of half-precision floats.
     Halves(Vec<u16>),
-    /// Numbers.
+    /// Single-precision floats.
     Floats(Vec<f32>),
-    /// 1 for every pixel: the alpha of a picture that has none.
+    /// 1 for each pixel: alpha of an image without an alpha channel.
     One,
 }
 
 impl Plane {
-    /// Writes the values of some pixels, of which the plane has as many as there are places.
+    /// Copies the values of a range of pixels; `to` must have the same length.
     pub fn values(&self, pixels: Range<usize>, to: &mut [f64]) {
         match self {
             Plane::Bytes(values) => copy(&values[pixels], to, |value| f64::from(value) / 255.0),
@@ -76,14 +76,15 @@ impl Plane {
         }
     }
 
-    /// The value of a pixel.
+    /// Returns the value of a pixel.
     pub fn value(&self, pixel: usize) -> f64 {
         let mut value = [0.0];
         self.values(pixel..pixel + 1, &mut value);
         value[0]
     }
 
-    /// Whether two planes of a screen's values have the same ones; where that takes arithmetic it is not found out.
+    /// Returns true if both planes have equal values in the same pixels, judged by their stored integers. Floats and
+    /// planes of different types always yield false.
     pub fn is_plainly(&self, other: &Plane, pixels: Range<usize>) -> bool {
         match (self, other) {
             (Plane::Bytes(a), Plane::Bytes(b)) => a[pixels.clone()] == b[pixels],
@@ -101,18 +102,18 @@ fn copy<T: Copy>(from: &[T], to: &mut [f64], value: impl Fn(T) -> f64) {
 }
 
 impl Picture {
-    /// Its pixels.
+    /// Returns the number of pixels.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// The channel of a name.
+    /// Returns the channel with a name.
     pub fn channel(&self, name: &str) -> Option<&Arc<Plane>> {
         let channel = self.channels.iter().find(|channel| channel.name == name)?;
         Some(&channel.plane)
     }
 
-    /// Red, green and blue; those of gray are one plane. None if there are no colours.
+    /// Returns red, green and blue, which are the same plane in gray images. `None` if the image has no colors.
     pub fn colors(&self) -> Option<[&Arc<Plane>; 3]> {
         let [r, g, b] = ["R", "G", "B"].map(|name| self.channel(name));
         match (r, g, b, self.channel("Y")) {
@@ -122,8 +123,8 @@ impl Picture {
         }
     }
 
-    /// What `wgray render` shows of linear values as a PNG of 8 or 16 bits: red, green, blue, and alpha where there is any. None
-    /// if there are no colours.
+    /// Converts linear values to the 8-bit or 16-bit PNG that `wgray render` writes: red, green, blue, and alpha if
+    /// present. `None` if the image has no colors.
     pub fn displayed(&self, bits: u8) -> Option<Picture> {
         let colors = self.colors()?;
         let alpha = self.channel("A");
@@ -147,7 +148,7 @@ impl Picture {
         })
     }
 
-    /// The same with alpha: a screen's picture without it covers all.
+    /// Adds an opaque alpha channel if the image has none.
     pub fn with_alpha(mut self) -> Picture {
         if self.channel("A").is_none() {
             self.channels.push(Channel {
@@ -159,7 +160,7 @@ impl Picture {
     }
 }
 
-/// A plane as a PNG has it: of colours those by themselves, to the power 1/2.2.
+/// Encodes a plane as in a PNG. Colors are divided by alpha and gamma-encoded (1/2.2).
 fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8, is_color: bool) -> Plane {
     const CHUNK: usize = 4096;
     let (mut values, mut shares) = ([0.0; CHUNK], [1.0; CHUNK]);
@@ -171,7 +172,7 @@ fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8,
             alpha.values(start..start + count, &mut shares[..count]);
         }
         for (value, share) in values[..count].iter().zip(&shares) {
-            // in the 32-bit floats of a render, so that the bytes are those of its PNG
+            // In `f32` as in a render, so that the bytes equal those of its PNG.
             let (value, share) = (*value as f32, *share as f32);
             let value = match alpha {
                 Some(_) if !(share > 0.0) => 0.0,
@@ -180,7 +181,7 @@ fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8,
             };
             let exponent = if is_color { super::colors::DISPLAY } else { 1.0 };
             let shown = f64::from(value.clamp(0.0, 1.0)).powf(exponent);
-            // the conversions saturate, and take NaN to 0
+            // The casts saturate and map NaN to 0.
             match bits {
                 8 => bytes.push((shown * 255.0 + 0.5) as u8),
                 _ => words.push((shown * 65_535.0 + 0.5) as u16),

@@ -81,7 +81,6 @@ pub enum Unreadable {
     },
 }
 
-/// A source of image bytes.
 pub(super) trait Source: BufRead + Seek {}
 impl<T: BufRead + Seek> Source for T {}
 
@@ -112,7 +111,7 @@ impl Picture {
         decode(&mut BufReader::with_capacity(1 << 16, file), u64::MAX)
     }
 
-    /// Reads a picture from its bytes.
+    /// Decodes an image.
     ///
     /// # Errors
     ///
@@ -137,7 +136,7 @@ fn decode(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadab
     }
 }
 
-/// Refuses a picture of too many pixels, and one whose values take far more than its file has bytes.
+/// Rejects images with too many pixels, and images whose values are far larger than their file.
 pub(super) fn check(
     most_pixels: u64,
     length: u64,
@@ -165,7 +164,7 @@ pub(super) fn check(
     }
 }
 
-/// Room for values, if there is as much memory.
+/// Reserves memory for values, or returns [`Unreadable::Memory`].
 pub(super) fn room<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unreadable> {
     let refused = Unreadable::Memory {
         width,
@@ -194,14 +193,14 @@ impl From<png::DecodingError> for Unreadable {
     }
 }
 
-/// How many bytes there are; they are read from the first on after that.
+/// Returns the length in bytes, and seeks to the start.
 pub(super) fn length_of(source: &mut dyn Source) -> io::Result<u64> {
     let length = source.seek(SeekFrom::End(0))?;
     source.seek(SeekFrom::Start(0))?;
     Ok(length)
 }
 
-/// Row by row, so that nothing but the picture's own values is in memory.
+/// Decodes row by row unless interlaced, so that only the values of the image are in memory.
 fn png(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let mut options = png::DecodeOptions::default();
@@ -209,7 +208,7 @@ fn png(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable>
     options.set_ignore_iccp_chunk(true);
     let mut decoder = png::Decoder::new_with_options(source, options);
     decoder.set_limits(png::Limits { bytes: BESIDE });
-    decoder.set_transformations(png::Transformations::EXPAND); // palettes to colours, fewer bits to 8
+    decoder.set_transformations(png::Transformations::EXPAND); // palettes to colors, fewer than 8 bits to 8
     let mut reader = decoder.read_info()?;
     let (width, height) = (reader.info().width, reader.info().height);
     let is_interlaced = reader.info().interlaced;
@@ -235,7 +234,7 @@ fn png(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable>
     Ok(planes.picture(width, height))
 }
 
-/// What a screen shows, one plane for each sample of a pixel.
+/// Display values, one plane per sample of a pixel; `words` if they have 16 bits.
 struct Planes {
     samples: usize,
     bytes: Vec<Vec<u8>>,
@@ -259,7 +258,7 @@ impl Planes {
         Ok(planes)
     }
 
-    /// Adds whole pixels; words have their high byte first.
+    /// Appends whole pixels; 16-bit samples are big-endian.
     fn take(&mut self, pixels: &[u8]) {
         let samples = self.samples;
         for (i, plane) in self.bytes.iter_mut().enumerate() {
@@ -278,7 +277,7 @@ impl Planes {
             .chain(self.words.into_iter().map(Plane::Words))
             .map(Arc::new)
             .collect();
-        // gray is a colour of three same parts
+        // Gray images share one plane among R, G and B.
         let names: &[(&str, usize)] = match planes.len() {
             1 => &[("R", 0), ("G", 0), ("B", 0)],
             2 => &[("R", 0), ("G", 0), ("B", 0), ("A", 1)],
@@ -301,7 +300,7 @@ impl Planes {
     }
 }
 
-/// Files that the image library reads whole.
+/// Decodes the formats that the `image` crate reads at once.
 fn other(source: &mut dyn Source, format: ImageFormat, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let mut reader = ImageReader::with_format(source, format);
@@ -321,7 +320,7 @@ fn other(source: &mut dyn Source, format: ImageFormat, most_pixels: u64) -> Resu
     let color = decoder.color_type();
     let size = (width.into(), height.into());
     check(most_pixels, length, size, color.bytes_per_pixel().into())?;
-    // asked for before the library does, which would end the program
+    // Reserved here first, since a failed allocation in the library aborts the process.
     drop(room::<u8>(width.into(), height.into(), decoder.total_bytes())?);
     let image = DynamicImage::from_decoder(decoder).map_err(refused)?;
     let (columns, rows) = (u64::from(width), u64::from(height));

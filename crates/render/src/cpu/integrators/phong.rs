@@ -1,4 +1,4 @@
-//! Twin of `shaders/integrators/phong.wgsl`: the integrator `phong`.
+//! Twin of `shaders/integrators/phong.wgsl`: the integrator `phong`, direct light with specular bounces.
 
 use glam::{UVec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! The nearest triangle that a ray meets.
+//! Traversal of a BVH by a single ray: leaves in the order of distance, closest hit and any hit.
 
 use std::ops::Range;
 
@@ -11,10 +11,11 @@ use super::line::greater;
 use super::{Line, Mesh, Nearest, limit_from};
 use crate::bvh::{MOST_LEVELS, Node};
 
-/// Nodes that wait to be looked at, at most: each level adds 8 and takes one.
+/// Maximum number of nodes on the stack: each level pops one and pushes up to 8.
 pub const STACK: usize = MOST_LEVELS as usize * 7 + 1;
 
-/// A side of the boxes of a node's children along an axis, as [`Node::low`] and [`Node::high`] give it.
+/// Decodes one side of all child boxes along an axis, `side` being `Node::low` or `Node::high`, like the accessors of a
+/// single child.
 #[inline(always)]
 pub fn side<S: Simd>(simd: S, node: &Node, side: &[[u8; 8]; 3], axis: usize, scale: f32) -> f32x8<S> {
     let mut steps = [0.0; 8];
@@ -88,7 +89,7 @@ pub fn leaves<S: Simd>(
     mut limit: f32,
     mut visit: impl FnMut(Range<usize>, f32) -> f32,
 ) {
-    // For x, y and z: whether the ray goes down, the origins for the near and the far side, and the reciprocal.
+    // By axis: 1 if the direction is negative, the origins relative to near and far sides, and the reciprocals.
     let mut down = [0; 3];
     let mut from = [[0.0; 3]; 2];
     let mut inverse = [0.0; 3];
@@ -100,7 +101,7 @@ pub fn leaves<S: Simd>(
         from[1 - down[k]][k] = line.o_high[i];
         inverse[k] = line.inverse[i];
     }
-    // The nearest is on top.
+    // Sorted within each node, nearest on top.
     let mut stack: ArrayVec<(f32, u32), STACK> = ArrayVec::new();
     stack.push((f32::NEG_INFINITY, 0));
     while let Some((entry, number)) = stack.pop() {

@@ -1,20 +1,19 @@
-//! A ray against up to four triangles at once.
+//! Intersection of a ray with up to four triangles at once.
 
 use fearless_simd::f32x4;
 use fearless_simd::prelude::*;
 
 use super::{Line, Mesh};
 
-/// Up to four triangles of a leaf; if there are fewer, the last stands in the other places.
+/// Up to four triangles of a leaf. The last one is repeated in unused lanes.
 pub struct Four<S: Simd> {
-    /// The corners' x, y and z.
     corners: [[f32x4<S>; 3]; 3],
-    /// A bit for each triangle that there is.
+    /// Mask of the lanes in use.
     full: u32,
 }
 
 impl<S: Simd> Four<S> {
-    /// The triangles with these corners, at least one.
+    /// Loads triangles, at least one and at most four.
     #[inline(always)]
     pub fn new(simd: S, mesh: &Mesh, triangles: &[[u32; 4]]) -> Four<S> {
         let last = triangles.len().min(4) - 1;
@@ -39,8 +38,8 @@ impl<S: Simd> Four<S> {
         }
     }
 
-    /// Which of the triangles the ray meets, and where, behind its origin too by as much as boxes are enlarged: [`Line::triangle`]
-    /// for each.
+    /// Returns the mask of hit triangles and the distances, as [`Line::triangle`] for each. Distances may be negative
+    /// by the padding of boxes.
     #[inline(always)]
     pub fn met_by(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
         let zero = f32x4::splat(simd, 0.0);
@@ -73,7 +72,7 @@ impl<S: Simd> Four<S> {
             near = near.max(first.min(second));
             far = far.min(first.max(second));
         }
-        // Selected in this way, NaN stays NaN.
+        // In this order NaN is preserved.
         let t = near.simd_gt(t).select(near, t);
         let t = far.simd_lt(t).select(far, t);
         let met = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);

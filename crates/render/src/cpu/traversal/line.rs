@@ -1,28 +1,25 @@
-//! A ray, prepared for tests against boxes and triangles.
+//! A ray with precomputed values for tests against boxes and triangles.
 
 use glam::Vec3;
 
-/// Components of a direction nearer to 0 are taken to be this, so that their reciprocals are finite: 2^-100.
+/// Minimum magnitude of a direction's component in box tests, 2^-100, so that its reciprocal is finite.
 pub const LEAST: f32 = f32::from_bits((127 - 100) << 23);
 
-/// A ray, with all that its tests against boxes and triangles have in common.
+/// A ray with the values that all its box and triangle tests share.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    /// Which axis is which in what follows: the third is that of the direction's largest component.
+    /// Permutation of the axes of all other fields; the last one is that of the direction's largest component.
     pub axes: [usize; 3],
-    /// The origin.
     pub o: [f32; 3],
-    /// The origin that the low sides of boxes are seen from.
+    /// The origin relative to which lower sides of boxes are taken, which pads the boxes.
     pub o_low: [f32; 3],
-    /// The origin that the high sides of boxes are seen from.
+    /// The origin relative to which upper sides of boxes are taken.
     pub o_high: [f32; 3],
-    /// The reciprocals of the direction's components.
     pub inverse: [f32; 3],
-    /// What makes the direction the third axis.
+    /// The shear and scale that map the direction to the last axis.
     pub shear: [f32; 3],
 }
 
-/// A direction's component as the boxes' tests take it.
 #[inline(always)]
 pub fn away_from_zero(x: f32) -> f32 {
     match () {
@@ -32,7 +29,6 @@ pub fn away_from_zero(x: f32) -> f32 {
     }
 }
 
-/// The axes for a direction.
 #[inline(always)]
 pub fn axes(d: Vec3) -> [usize; 3] {
     let [x, y, z] = d.abs().to_array();
@@ -44,14 +40,14 @@ pub fn axes(d: Vec3) -> [usize; 3] {
     axes_from(third)
 }
 
-/// The axes that end with this one.
+/// Returns the cyclic permutation that ends with an axis.
 #[inline(always)]
 pub fn axes_from(third: usize) -> [usize; 3] {
     [(third + 1) % 3, (third + 2) % 3, third]
 }
 
 impl Line {
-    /// A ray from `o` along `d`, of any length. Boxes are tested as if they were larger by `pad` on all sides.
+    /// Creates a ray from `o` along `d`, of any length. Boxes count as enlarged by `pad` on all sides.
     #[inline(always)]
     pub fn new(o: Vec3, d: Vec3, pad: f32) -> Line {
         let axes = axes(d);
@@ -71,7 +67,7 @@ impl Line {
         }
     }
 
-    /// From where to where the ray is in a box; the axes in the order of `self.axes`.
+    /// Returns the interval of the ray inside a box, with axes permuted by `self.axes`.
     #[inline(always)]
     pub fn slab(&self, low: [f32; 3], high: [f32; 3]) -> [f32; 2] {
         let mut within = [f32::NEG_INFINITY, f32::INFINITY];
@@ -83,15 +79,15 @@ impl Line {
         within
     }
 
-    /// A corner of a triangle as seen from the origin, with the direction as the third axis.
+    /// Returns a vertex relative to the origin, sheared so that the direction is the last axis.
     #[inline(always)]
     fn sheared(&self, v: [f32; 3]) -> [f32; 3] {
         let [x, y, z] = [v[0] - self.o[0], v[1] - self.o[1], v[2] - self.o[2]];
         [x - self.shear[0] * z, y - self.shear[1] * z, self.shear[2] * z]
     }
 
-    /// Where the ray meets a triangle: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. It
-    /// does so only where it meets the box around the triangle too.
+    /// Returns the distance of the hit with a triangle, if any: Woop, Benthin and Wald, "Watertight Ray/Triangle
+    /// Intersection", JCGT 2(1), 2013. The ray must also hit the triangle's bounding box.
     #[inline(always)]
     pub fn triangle(&self, vertices: [&[f32; 4]; 3]) -> Option<f32> {
         let corners = [
@@ -121,25 +117,24 @@ impl Line {
             }
         }
         let [near, far] = self.slab(low, high);
-        // In this order NaN stays NaN.
+        // In this order NaN is preserved.
         let t = less(far, greater(near, t));
         (near <= far && t > 0.0).then_some(t)
     }
 }
 
-/// A vector's components in the order of these axes.
 #[inline(always)]
 pub fn in_order<const N: usize>(v: &[f32; N], axes: [usize; 3]) -> [f32; 3] {
     [v[axes[0]], v[axes[1]], v[axes[2]]]
 }
 
-/// The lesser of two numbers; the second where one is NaN.
+/// Returns the minimum; `b` if either number is NaN.
 #[inline(always)]
 pub fn less(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The greater of two numbers; the second where one is NaN.
+/// Returns the maximum; `b` if either number is NaN.
 #[inline(always)]
 pub fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }

@@ -1,14 +1,15 @@
-//! Walks over a tree of boxes with triangles in its leaves: the nearest one that a ray meets, and which segments from a point are
-//! hidden. The results are those of all triangles tested one by one ([`Line::triangle`]), whatever the tree is, for three reasons: a
-//! triangle is only met where its own box is, a larger box is passed wherever a smaller one is since every step of the test is
-//! monotone, and of equal distances the least number counts.
+//! Closest-hit and occlusion queries over a BVH of triangles or other items.
 //!
-//! Each function is compiled for several sets of instructions, and `fearless_simd` chooses among them; all give the same bits.
-//! Nothing is contracted.
+//! The results equal those of testing every triangle ([`Line::triangle`]), independently of the BVH: a triangle is hit
+//! only where its bounding box is; every step of the box test is monotone, so that a box is hit wherever a box inside
+//! it is; on equal distance the smallest index wins.
 //!
-//! Measured on an AMD EPYC with AVX-512, other work beside it, in processor time of one thread (a bumpy sphere of 70,000 triangles
-//! on a floor, `benches/trees.rs`): 157 ns for a ray of the camera, 665 ns for 16 segments to a light. Plain loops over eight numbers
-//! instead of `fearless_simd` made rays 8 % slower with AVX-512 and 30 % with AVX2.
+//! Each function is compiled for several instruction sets, among which `fearless_simd` selects. All give the same bits,
+//! since nothing is contracted to fused multiply-adds.
+//!
+//! Measured on an AMD EPYC with AVX-512 under other load, in CPU time of one thread (a bumpy sphere of 70,000 triangles
+//! on a floor, `benches/trees.rs`): 157 ns per camera ray, 665 ns per 16 shadow segments. Plain loops over eight
+//! numbers instead of `fearless_simd` made rays 8 % slower with AVX-512 and 30 % with AVX2.
 
 mod closest;
 mod four;
@@ -24,65 +25,62 @@ use glam::Vec3;
 pub use self::line::Line;
 use crate::bvh::{Aabb, Node};
 
-/// Triangles below a tree.
+/// The triangles of a BVH.
 #[derive(Clone, Copy, Debug)]
 pub struct Mesh<'a> {
-    /// The tree's nodes.
     pub nodes: &'a [Node],
-    /// Positions, each followed by a word of any meaning.
+    /// Positions, each followed by an unused word.
     pub vertices: &'a [[f32; 4]],
-    /// In the order of the tree's leaves: the numbers of three vertices, and the triangle's own.
+    /// Three vertex indices and the triangle's index, in the order of the leaves.
     pub triangles: &'a [[u32; 4]],
 }
 
-/// What a ray meets, or how far it is looked along.
+/// The closest hit so far, or the bounds of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// Along the ray, in lengths of its direction.
+    /// Distance in lengths of the ray's direction.
     pub t: f32,
-    /// The triangle's own number.
     pub number: u32,
-    /// The triangle's place in the order of the tree's leaves.
+    /// The triangle's position in the order of the leaves.
     pub slot: u32,
 }
 
-/// How far beyond `start` what is nearer than t can be: more than t - start by what the sum of both may be rounded.
+/// Returns an upper bound on the distance beyond `start` of anything nearer than `t`, with a margin for the rounding of
+/// their sum.
 pub fn limit_from(start: f32, t: f32) -> f32 {
     (t - start) + t * 4.7683716e-7
 }
 
-/// Finds the nearest triangle that is nearer than `best`, but for the one with the number `skip`. Distances are those from the line's
-/// origin, 0 at least, plus `start`; they are above 0. Of several at the same place
-/// it is the one with the least number.
+/// Returns the closest triangle that is nearer than `best`, except the one with index `skip`, else `best`. A distance
+/// is `start` plus the nonnegative distance from the ray's origin, and positive. On equal distance the smallest index
+/// wins.
 pub fn closest(level: Level, mesh: &Mesh, line: &Line, start: f32, skip: u32, best: Nearest) -> Nearest {
     dispatch!(level, simd => closest::closest(simd, mesh, line, start, skip, best))
 }
 
-/// Whether a ray meets any triangle before `t_max` lengths of its direction, but for the one with the number `skip`.
+/// Returns true if the ray hits a triangle at a distance less than `t_max`, except the one with index `skip`.
 pub fn any(level: Level, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) -> bool {
     dispatch!(level, simd => closest::any(simd, mesh, line, skip, t_max))
 }
 
-/// Visits the leaves of a tree that a ray meets before `limit`, nearly in the order in which it does: `visit` is given a range of
-/// the tree's order and the limit, and gives the limit from then on, which is not greater.
+/// Visits the leaves that the ray hits before `limit`, approximately front to back. `visit` gets the range of a leaf's
+/// items and the limit, and returns the new limit, which must not be larger.
 pub fn leaves(level: Level, nodes: &[Node], line: &Line, limit: f32, visit: impl FnMut(Range<usize>, f32) -> f32) {
     dispatch!(level, simd => closest::leaves(simd, nodes, line, limit, visit))
 }
 
-/// Segments at once, at most.
+/// Maximum number of segments per query.
 pub const MOST: usize = 32;
 
-/// Up to 32 vectors, their x, y and z; the first stands in all places that are left.
+/// Up to [`MOST`] vectors as a structure of arrays. Unused lanes repeat the first vector.
 #[derive(Clone, Debug)]
 pub struct Directions {
-    /// How many there are.
     pub count: usize,
-    /// The components.
     pub along: [[f32; MOST]; 3],
 }
 
 impl Directions {
-    /// These vectors, at most 32.
+    /// Creates the lanes of at most [`MOST`] vectors.
     pub fn new(vectors: &[Vec3]) -> Directions {
         let first = vectors.first().copied().unwrap_or(Vec3::Z);
         let mut directions = Directions {
@@ -97,41 +95,37 @@ impl Directions {
         directions
     }
 
-    /// One of them.
     pub fn get(&self, i: usize) -> Vec3 {
         let [x, y, z] = &self.along;
         Vec3::new(x[i], y[i], z[i])
     }
 
-    /// A bit for each.
     pub fn all(&self) -> u32 {
         ((1_u64 << self.count) - 1) as u32
     }
 }
 
-/// Up to 32 segments from one point.
+/// Up to [`MOST`] segments from one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Segments<'a> {
-    /// The point.
     pub o: Vec3,
-    /// Boxes are tested as if they were larger by so much on all sides.
+    /// Padding of boxes on all sides.
     pub pad: f32,
-    /// From the point to the other ends.
     pub directions: &'a Directions,
-    /// Triangles at so many lengths of the direction, or beyond, hide nothing.
+    /// Distances of occluders are less than this, in lengths of a segment's direction.
     pub t_max: f32,
-    /// The number of a triangle that hides nothing.
+    /// Index of a triangle that occludes nothing.
     pub skip: u32,
 }
 
-/// Which of some segments are hidden by a triangle, a bit for each; only those whose bits are in `asked`.
+/// Returns the mask of the segments in `asked` that a triangle occludes.
 pub fn occluded(level: Level, mesh: &Mesh, segments: &Segments, asked: u32) -> u32 {
     dispatch!(level, simd => occluded::occluded(simd, mesh, segments, asked))
 }
 
-/// Visits the items below a tree whose boxes any of some segments pass: `boxes` gives the box of an item, or nothing if it
-/// hides nothing; `visit` is given the item and the segments that pass its box, and says which of these are hidden. Says which of
-/// all are.
+/// Returns the mask of the segments in `asked` that an item occludes. `boxes` returns the bounds of an item, or `None`
+/// if it occludes nothing. `visit` gets an item and the mask of segments that hit its bounds, and returns the mask of
+/// those that it occludes.
 pub fn occluded_items(
     level: Level,
     nodes: &[Node],
@@ -143,7 +137,7 @@ pub fn occluded_items(
     dispatch!(level, simd => occluded::items(simd, nodes, segments, asked, boxes, visit))
 }
 
-/// All levels of instructions that this machine has.
+/// Returns all instruction sets that this machine supports.
 #[cfg(test)]
 pub(crate) fn levels() -> Vec<Level> {
     let best = Level::new();

@@ -1,4 +1,4 @@
-//! Which segments from one point are hidden: all of them walk the tree together.
+//! Occlusion of up to 32 segments from one point, which traverse the BVH together.
 
 use std::ops::Range;
 
@@ -12,36 +12,35 @@ use super::line::{LEAST, axes_from, greater, in_order, less};
 use super::{Directions, Line, MOST, Mesh, Segments};
 use crate::bvh::{Aabb, Node};
 
-/// So many segments are tested against the boxes of a node, or the triangles of a leaf, one by one.
+/// Maximum number of segments that are tested one by one, against all boxes of a node or triangles of a leaf at once.
 const FEW: u32 = 6;
 
-/// As many vectors hold all segments, at most: of four numbers each.
+/// Maximum number of SIMD vectors for all segments: the narrowest have four lanes.
 const MOST_LANES: usize = MOST / 4;
 
-/// As many segments as a vector has places. Their places are their numbers.
+/// One SIMD vector of segments, in the order of their indices.
 #[derive(Clone, Copy)]
 struct Lanes<S: Simd> {
-    /// The axes as for a [`Line`](super::Line), if they are those of all segments.
+    /// The permutation of axes as in [`Line`](super::Line), if all segments share it.
     axes: Option<[usize; 3]>,
-    /// Where the largest component is along x, and where along y.
+    /// Masks of the segments whose largest component is x, and y.
     largest: [S::mask32s; 2],
-    /// As for a [`Line`](super::Line).
+    /// The shear as in [`Line`](super::Line).
     shear: [S::f32s; 3],
-    /// The reciprocals of the directions' x, y and z.
     inverse: [S::f32s; 3],
 }
 
-/// One axis of all directions, for tests that a box passes wherever one of the segments does.
+/// Bounds on all directions along an axis, for a conservative box test: it passes if any segment hits the box.
 #[derive(Clone, Copy, Default)]
 struct Slope {
-    /// Whether all go the same way.
+    /// True if all directions have the same sign.
     same: bool,
-    /// If so, the nearer and the farther side of a box (0: low, 1: high); else low and high.
+    /// The near and far side of a box (0: lower, 1: upper) if the signs agree, else lower and upper.
     sides: [usize; 2],
-    /// From where these are seen.
+    /// The origins relative to which these sides are taken.
     from: [f32; 2],
-    /// The reciprocals that make the nearer side nearest and the farther farthest; or those that make either side nearest, for
-    /// the segments that come from outside.
+    /// The reciprocals that minimize the near and maximize the far distance if the signs agree, else those that
+    /// minimize the distance at which a segment enters by either side.
     inverse: [f32; 2],
 }
 
@@ -127,7 +126,6 @@ pub fn items<S: Simd>(
     )
 }
 
-/// The numbers of the bits that are set.
 #[inline(always)]
 fn bits_of(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(
@@ -140,7 +138,7 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = usize> {
     )
 }
 
-/// What a test of all segments of a vector says, for all of them.
+/// Concatenates the masks that a test returns for each vector of segments.
 #[inline(always)]
 fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64) -> u32 {
     let mut bits = 0;
@@ -150,7 +148,8 @@ fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64)
     bits
 }
 
-/// Visits leaves with the segments that pass their boxes; is told which of them are hidden; and says which of all are.
+/// Visits leaves with the mask of segments that hit them. `visit` returns the mask of those that are occluded. Returns
+/// the mask of all occluded segments.
 #[inline(always)]
 fn walk<S: Simd>(
     simd: S,
@@ -184,7 +183,7 @@ fn walk<S: Simd>(
                 seen[i][k] = side(simd, node, planes[slopes[k].sides[i]], k, scale[k]) - slopes[k].from[i];
             }
         }
-        // For each child those that pass its box; the children that any passes.
+        // The segments that hit each child's box, and the mask of children that any segment hits.
         let mut children = [0u32; 8];
         let mut any = 0;
         if mask.count_ones() <= FEW {
@@ -204,7 +203,7 @@ fn walk<S: Simd>(
                 }
                 let passed = (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() as u32;
                 any |= passed;
-                // No branches, as they would be guessed wrong.
+                // Branchless, since branches would be mispredicted.
                 for (c, child) in children.iter_mut().enumerate() {
                     *child |= (passed >> c & 1) << i;
                 }
@@ -245,7 +244,6 @@ fn walk<S: Simd>(
     asked & !waiting
 }
 
-/// The segment at a place.
 #[inline(always)]
 fn line_at<S: Simd>(lanes: &[Lanes<S>], place: usize, o: &[f32; 3], pad: f32) -> Line {
     let (lanes, i) = (&lanes[place / S::f32s::LEN], place % S::f32s::LEN);
@@ -271,7 +269,7 @@ fn line_at<S: Simd>(lanes: &[Lanes<S>], place: usize, o: &[f32; 3], pad: f32) ->
     }
 }
 
-/// Makes vectors of the segments.
+/// Arranges the segments in vectors and returns bounds on their directions.
 #[inline(always)]
 fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>, MOST_LANES>) -> [Slope; 3] {
     let one = S::f32s::splat(simd, 1.0);
@@ -339,7 +337,7 @@ fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>,
     slopes
 }
 
-/// See [`line::away_from_zero`](super::line::away_from_zero).
+/// Like [`line::away_from_zero`](super::line::away_from_zero).
 #[inline(always)]
 fn away_from_zero<S: Simd>(simd: S, d: S::f32s) -> S::f32s {
     let least = S::f32s::splat(simd, LEAST);
@@ -348,7 +346,6 @@ fn away_from_zero<S: Simd>(simd: S, d: S::f32s) -> S::f32s {
 }
 
 impl<S: Simd> Lanes<S> {
-    /// A vector's components in the order of each segment's axes.
     #[inline(always)]
     fn in_order(&self, v: [S::f32s; 3]) -> [S::f32s; 3] {
         if let Some([x, y, z]) = self.axes {
@@ -363,7 +360,6 @@ impl<S: Simd> Lanes<S> {
         ]
     }
 
-    /// The same of one that all segments have in common.
     #[inline(always)]
     fn splat_in_order(&self, simd: S, v: [f32; 3]) -> [S::f32s; 3] {
         match self.axes {
@@ -373,7 +369,7 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// Which of the segments pass the box of an item: `interval_hits` of `slab.rs`.
+/// Returns the mask of segments that hit an item's box, as `interval_hits` of `slab.rs`.
 #[inline(always)]
 fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segments, bounds: &Aabb) -> u64 {
     let [near, far] = passage(
@@ -389,7 +385,7 @@ fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segm
     (near.simd_le(far) & far.simd_ge(zero) & near.simd_le(t_max)).to_bitmask()
 }
 
-/// From where to where the segments' lines are in a box: [`Line::slab`](super::Line::slab) for each.
+/// Returns the intervals of the segments' lines inside a box, as [`Line::slab`](super::Line::slab).
 #[inline(always)]
 fn passage<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], pad: f32, low: [f32; 3], high: [f32; 3]) -> [S::f32s; 2] {
     let mut near = S::f32s::splat(simd, f32::NEG_INFINITY);
@@ -403,7 +399,7 @@ fn passage<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], pad: f32, low: [f32
     [near, far]
 }
 
-/// Which of the segments pass a child's box.
+/// Returns the mask of segments that hit a child's box.
 #[inline(always)]
 fn passing<S: Simd>(
     simd: S,
@@ -430,7 +426,7 @@ fn passing<S: Simd>(
     (near.simd_le(far) & far.simd_gt(zero)).to_bitmask()
 }
 
-/// Which of the segments a triangle hides: [`Line::triangle`](super::Line::triangle) for each.
+/// Returns the mask of segments that a triangle occludes, as [`Line::triangle`](super::Line::triangle).
 #[inline(always)]
 fn triangle_hides<S: Simd>(
     simd: S,
@@ -465,7 +461,7 @@ fn triangle_hides<S: Simd>(
         high[k] = greater(greater(a, b), c);
     }
     let [near, far] = passage(simd, lanes, o, segments.pad, low, high);
-    // Selected in this way, NaN stays NaN.
+    // In this order NaN is preserved.
     let t = near.simd_gt(t).select(near, t);
     let t = far.simd_lt(t).select(far, t);
     let hit = inside

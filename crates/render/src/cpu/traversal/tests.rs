@@ -22,7 +22,7 @@ impl Random {
         (self.0 >> 32) as u32
     }
 
-    /// From -1 to 1.
+    /// Returns a number from -1 to 1.
     fn number(&mut self) -> f32 {
         self.bits() as f32 / (1u64 << 31) as f32 - 1.0
     }
@@ -36,7 +36,6 @@ impl Random {
     }
 }
 
-/// Triangles with a tree over them.
 struct Scene {
     tree: Tree,
     vertices: Vec<[f32; 4]>,
@@ -80,7 +79,7 @@ impl Scene {
         line.triangle(vertices)
     }
 
-    /// [`closest`] without a tree, from the line's origin on.
+    /// Brute-force [`closest`], for distances measured from the line's origin.
     fn closest(&self, line: &Line, skip: u32, best: Nearest) -> Nearest {
         let triangles = (0..).zip(&self.triangles).filter(|(_, t)| t[3] != skip);
         triangles.fold(best, |best, (slot, triangle)| match self.t(triangle, line) {
@@ -93,7 +92,7 @@ impl Scene {
         })
     }
 
-    /// [`occluded`] without a tree.
+    /// Brute-force [`occluded`].
     fn occluded(&self, segments: &Segments, asked: u32) -> u32 {
         let mut bits = 0;
         for i in 0..segments.directions.count {
@@ -107,7 +106,7 @@ impl Scene {
     }
 }
 
-/// What was compared, so that a test can say that it was something.
+/// Counts of outcomes, which show that a test covers all cases.
 #[derive(Debug, Default)]
 struct Seen {
     hits: u32,
@@ -116,7 +115,7 @@ struct Seen {
     free: u32,
 }
 
-/// Compares rays and groups of segments with all triangles one by one; `line` gives an origin and a direction.
+/// Compares queries by rays and by groups of segments with brute force. `line` returns an origin and a direction.
 fn compare(
     scene: &Scene,
     random: &mut Random,
@@ -155,7 +154,7 @@ fn compare(
             seen.hits += 1
         }
 
-        // Segments to points near one another, or anywhere.
+        // Segments to nearby points, or in any direction.
         let spread = [0.0, 0.01, 0.3, 10.0][i / 2 % 4];
         let directions: Vec<Vec3> = (0..random.below(33))
             .map(|_| {
@@ -186,7 +185,7 @@ fn compare(
     seen
 }
 
-/// Triangles of this size around points from -1 to 1.
+/// Returns triangles of a size at random points from -1 to 1.
 fn soup(random: &mut Random, count: usize, size: f32) -> Scene {
     let mut corners = Vec::new();
     for _ in 0..count {
@@ -228,7 +227,7 @@ fn nothing_at_all() {
     assert_eq!(occluded(Level::new(), &scene.mesh(), &segments, 0), 0);
 }
 
-/// A grid of squares in the plane z = 0, or rather a step that rises by `slope` a square, each of two triangles.
+/// Returns a grid of squares, two triangles each, in the plane z = 0 or rising by `slope` per square along x.
 fn grid(side: u32, slope: f32) -> Scene {
     let at =
         |x: u32, y: u32| Vec3::new(x as f32, y as f32, slope * x as f32) / side as f32 * 2.0 - Vec3::new(1.0, 1.0, 0.0);
@@ -249,7 +248,7 @@ fn edges_and_corners_of_a_grid() {
     let random = &mut Random(3);
     for slope in [0.0, 0.25, -1.0] {
         let scene = grid(16, slope);
-        // From above, from the plane itself, and along it, at corners and edges; along the axes, too.
+        // From above, from the plane itself and along it, through vertices and edges, and parallel to the axes.
         let place = |random: &mut Random| {
             Vec3::new(random.below(33) as f32, random.below(33) as f32, 0.0) / 16.0 - Vec3::new(1.0, 1.0, 0.0)
         };
@@ -276,7 +275,7 @@ fn no_ray_slips_between_triangles() {
     let random = &mut Random(4);
     let scene = grid(16, 0.3);
     for _ in 0..2000 {
-        // At points of edges, from anywhere above.
+        // Rays from above to points on edges.
         let along = (random.number() + 1.0) * 0.5;
         let edge = random.below(scene.triangles.len());
         let [a, b] = [0, 1].map(|i| Vec3::from_slice(&scene.vertices[scene.triangles[edge][i] as usize][..3]));
@@ -297,7 +296,7 @@ fn degenerate_triangles() {
     let mut corners: Vec<Vec3> = (0..60).map(|_| random.vector()).collect();
     corners.push(Vec3::ZERO);
     let count = corners.len();
-    // Points, needles, and the same triangle many times.
+    // Points, needles and duplicate triangles.
     let mut triangles = Vec::new();
     for _ in 0..100 {
         let [a, b, c] = [0; 3].map(|_| random.below(count) as u32);
@@ -332,7 +331,7 @@ fn huge_and_tiny() {
             });
         }
     }
-    // All sizes at once, and far from the origin.
+    // Mixed sizes, near and far from the origin.
     let mut corners = Vec::new();
     for i in 0..300 {
         let far = if i % 2 == 0 { Vec3::splat(1000.0) } else { Vec3::ZERO };
@@ -424,7 +423,7 @@ fn leaves_are_visited_until_the_limit() {
     }
 }
 
-/// Möller and Trumbore's test in f64, where the triangle is met well inside.
+/// Möller and Trumbore's test in f64. Returns the distance and the smallest barycentric coordinate.
 fn by_another_way(o: DVec3, d: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, f64)> {
     let (e1, e2) = (b - a, c - a);
     let p = d.cross(e2);

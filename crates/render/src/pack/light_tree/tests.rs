@@ -1,4 +1,4 @@
-//! The tree's cones, bounds and probabilities against integrals and searches written from other formulas, in f64.
+//! Tests of the light tree against integrals and exhaustive searches with independent formulas, in f64.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3, Vec4};
 use super::*;
 use crate::cpu::light_tree::{light_child, light_importances, light_shares};
 
-/// Numbers from 0 to 1, by a linear congruence.
+/// A linear congruential generator of numbers from 0 to 1.
 struct Random(u64);
 
 impl Random {
@@ -51,7 +51,7 @@ impl Random {
         }
     }
 
-    /// A square lamp, or a point.
+    /// A square emitter, or a point.
     fn lamp(&mut self, i: u32, two_sided: bool) -> Lamp {
         let (center, normal) = (self.point() * 5.0, self.direction());
         let half = if self.unit() < 0.2 { 0.0 } else { 0.3 * self.unit() };
@@ -71,7 +71,7 @@ impl Random {
     }
 }
 
-/// Whether a cone has a normal; of a cone of both sides, it or its opposite.
+/// Returns true if a cone contains a normal, or its opposite if the cone is two-sided.
 fn has(cone: &Cone, normal: DVec3) -> bool {
     let away = cone.axis.angle_between(normal);
     let away = if cone.two_sided { away.min(PI - away) } else { away };
@@ -90,7 +90,7 @@ fn a_cone_around_two_has_what_both_have() {
         narrower += u32::from(both.spread < PI);
         for cone in [a, b] {
             for _ in 0..8 {
-                // A normal of it, at its rim as often as inside.
+                // A normal in the cone, half of them on its rim.
                 let side = cone.axis.any_orthonormal_vector();
                 let around = DQuat::from_axis_angle(cone.axis, random.unit() * 2.0 * PI) * side;
                 let angle = cone.spread * if random.unit() < 0.5 { 1.0 } else { random.unit() };
@@ -104,7 +104,7 @@ fn a_cone_around_two_has_what_both_have() {
 
 #[test]
 fn the_measure_of_a_cone_is_the_integral_of_its_weights() {
-    // Equation 1 is the integral over the sphere of 1 inside the spread and of the cosine beyond, to the edge.
+    // Equation 1 integrates over the sphere: 1 inside the spread, then the cosine up to the edge.
     for (spread, edge) in [
         (0.0, FRAC_PI_2),
         (0.5, FRAC_PI_2),
@@ -139,14 +139,13 @@ fn the_measure_of_a_cone_is_the_integral_of_its_weights() {
     }
 }
 
-/// The children of a node: which they are, and the node below.
 fn children(node: &LightNode) -> impl Iterator<Item = (usize, u32)> {
     (0..WIDTH)
         .filter(|i| node.intensity[*i] > 0.0)
         .map(|i| (i, node.children[i]))
 }
 
-/// The probability of each of so many lamps at p, by the way down the tree.
+/// Returns the probability of selecting each emitter at p, by traversal of the tree.
 fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64> {
     let mut found = vec![0.0; count];
     let mut waiting = vec![(0_usize, 1.0)];
@@ -208,7 +207,7 @@ fn probabilities_sum_to_one_and_whatever_can_shine_has_one() {
             let sum: f64 = found.iter().sum();
             assert!((sum - 1.0).abs() < 1e-5, "{sum}");
             for lamp in &lamps {
-                // A point of it, that its normal and the surface's face.
+                // A point of the emitter that faces the surface, on both sides.
                 let (center, half) = (0.5 * (lamp.low + lamp.high), 0.5 * (lamp.high - lamp.low).x);
                 let u = lamp.cone.axis.any_orthonormal_vector();
                 let v = lamp.cone.axis.cross(u);
@@ -252,7 +251,7 @@ fn nodes_know_their_parents_and_hold_their_children() {
             assert_eq!(inside.parent.x, 4 * number + i as u32);
             let mut sum = 0.0;
             for (j, _) in children(inside) {
-                // Spheres around boxes: that of a part may stick out, but its middle does not.
+                // Spheres around boxes: a child's sphere may stick out, but its center does not.
                 assert!((center(node, i) - center(inside, j)).length() <= node.radius[i] * 1.0001);
                 sum += inside.intensity[j];
             }
@@ -263,7 +262,7 @@ fn nodes_know_their_parents_and_hold_their_children() {
     assert_eq!((seen, leaves), (nodes.len(), lamps.len()));
 }
 
-/// The mean of what is above 0 of a height, by many heights.
+/// Returns the mean of the positive part of evenly spread heights, by quadrature.
 fn mean_above(middle: f64, radius: f64) -> f64 {
     let steps = 2000;
     let heights = (0..steps).map(|i| middle + radius * (2.0 * (f64::from(i) + 0.5) / f64::from(steps) - 1.0));
@@ -337,7 +336,7 @@ fn shares_are_those_of_importances_and_numbers_choose_by_them() {
         }
         for i in 0..WIDTH {
             let share = f64::from(importances[i]) / sum;
-            // At most three others are as rare as 2^-12 at least.
+            // At most three other shares are raised to the minimum of 2^-12.
             assert!(
                 (f64::from(shares[i]) - share).abs() < 4.0 / 4096.0,
                 "{importances}: {shares}"
@@ -355,7 +354,7 @@ fn shares_are_those_of_importances_and_numbers_choose_by_them() {
             assert!((f64::from(counts[i]) - expected).abs() <= 2.0, "{shares}: {counts:?}");
             assert!(shares[i] > 0.0 || counts[i] == 0);
         }
-        // The last number of all.
+        // The largest random number.
         let last = light_child(shares, 1.0 - f32::EPSILON / 2.0) as usize;
         assert!(shares[last] > 0.0, "{shares}: {last}");
     }
@@ -389,7 +388,7 @@ fn lamps_in_one_place_and_in_a_row_make_trees_of_few_levels() {
     assert!(depth(&one_place) <= 8, "{}", depth(&one_place));
     let row: Vec<Lamp> = (0..count).map(|i| at(i, DVec3::X * f64::from(i), 1.0)).collect();
     assert!(depth(&row) <= 12, "{}", depth(&row));
-    // Each a thousandth of the next: split off one by one, were it not for the bound.
+    // Each has a thousandth of the next: without the bound they would be split off one by one.
     let falling: Vec<Lamp> = (0..300)
         .map(|i| at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))
         .collect();

@@ -1,4 +1,4 @@
-//! Accessors of every type, and what can be wrong with them.
+//! Tests of accessors: component types, layouts and errors.
 
 use serde_json::{Value, json};
 
@@ -29,7 +29,7 @@ fn every_component_type_is_read() {
     assert_eq!(of(5122, 4, false), [256.0, -32641.0, -127.0, -32768.0]);
     assert_eq!(of(5123, 4, false), [256.0, 32895.0, 65409.0, 32768.0]);
     assert_eq!(of(5125, 2, false), [2_155_807_000.0, 2_147_549_057.0]);
-    // By the formulas of section 3.6.2.2, in 64 bits.
+    // By the formulas of section 3.6.2.2, in f64.
     let near = |found: Vec<f32>, wanted: &[f64]| {
         assert_eq!(found.len(), wanted.len());
         for (found, wanted) in found.iter().zip(wanted) {
@@ -48,7 +48,6 @@ fn every_component_type_is_read() {
         of(5123, 4, true),
         &[256.0, 32895.0, 65409.0, 32768.0].map(|c| c / 65535.0),
     );
-    // The ends are exact.
     assert_eq!(of(5120, 4, true)[3], -1.0);
     assert_eq!(of(5121, 6, true)[5], 1.0);
     assert_eq!(of(5122, 4, true)[3], -1.0);
@@ -128,7 +127,7 @@ fn columns_of_matrices_begin_at_multiples_of_4_bytes() {
     let shorts = |values: &[u16]| -> Vec<u8> { values.iter().flat_map(|x| x.to_le_bytes()).collect() };
     let bytes = shorts(&bytes.map(u16::from));
     assert_eq!(matrix("MAT3", 5123, &bytes).vectors::<9>(0).unwrap(), [row(1), row(10)]);
-    // Two shorts have 4 bytes: nothing is padded, nor in matrices of 4 by 4.
+    // No padding: columns have 4 bytes.
     let bytes = shorts(&[1, 2, 3, 4, 5, 6, 7, 8]);
     let found = matrix("MAT2", 5123, &bytes).vectors::<4>(0).unwrap();
     assert_eq!(found, [[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]]);
@@ -139,7 +138,7 @@ fn columns_of_matrices_begin_at_multiples_of_4_bytes() {
 
 #[test]
 fn elements_are_found_by_offsets_and_strides() {
-    // Interleaved: a position, and a colour of bytes. Neither offsets nor strides need be multiples of anything.
+    // Interleaved positions and colours, unaligned.
     let mut bytes = vec![7; 5];
     for i in 0..3u8 {
         bytes.extend(floats(&[f32::from(i), 10.0, 20.0]));
@@ -189,7 +188,7 @@ fn indices_are_whole_numbers() {
         let told = told(accessor(&bytes, description.clone()).indices(0));
         assert!(told.starts_with("accessors[0]: element 1 is "), "{told}");
         assert!(told.contains("restart"), "{told}");
-        // One less is an index.
+        // One less is a valid index.
         bytes[size] = 0xfe;
         assert_eq!(accessor(&bytes, description).indices(0).unwrap().len(), 2);
     }
@@ -257,7 +256,7 @@ fn an_accessor_without_bytes_is_zero() {
         "accessors[0].count: 4294967295 elements without a bufferView; there must be at most 4194304"
     );
     assert!(of(u64::MAX).vectors::<2>(0).is_err());
-    // Unless its bytes are in what is not known.
+    // Except if an unsupported extension holds the data.
     let hidden = json!({ "componentType": 5126, "count": 2, "type": "VEC2", "extensions": { "X_bytes": {} } });
     assert_eq!(
         told(accessor(&[0], hidden).vectors::<2>(0)),
@@ -293,7 +292,6 @@ fn no_length_offset_or_count_leaves_the_bytes() {
         1
     );
     assert!(with(&[("count", json!(1)), ("byteOffset", json!(13))]).is_err());
-    // Nothing needs no bytes.
     assert!(with(&[("count", json!(0))]).unwrap().is_empty());
     assert!(
         with(&[("count", json!(0)), ("byteOffset", json!(24))])
@@ -301,7 +299,6 @@ fn no_length_offset_or_count_leaves_the_bytes() {
             .is_empty()
     );
     assert!(with(&[("count", json!(0)), ("byteOffset", json!(25))]).is_err());
-    // Of views, and their strides.
     let view = |view: Value| {
         let accessors = json!([{ "bufferView": 0, "componentType": 5126, "count": 2, "type": "VEC3" }]);
         document(&bytes, json!([view]), accessors).vectors::<3>(0)

@@ -1,4 +1,4 @@
-//! Files that are right, that are strange, and that are hostile.
+//! Tests of documents: valid, unusual and malicious files.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,7 +16,6 @@ fn told(json: &Value) -> String {
     }
 }
 
-/// A small file with most of what this layer looks at.
 fn small() -> (Value, Vec<u8>) {
     let mut binary: Vec<u8> = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
         .iter()
@@ -53,7 +52,7 @@ fn small() -> (Value, Vec<u8>) {
     (json, binary)
 }
 
-/// Asks for all that there is. What is refused is refused by a message.
+/// Reads everything and returns the number of successes. Failures must not panic.
 fn ask(document: &Document) -> usize {
     let mut count = 0;
     for i in 0..document.json.accessors.len() + 1 {
@@ -105,7 +104,7 @@ fn other_files_are_read_and_listed() {
         { "uri": "a.png" }, { "uri": "none.png" }, { "uri": "../out.png" }, { "name": "nothing" },
         { "extensions": { "X_image": {} } },
     ]);
-    let path = folder.join("small.txt"); // what it is, its text says
+    let path = folder.join("small.txt"); // detected by content
     fs::write(&path, json.to_string()).unwrap();
     let mut files = BTreeSet::new();
     let document = Document::open(&path, &folder, &mut files).unwrap();
@@ -136,10 +135,10 @@ fn other_files_are_read_and_listed() {
     for name in ["the data.bin", "a.png", "small.txt"] {
         assert!(names.contains(&name), "{names:?}");
     }
-    // A wider root lets more in.
+    // A wider asset root admits more files.
     let document = Document::open(&path, outer.path(), &mut BTreeSet::new()).unwrap();
     assert_eq!(*document.image_bytes(2).unwrap().unwrap(), *b"secret");
-    // A buffer that is too short, one that is not there, and one that nobody asks for.
+    // Too short, missing, and unreferenced buffers.
     fs::write(folder.join("the data.bin"), &binary[..47]).unwrap();
     let fails = |json: &Value| {
         fs::write(&path, json.to_string()).unwrap();
@@ -182,7 +181,6 @@ fn buffers_may_be_data_uris() {
     assert_eq!(told(&json), "a: buffers[0].byteLength: 4 bytes; its data has 3");
     json["buffers"][0]["uri"] = json!("data:;base64,A");
     assert!(told(&json).starts_with("a: buffers[0].uri: the data URI must be base64"));
-    // The chunk of a container is the first buffer alone.
     json["buffers"] = json!([{ "byteLength": 3 }]);
     assert_eq!(told(&json), "a: buffers[0]: has no uri, but buffer views refer to it");
     json["buffers"] = json!([{ "byteLength": 4 }, { "byteLength": 4 }]);
@@ -231,7 +229,7 @@ fn what_is_no_gltf_is_told() {
         bytes(b"{\"asset\":{\"version\":\"2.0\xff\"}}"),
         "invalid unicode code point"
     );
-    // Deep, and wide.
+    // Deep and wide JSON.
     let deep = format!(
         "{{\"asset\":{{\"version\":\"2.0\"}},\"extras\":{}1{}}}",
         "[".repeat(1 << 20),
@@ -297,7 +295,7 @@ fn every_index_and_word_is_checked() {
     ] {
         let told = with(key, json!(99));
         assert!(told.starts_with(&format!("a: {place}")), "{key}: {told}");
-        // Not one of its lower 32 bits, and no other kind of value.
+        // 64-bit values are not truncated, and other types are errors.
         for value in [
             json!(1u64 << 32),
             json!(-1),
@@ -309,7 +307,7 @@ fn every_index_and_word_is_checked() {
             let told = with(key, value.clone());
             assert!(told.starts_with("a: "), "{key}: {value}: {told}");
         }
-        // Some writers write whole numbers so.
+        // Some exporters write integers as floats.
         if key != "/textures/0/source" {
             let same = good.pointer(key).unwrap().as_f64().unwrap();
             assert_eq!(with(key, json!(same)), "fine true", "{key}");
@@ -399,11 +397,11 @@ fn extensions_are_refused_or_told_by_their_names() {
     let many: Vec<String> = (0..1000).map(|i| format!("X_{i}")).collect();
     let many: Vec<&str> = many.iter().map(String::as_str).collect();
     assert_eq!(with(&[], &many).unwrap().len(), 21);
-    // A primitive that has nothing but what an extension says.
+    // Data in an extension only.
     let (mut json, binary) = small();
     let draco = json!({ "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } });
     json["meshes"][0]["primitives"][0]["extensions"] = draco;
-    assert!(read(container(&json, &binary)).is_ok()); // its accessors have views
+    assert!(read(container(&json, &binary)).is_ok()); // its accessors have buffer views
     json["accessors"][1].as_object_mut().unwrap().remove("bufferView");
     let fault = read(container(&json, &binary)).map(|_| ()).unwrap_err();
     assert_eq!(
@@ -497,7 +495,7 @@ fn no_byte_that_is_changed_is_more_than_a_message() {
             }
         }
     }
-    // Both happen often.
+    // Both outcomes are frequent.
     assert!(good > 1000 && bad > 1000, "{good} {bad}");
 }
 

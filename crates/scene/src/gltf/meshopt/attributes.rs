@@ -1,22 +1,21 @@
-//! Mode 0 of the bitstream, attributes: bytes of elements, as what they differ by from those of the element before
-//! (`KHR_meshopt_compression`, appendix A).
+//! Decoder of delta-coded attributes, meshopt mode 0 (`KHR_meshopt_compression`, appendix A).
 
 use super::{TOO_LONG, TOO_SHORT};
 
-/// The elements of a group, whose deltas have one width.
+/// Elements of a group, with deltas of one width.
 const GROUP: usize = 16;
-/// The most elements of a block.
+/// Maximum elements of a block.
 const BLOCK: usize = 256;
 
-/// The widths of deltas in bits that two bits choose among: of version 0, and of the control modes 0 and 1.
+/// Delta widths in bits by group header: version 0, and control modes 0 and 1.
 const WIDTHS: [[u32; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
 
-/// How four bytes of an element follow from those of the one before.
+/// Delta coding of four bytes of an element.
 #[derive(Clone, Copy)]
 enum Channel {
     Bytes,
     Pairs,
-    /// Rotated by so many bits.
+    /// Rotation of the delta in bits.
     Xor(u32),
 }
 
@@ -45,7 +44,7 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
         };
     }
     let most = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
-    // A block has a byte for four of an element at least, or else a file of no size could ask for any memory.
+    // A block has at least one byte per channel, which bounds the memory of an empty file.
     if count.div_ceil(most).saturating_mul(stride / 4) > data.len() {
         return Err(TOO_SHORT);
     }
@@ -64,7 +63,7 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
                     None => WIDTHS[0],
                     Some(0) => WIDTHS[1],
                     Some(1) => WIDTHS[2],
-                    Some(2) => continue, // zeros
+                    Some(2) => continue, // all zero
                     Some(_) => {
                         deltas[..length].copy_from_slice(take(&mut data, length)?);
                         continue;
@@ -88,14 +87,13 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
     }
 }
 
-/// The next so many bytes.
 fn take<'a>(data: &mut &'a [u8], count: usize) -> Result<&'a [u8], &'static str> {
     let (taken, rest) = data.split_at_checked(count).ok_or(TOO_SHORT)?;
     *data = rest;
     Ok(taken)
 }
 
-/// The deltas of a group: each in `width` bits, or, where all of these are ones, in a byte that follows them.
+/// Decodes the deltas of a group. All ones are an escape to a following byte.
 fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str> {
     let mut deltas = [0; GROUP];
     if width == 0 {
@@ -112,7 +110,7 @@ fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str>
         let i = i as u32;
         let byte = packed[(i / each) as usize];
         let place = i % each;
-        // Single bits begin at the lowest of a byte, others at the highest.
+        // Single bits are stored from the lowest of a byte, wider deltas from the highest.
         let shift = if width == 1 { place } else { 8 - width * (place + 1) };
         *delta = byte >> shift & most;
     }
@@ -124,7 +122,7 @@ fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str>
     Ok(deltas)
 }
 
-/// Puts four bytes of each element in their places, and gives those of the last.
+/// Decodes a channel of a block; returns its last element.
 fn undo(
     kind: Channel,
     deltas: &[[u8; BLOCK]; 4],

@@ -1,6 +1,6 @@
-//! What is done to attributes that are decoded (`KHR_meshopt_compression`, appendix B).
+//! Filters of decoded meshopt attributes (`KHR_meshopt_compression`, appendix B).
 
-/// A filter. Its stride has been checked.
+/// A filter; its stride is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Filter {
     None,
@@ -11,7 +11,7 @@ pub(super) enum Filter {
 }
 
 impl Filter {
-    /// Changes all elements in place. Values that the specification leaves open become some or others.
+    /// Filters in place. Results of invalid values are unspecified.
     pub fn apply(self, bytes: &mut [u8], stride: usize) {
         match (self, stride) {
             (Filter::None, _) => {}
@@ -41,7 +41,6 @@ impl Filter {
     }
 }
 
-/// Whole numbers as bytes have them.
 trait Component: Copy {
     const SIZE: usize;
     fn read(bytes: &[u8]) -> Self;
@@ -78,7 +77,7 @@ fn each<T: Component>(bytes: &mut [u8], change: impl Fn([T; 4]) -> [T; 4]) {
     }
 }
 
-/// A unit vector; the last component stays.
+/// Decodes an octahedral unit vector; the last component is unchanged.
 fn octahedral<T>([x, y, one, _]: [f32; 4], most: f32, last: T, whole: impl Fn(f32) -> T) -> [T; 4] {
     let (x, y) = (x / one, y / one);
     let z = 1.0 - x.abs() - y.abs();
@@ -104,12 +103,12 @@ fn quaternion(v: [i16; 4]) -> [i16; 4] {
 
 fn exponential(value: i32) -> f32 {
     let (exponent, mantissa) = (value >> 24, value << 8 >> 8);
-    // Within what 32 bits have without subnormals; the specification has -100 to 100.
+    // Without subnormals; the specification has -100 to 100.
     let power = f32::from_bits(((exponent.max(-126) + 127) as u32) << 23);
     power * mantissa as f32
 }
 
-/// YCoCg; how many bits a component has is where the highest bit of alpha is.
+/// Decodes YCoCg of the bit depth given by the highest bit of alpha.
 fn color(y: i32, co: i32, cg: i32, a: i32, most: f32) -> [f32; 4] {
     let bits = 32 - a.leading_zeros();
     let all = (1 << bits) - 1;

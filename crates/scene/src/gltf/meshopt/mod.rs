@@ -1,7 +1,7 @@
-//! Views of buffers that are compressed by `EXT_meshopt_compression` or `KHR_meshopt_compression` (Khronos Group, the
-//! extensions' specifications; the second has all of the first).
+//! Buffer views compressed with `EXT_meshopt_compression` or its superset `KHR_meshopt_compression` (Khronos Group,
+//! specifications of the extensions).
 //!
-//! Not by the crate `meshopt-rs` 0.1.2, which knows version 0 of the bitstream alone and has none of the filters' checks.
+//! The crate `meshopt-rs` 0.1.2 only has version 0 of the bitstream, and does not check filters.
 
 mod attributes;
 mod filter;
@@ -13,15 +13,14 @@ use serde_json::{Map, Value};
 use self::filter::Filter;
 use super::error::{Fault, plain, shown};
 
-/// The extensions' names, the one that goes first before the other.
+/// In order of precedence.
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
-/// What the extension says of a view.
+/// Compression of a buffer view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Compressed {
-    /// Which of the two names it goes by.
+    /// Name of the extension.
     pub name: &'static str,
-    /// The buffer with the stream.
     pub buffer: usize,
     pub offset: u64,
     pub length: u64,
@@ -38,7 +37,6 @@ enum Mode {
     Indices,
 }
 
-/// As the JSON has it.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Said {
@@ -53,7 +51,7 @@ struct Said {
     filter: Option<String>,
 }
 
-/// What a view's extensions say of its compression. `length` is how many bytes the view has.
+/// Returns the compression of a view of `length` bytes.
 pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) -> Result<Option<Compressed>, Fault> {
     let Some((name, said)) = NAMES.iter().find_map(|name| Some((*name, others.get(*name)?))) else {
         return Ok(None);
@@ -122,12 +120,11 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
 }
 
 impl Compressed {
-    /// How many bytes the view has.
     pub fn size(&self) -> u64 {
         self.count as u64 * self.stride as u64
     }
 
-    /// Decodes the stream. The error is the rule that it breaks.
+    /// Decodes the stream. The error is the violated rule.
     pub fn decode(&self, stream: &[u8]) -> Result<Vec<u8>, &'static str> {
         match self.mode {
             Mode::Triangles => indices::triangles(stream, self.count, self.stride),
@@ -141,9 +138,7 @@ impl Compressed {
     }
 }
 
-/// A stream that has fewer bytes than its elements need.
 const TOO_SHORT: &str = "the stream must have bytes for all elements";
-/// A stream that has more.
 const TOO_LONG: &str = "the stream must end where its elements end";
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Streams of another program's encoder against what its decoder makes of them, and streams that are damaged.
+//! Tests of the meshopt decoder: reference streams and damaged ones.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{Compressed, compressed};
 use crate::gltf::made::{container, read};
 
-/// What `tests/gltf/meshopt.mjs` made.
+/// Output of `tests/gltf/meshopt.mjs`.
 const STREAMS: &str = include_str!("streams.txt");
 
 struct Stream {
@@ -46,7 +46,7 @@ fn streams() -> Vec<Stream> {
     streams.collect()
 }
 
-/// FNV-1a of 64 bits.
+/// 64-bit FNV-1a.
 fn hash(bytes: &[u8]) -> String {
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
@@ -74,7 +74,7 @@ fn streams_decode_to_what_the_reference_makes_of_them() {
         let wanted = STANDARD.decode(wanted).unwrap();
         assert_eq!(found.len(), wanted.len());
         if how.filter == super::Filter::Exponential {
-            // Exactly; a zero may have either sign.
+            // Exact, except for the sign of zeros.
             let floats = |bytes: &[u8]| -> Vec<f32> {
                 let words = bytes.as_chunks::<4>().0.iter();
                 words.map(|word| f32::from_le_bytes(*word)).collect()
@@ -82,7 +82,7 @@ fn streams_decode_to_what_the_reference_makes_of_them() {
             assert_eq!(floats(&found), floats(&wanted), "{name}");
             continue;
         }
-        // Within a unit in the last place, as the specification has it.
+        // Within one unit in the last place, by the specification.
         let is_color = how.filter == super::Filter::Color;
         let numbers = |bytes: &[u8]| -> Vec<i32> {
             match (how.stride, is_color) {
@@ -106,10 +106,9 @@ fn streams_decode_to_what_the_reference_makes_of_them() {
     }
 }
 
-/// The examples of the specification's text.
 #[test]
 fn the_examples_of_the_specification_are_right() {
-    // Sixteen deltas in four bits, of the first of four bytes; the others do not change.
+    // Sixteen 4-bit deltas of the first byte.
     let mut stream = vec![0xa0, 2, 0x17, 0x5f, 0xf0, 0xbc, 0x77, 0xa9, 0x21, 0x00, 0x34, 0xb5];
     stream.extend([0; 3 + 32]);
     let bytes = described("ATTRIBUTES", "NONE", 4, 16).unwrap().decode(&stream).unwrap();
@@ -123,7 +122,7 @@ fn the_examples_of_the_specification_are_right() {
         })
         .collect();
     assert_eq!(bytes, wanted);
-    // Numbers of 7 bits a byte: from the first baseline, half of a half of each.
+    // 7 bits per byte, zigzag, from the first baseline.
     let indices = |numbers: &[u8]| {
         let mut stream = vec![0xd1];
         stream.extend(numbers);
@@ -139,12 +138,12 @@ fn the_examples_of_the_specification_are_right() {
         indices(&[0xff, 0xff, 0xff, 0xff, 0x8f, 0x00]),
         Err("the stream's numbers must have at most 5 bytes")
     );
-    // The first triangle is new, the second shares an edge with it.
+    // A new triangle, and one that shares an edge.
     let mut stream = vec![0xe1, 0xf0, 0x00];
     stream.extend([0; 16]);
     let bytes = described("TRIANGLES", "NONE", 2, 6).unwrap().decode(&stream).unwrap();
     assert_eq!(bytes, [0, 0, 1, 0, 2, 0, 0, 0, 2, 0, 3, 0]);
-    // Nothing is there to share yet.
+    // No edge yet.
     let mut stream = vec![0xe1, 0x00];
     stream.extend([0; 16]);
     assert!(described("TRIANGLES", "NONE", 2, 3).unwrap().decode(&stream).is_err());
@@ -155,7 +154,7 @@ fn damaged_streams_are_refused_or_decode_to_something() {
     let (mut good, mut bad) = (0, 0);
     for Stream { name, how, bytes, .. } in streams() {
         for length in 0..bytes.len() {
-            // One that is cut is short by its tail at least; what is in it is taken from elsewhere, and need not fit.
+            // The tail of a truncated stream is misplaced, so the stream cannot end correctly.
             if how.decode(&bytes[..length]).is_ok() {
                 panic!("{name}: {length} of {} bytes", bytes.len());
             }
@@ -196,7 +195,6 @@ fn a_small_stream_asks_for_little_memory() {
         stream[0] = first;
         assert!(how.decode(&stream).is_err());
     }
-    // What an encoder makes of zeros is accepted, all the same.
     let how = described("ATTRIBUTES", "NONE", 4, 256 * 10).unwrap();
     let mut stream = vec![0xaa; 1 + 10 + 24];
     stream[0] = 0xa1;

@@ -1,4 +1,4 @@
-//! The header of a PLY file: what elements there are, and the types of their properties.
+//! PLY headers: elements and property types.
 
 use super::super::damage::{self, Damages};
 use super::super::error::{Fault, Place, shown};
@@ -37,7 +37,7 @@ impl Scalar {
         })
     }
 
-    /// Its bytes in a binary file.
+    /// Returns the size in bytes.
     pub fn size(self) -> usize {
         match self {
             Scalar::I8 | Scalar::U8 => 1,
@@ -47,7 +47,7 @@ impl Scalar {
         }
     }
 
-    /// The largest number of a type of whole numbers.
+    /// Returns the maximum of an integer type.
     pub fn largest(self) -> Option<f64> {
         Some(match self {
             Scalar::I8 => i8::MAX.into(),
@@ -67,7 +67,7 @@ impl Scalar {
 
 pub(super) struct Property {
     pub name: String,
-    /// The type of a list's length, if it is a list.
+    /// Type of a list's length.
     pub count: Option<Scalar>,
     pub scalar: Scalar,
 }
@@ -76,7 +76,6 @@ pub(super) struct Element {
     pub name: String,
     pub count: usize,
     pub properties: Vec<Property>,
-    /// Where the header tells of it.
     pub place: Place,
 }
 
@@ -86,7 +85,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Returns the number of rows that have values.
+    /// Returns the number of rows with values.
     pub fn rows(&self) -> u128 {
         let with_values = self.elements.iter().filter(|element| !element.properties.is_empty());
         with_values.map(|element| element.count as u128).sum()

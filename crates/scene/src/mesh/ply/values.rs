@@ -1,19 +1,16 @@
-//! The values behind the header of a PLY file: numbers in words, or bytes of either order.
+//! PLY values: ASCII, or binary of either byte order.
 
 use super::super::error::{Fault, Place, shown};
 use super::super::words::{self, Words};
 use super::header::Scalar;
 
-/// The values, one after the other.
 pub(super) trait Values {
     fn next(&mut self, scalar: Scalar) -> Result<f64, Fault>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault>;
-    /// The fewest bytes that so many values take.
     fn fewest_bytes(&self, scalar: Scalar) -> usize;
     fn left(&self) -> usize;
-    /// Where the next value is.
     fn place(&mut self) -> Place;
-    /// Ends a row. Returns its line if that has more values, which are skipped.
+    /// Ends a row. Returns its line if that has more values.
     fn end_row(&mut self) -> Option<Place> {
         None
     }
@@ -21,7 +18,7 @@ pub(super) trait Values {
 
 pub(super) struct Ascii<'a> {
     pub words: Words<'a>,
-    /// Each row ends with its line. Otherwise a line may have several rows.
+    /// Each row is one line.
     pub by_lines: bool,
 }
 
@@ -40,7 +37,7 @@ impl Values for Ascii<'_> {
         (0..count).try_for_each(|_| self.next(scalar).map(|_| ()))
     }
 
-    /// A digit and a blank; the last one has no blank.
+    /// A digit and a separator, which `left` includes for the last value.
     fn fewest_bytes(&self, _: Scalar) -> usize {
         2
     }

@@ -1,6 +1,6 @@
-//! A scene file in parts, so that a parser holds one of them at a time: what it makes of a text takes some 30 times the
-//! text's memory. A part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]`, `[textures.NAME]`, `[meshes.NAME]` or `[[instances]]`; what is
-//! outside of these is one part.
+//! Scene files in parts that are parsed one at a time, because the parser needs about 30 times the memory of a text. A
+//! part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]`, `[textures.NAME]`, `[meshes.NAME]` or
+//! `[[instances]]`; everything else is one part.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -14,10 +14,10 @@ use super::syntax::{explained, syntax_error};
 use crate::error::SceneError;
 use crate::key_path::{KeyPath, Segment};
 
-/// The largest part in bytes, and the largest file that has to be read as a whole.
+/// Maximum size in bytes of a part, and of a file that must be parsed as a whole.
 pub const LARGEST: usize = 4 << 20;
 
-/// What a part belongs to.
+/// The section of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Textures,
@@ -49,38 +49,37 @@ impl Kind {
         }
     }
 
-    /// Whether its tables have names.
+    /// Returns true if the tables have names.
     fn is_map(self) -> bool {
         matches!(self, Kind::Textures | Kind::Materials | Kind::Meshes)
     }
 }
 
-/// A table with those below it that follow it.
+/// A table and the subtables that follow it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
     pub kind: Kind,
-    /// Where it is in the text, its header first.
+    /// Range in the text, including the header.
     pub place: Range<usize>,
 }
 
-/// A text's parts. Each is a TOML document by itself.
+/// The parts of a text. Each is a standalone TOML document.
 pub struct Parts<'a> {
     pub text: &'a str,
     pub parts: Cow<'a, [Part]>,
 }
 
-/// An error in a text.
 #[derive(Debug)]
 pub struct Broken {
     /// Byte offset.
     pub at: usize,
     message: String,
-    /// Whether the message is the TOML parser's, and the place is known.
+    /// True if the message is from the TOML parser, with a known location.
     is_syntax: bool,
 }
 
 impl Broken {
-    /// Returns the parser's error of the document that begins at `start`.
+    /// Returns an error of the document that starts at `start`.
     pub fn of(start: usize, error: &Error) -> Broken {
         Broken {
             at: start + error.span().map_or(0, |span| span.start),
@@ -97,7 +96,6 @@ impl Broken {
         }
     }
 
-    /// Returns the error of the text of a file.
     pub fn into_error(self, text: &str, origin: &str) -> SceneError {
         let message = match self.is_syntax {
             true => explained(text, self.at, &self.message),
@@ -106,7 +104,7 @@ impl Broken {
         syntax_error(text, origin, self.at, &message)
     }
 
-    /// A text that would have to be read as a whole, and is too large for that.
+    /// Returns the error of a text that must be parsed as a whole but is too large.
     pub fn whole(text: &str) -> Broken {
         let size = text.len() as f64 / f64::from(1 << 20);
         let rule =
@@ -119,16 +117,16 @@ impl Broken {
     }
 }
 
-/// What is outside of the parts, as a document by itself.
+/// The text outside of the parts, as a standalone document.
 #[derive(Default)]
 pub struct Rest {
     pub text: String,
-    /// Where each piece of it begins, here and in the whole text.
+    /// Start of each piece, here and in the whole text.
     pieces: Vec<(usize, usize)>,
 }
 
 impl Rest {
-    /// Where a byte of it is in the whole text.
+    /// Returns the offset of a byte in the whole text.
     pub fn place(&self, at: usize) -> usize {
         let next = self.pieces.partition_point(|(here, _)| *here <= at);
         let (here, there) = next.checked_sub(1).map_or((0, 0), |last| self.pieces[last]);
@@ -136,13 +134,13 @@ impl Rest {
     }
 }
 
-/// A name that a part's table has, if it has one, and the table.
+/// The name of a part, if it has one, and its table.
 pub type Named = (Option<String>, Table);
 
 impl<'a> Parts<'a> {
     pub fn of(text: &'a str) -> Parts<'a> {
         let mut parts: Vec<Part> = Vec::new();
-        // The keys of the part's header, while it goes on.
+        // Keys of the header of the current part.
         let mut open: Option<Vec<&str>> = None;
         for header in Headers::of(text) {
             let below = |keys: &Vec<&str>| header.keys.len() > keys.len() && header.keys.starts_with(keys);
@@ -170,7 +168,6 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// What is outside of the parts.
     pub fn rest(&self) -> Rest {
         let mut rest = Rest::default();
         let mut end = 0;
@@ -185,7 +182,7 @@ impl<'a> Parts<'a> {
         rest
     }
 
-    /// What is larger than [`LARGEST`], if anything is.
+    /// Returns the error of a text with a part larger than [`LARGEST`].
     pub fn too_large(&self) -> Option<Broken> {
         let large = self.parts.iter().find(|part| part.place.len() > LARGEST);
         if let Some(part) = large {
@@ -197,7 +194,6 @@ impl<'a> Parts<'a> {
         (rest > LARGEST).then(|| Broken::whole(self.text))
     }
 
-    /// The tables outside of the parts.
     pub fn read_rest(&self) -> Result<Table, Broken> {
         let rest = self.rest();
         toml::from_str(&rest.text).map_err(|error| {
@@ -209,7 +205,7 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// The table of a part; `None` if it is none of its kind, and the file must be read as a whole.
+    /// Parses a part; `None` if it is not one element of its section and the file must be parsed as a whole.
     pub fn read(&self, part: &Part) -> Result<Option<Named>, Broken> {
         let document = toml::from_str(self.text(part)).map_err(|error| Broken::of(part.place.start, &error));
         let mut document: Table = document?;
@@ -226,7 +222,7 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// What TOML says of two parts together, which have the same name.
+    /// Returns the TOML error of two parts with the same name.
     pub fn twice(&self, name: &str, part: &Part) -> Option<Broken> {
         let path = [part.kind.name(), name].map(Segment::from);
         let (first, _) = self.find(&KeyPath(path.to_vec()))?;
@@ -243,7 +239,7 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// The part that a key path leads into, and the path in it.
+    /// Returns the part that contains a path, and the path in it.
     pub fn find(&self, path: &KeyPath) -> Option<(&Part, KeyPath)> {
         let [Segment::Key(first), second, rest @ ..] = path.0.as_slice() else {
             return None;
@@ -270,19 +266,18 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// A table's header: `[a.b]` or `[[a.b]]`.
+/// A table header: `[a.b]` or `[[a.b]]`.
 struct Header<'a> {
     start: usize,
     is_array: bool,
-    /// As they are written.
     keys: Vec<&'a str>,
 }
 
-/// The headers of a text, in its order. What is no header, or a broken one, is passed over.
+/// The headers of a text, in order. Invalid ones are skipped.
 struct Headers<'a, T: Iterator<Item = Token>> {
     text: &'a str,
     tokens: T,
-    /// Whether a statement may begin: at the start, and on a new line.
+    /// True where a statement may begin: at the start, and on a new line.
     begins: bool,
 }
 
@@ -297,7 +292,7 @@ impl<'a> Headers<'a, toml_parser::lexer::Lexer<'a>> {
 }
 
 impl<'a, T: Iterator<Item = Token>> Headers<'a, T> {
-    /// The header whose first bracket stands at `start`; the tokens go on behind it.
+    /// Parses the header that starts at `start`.
     fn header(&mut self, start: usize) -> Option<Header<'a>> {
         let mut keys = Vec::new();
         let mut brackets = [1, 0]; // opened, closed
@@ -337,7 +332,7 @@ impl<'a, T: Iterator<Item = Token>> Iterator for Headers<'a, T> {
                     self.begins = false;
                     match self.header(token.span().start()) {
                         Some(header) => return Some(header),
-                        None => self.begins = true, // on the next line, or the text is broken
+                        None => self.begins = true, // on the next line, or the text is invalid
                     }
                 }
                 TokenKind::LeftSquareBracket | TokenKind::LeftCurlyBracket => {

@@ -1,4 +1,4 @@
-//! A text read by its parts says what it says read as a whole.
+//! Tests that parsing a text by parts and as a whole gives the same result.
 
 use super::*;
 use crate::Description;
@@ -20,7 +20,7 @@ fn whole(text: &str) -> Result<Description, SceneError> {
     read_file(table).map_err(|problems| invalid(text, "s", problems, &Defines::new(&[])))
 }
 
-/// The same by parts, with line and column of what is wrong.
+/// Returns the description of a text that is parsed by parts, or its error.
 fn by_parts(text: &str) -> Result<Description, String> {
     Description::parse(text, "s").map_err(|error| error.to_string())
 }
@@ -43,7 +43,7 @@ fn good_files_say_the_same() {
     let text = "[materials.z]\ntype = 'phong'\n[materials.z.color]\ntexture = \"\"\"\n[[shapes]]\n\"\"\"\n";
     let render = "[render]\nseed = 3\n[render.pixel_samples]\ncount = 4\n";
     let pieces = [POINT, SPHERE, RED, BLUE, sub, image, nested, text, render];
-    // Every order of three, and those in which a table below comes late or a table is defined twice, which is an error.
+    // Every order of three pieces; late subtables and duplicate tables are errors.
     for a in pieces {
         for b in pieces {
             for c in pieces {
@@ -74,7 +74,7 @@ fn bad_files_are_told_the_same() {
         render = "[render]\nseed = 3\n"
     );
     assert_same(&good);
-    // Every line left out, doubled, cut in the middle, or with something before it.
+    // Every line removed, duplicated, truncated, or with an insertion before it.
     let lines: Vec<&str> = good.lines().collect();
     for i in 0..lines.len() {
         let line = lines[i];

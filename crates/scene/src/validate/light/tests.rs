@@ -1,8 +1,8 @@
-//! The rules of spot lights, at the ends of their ranges.
+//! Tests of spot lights at both ends of their ranges.
 
 use crate::{Light, Scene};
 
-/// The light of a scene, or what is told of it.
+/// Returns the light of a scene, or the error.
 fn spot(keys: &str) -> Result<Light, String> {
     let text = format!(
         "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\

@@ -1,4 +1,4 @@
-//! What is told of meshes that break a rule, and where good ones are.
+//! Tests of the errors of meshes, and of their placement.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use super::*;
 use crate::{Description, Encoding, Image, Scene, SceneError, Texels};
 
-/// A scene that names meshes in each way.
+/// A scene with all kinds of references to meshes.
 const GOOD: &str = r#"image = { width = 4, height = 4 }
 camera = { position = [0, -9, 0], look_at = [0, 0, 0], fov = 40 }
 [textures.checks]
@@ -42,11 +42,10 @@ materials = { roof = "red", brick = "white" }
 rotate = { axis = [0, 0, 2], degrees = 45 }
 "#;
 
-/// A triangle without names.
 const ONE: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\nf 1 2 3\n";
-/// The same with texture coordinates.
+/// A triangle with texture coordinates.
 const COORDINATES: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
-/// Three groups: `roof` of no material, `wall` of brick, and one of brick whose name is `door`.
+/// Three groups: `roof` without a material, `wall` of brick, and `door` of brick.
 const PARTS: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\ng roof\nf 1 2 3\nv 0 0 5\nv 1 0 5\nv 0 2 9\nusemtl brick\ng wall\nf 4 5 6\n\
                      v 0 0 7\nv 1 0 7\nv 0 2 8\ng door\nf 7 8 9\n";
 
@@ -72,14 +71,14 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     parse_in(&folder(), text)
 }
 
-/// The good scene with one line changed.
+/// Returns the valid scene with one line changed.
 fn with(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
     assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
     GOOD.replace(&line, &format!("\n{changed}\n"))
 }
 
-/// Where a shape is: the map of its mesh to the scene.
+/// Returns the mesh-to-world transform of a shape.
 fn to_world(scene: &Scene, shape: usize) -> DAffine3 {
     match scene.shapes[shape].geometry {
         Geometry::Mesh { to_world, .. } => to_world,
@@ -87,7 +86,6 @@ fn to_world(scene: &Scene, shape: usize) -> DAffine3 {
     }
 }
 
-/// The materials of a mesh's groups.
 fn groups(scene: &Scene, shape: usize) -> &[usize] {
     match &scene.shapes[shape].geometry {
         Geometry::Mesh { materials, .. } => materials,
@@ -98,7 +96,7 @@ fn groups(scene: &Scene, shape: usize) -> &[usize] {
 const LINE_OF_MATERIALS: &str = r#"materials = { roof = "red", brick = "white" }"#;
 const LINE_OF_MATRIX: &str = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]]";
 
-/// A line of the good scene, what stands there instead, and what is told of it.
+/// A line of the valid scene, its replacement, and the error.
 const BAD: &[(&str, &str, &str)] = &[
     // Files.
     (
@@ -141,13 +139,13 @@ const BAD: &[(&str, &str, &str)] = &[
         "file = \"parts.obj\"\nscale = 2",
         "meshes.parts.scale: unknown key; expected one of \"file\", \"normals\", \"up\"",
     ),
-    // Meshes by their names.
+    // Names of meshes.
     (
         "mesh = \"parts\"",
         "mesh = \"part\"",
         "instances[0].mesh: there is no mesh \"part\"; did you mean \"parts\"?",
     ),
-    // Places.
+    // Placement.
     (
         LINE_OF_MATRIX,
         "scale = 0",
@@ -292,7 +290,7 @@ fn files_are_told_with_their_own_places() {
         ("far.obj", "\"far.obj\" reaches to "),
         ("small.obj", ""),
     ] {
-        // Twice as large as its file at least, and three times as far away.
+        // At least scaled by 2, and moved three times as far.
         let text = GOOD.replacen("file = \"one.obj\"", &format!("file = \"{file}\""), 1);
         match parse_in(&folder, &text) {
             Ok(_) => assert_eq!(told, ""),
@@ -372,7 +370,7 @@ fn groups_have_the_materials_of_their_names_first() {
     assert_eq!(groups(&scene, 2), [1, 2, 2]);
     let changed = "material = 'red'\nmaterials = { wall = 'white' }";
     assert_eq!(groups(&parse(&with(LINE_OF_MATERIALS, changed)).unwrap(), 2), [1, 2, 1]);
-    // A group's own name goes before that of its material.
+    // The name of a group takes precedence over that of its material.
     let changed = "material = 'red'\nmaterials = { brick = 'white', door = 'red' }";
     assert_eq!(groups(&parse(&with(LINE_OF_MATERIALS, changed)).unwrap(), 2), [1, 2, 1]);
 }
@@ -388,7 +386,7 @@ fn textures_are_on_meshes_with_coordinates() {
     assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::X, Vec2::Y]);
 }
 
-/// Wherever a material of the path tracer has its texture.
+/// Tests all textures of the materials of the path integrator.
 #[test]
 fn every_texture_of_a_material_needs_coordinates() {
     let texture = "{ texture = \"checks\" }";
@@ -431,7 +429,6 @@ fn every_texture_of_a_material_needs_coordinates() {
 fn meshes_are_scaled_then_turned_then_moved() {
     let scene = parse(GOOD).unwrap();
     let at = |shape, p: [f64; 3]| to_world(&scene, shape).transform_point3(p.into());
-    // Quarter turns are exact.
     assert_eq!(at(0, [1.0, 0.0, 0.0]), DVec3::new(1.0, 4.0, 3.0));
     assert_eq!(at(0, [0.0, 2.0, 4.0]), DVec3::new(-3.0, 2.0, 11.0));
     assert_eq!(at(1, [1.0, 2.0, 4.0]), DVec3::new(6.0, 8.0, 11.0));
@@ -444,7 +441,7 @@ fn the_axes_are_turned_about_in_their_order() {
     let text = with("rotate = [0, 0, 90]", "rotate = [90, 0, 90]").replace("scale = 2\n", "");
     let scene = parse(&text).unwrap();
     let turned = |p: [f64; 3]| to_world(&scene, 0).transform_vector3(p.into());
-    // About x: y becomes z; then about z: x becomes y.
+    // About x, y becomes z; then about z, x becomes y.
     assert_eq!(turned([0.0, 1.0, 0.0]), DVec3::Z);
     assert_eq!(turned([1.0, 0.0, 0.0]), DVec3::Y);
     assert_eq!(turned([0.0, 0.0, 1.0]), DVec3::X);
@@ -465,9 +462,9 @@ fn another_axis_may_be_up() {
         let text = with(LINE_OF_MATRIX, &format!("up = '{up}'"));
         let map = to_world(&parse(&text).unwrap(), 1);
         assert_eq!((map.x_axis, map.y_axis, map.z_axis), (x, y, z), "{up}");
-        // No mesh is mirrored by that.
+        // No reflection.
         assert_eq!(map.matrix3.determinant(), 1.0);
-        // All else is done to the turned mesh.
+        // The other transforms are applied after the rotation.
         let text = with(
             LINE_OF_MATRIX,
             &format!("up = '{up}'\nscale = [1, 2, 3]\ntranslate = [5, 6, 7]"),

@@ -1,4 +1,4 @@
-//! What MTL files make of meshes, and what is told of them.
+//! Tests of materials from MTL files, and their warnings.
 
 use std::fs;
 use std::path::PathBuf;
@@ -13,14 +13,14 @@ const SCENE: &str = "image = { width = 4, height = 4 }\n\
                      [materials.own]\ntype = 'mirror'\n";
 const MESH: &str = "[[shapes]]\ntype = 'mesh'\nfile = 'in/a.obj'\n";
 
-/// Triangles with texture coordinates: of red, of red with a name, and of blue.
+/// Triangles with texture coordinates: red, red with a group name, and blue.
 const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 2 4\nv 0 0 5\nv 1 0 5\nv 0 2 9\nv 0 0 6\nv 1 0 6\nv 0 2 8\nvt 0 0\n\
                    usemtl red\nf 1/1 2/1 3/1\ng door\nf 4/1 5/1 6/1\nusemtl blue\nf 7/1 8/1 9/1\n";
 
 struct Place(TempDir);
 
 impl Place {
-    /// The mesh in the folder `in`, with these materials.
+    /// Creates the mesh in the folder `in`, with these materials.
     fn new(mtl: &str) -> Place {
         let place = Place(tempfile::tempdir().unwrap());
         fs::create_dir(place.path("in")).unwrap();
@@ -47,7 +47,6 @@ impl Place {
     }
 }
 
-/// The names of the materials of a shape's groups.
 fn names(scene: &Scene, shape: usize) -> Vec<&str> {
     match &scene.shapes[shape].geometry {
         Geometry::Mesh { materials, .. } => materials.iter().map(|i| scene.material_names[*i].as_str()).collect(),
@@ -60,7 +59,7 @@ fn named<'a>(scene: &'a Scene, name: &str) -> &'a Material {
     &scene.materials[i]
 }
 
-/// Ambient, diffuse and specular factor, and the exponent.
+/// Returns the ambient, diffuse and specular factors and the exponent.
 fn phong(material: &Material) -> (Color, Color, Color, f64) {
     assert_eq!((material.emission, material.normal_map), (Color::BLACK, None));
     match material.reflection {
@@ -90,7 +89,7 @@ fn groups_have_the_materials_of_their_file() {
         phong(named(&scene, "red")),
         (red, red, plain(0.125, 0.125, 0.125), 96.5)
     );
-    // What the file does not say; and no highlights by its model.
+    // Defaults of the file; its illumination model has no highlights.
     let gray = plain(0.8, 0.8, 0.8);
     assert_eq!(phong(named(&scene, "blue")), (gray, gray, plain(0.0, 0.0, 0.0), 16.0));
 }
@@ -105,7 +104,7 @@ fn the_scene_goes_before_the_file() {
     assert_eq!(materials("material = 'own'"), "own own own");
     assert_eq!(materials("materials = { door = 'own' }"), "red own own");
     assert_eq!(materials("materials = { red = 'own' }"), "own own blue");
-    // Nothing is made of materials that are not used, and nothing is told of them.
+    // Unused materials are neither loaded nor validated.
     place.write("in/a.mtl", "newmtl red\nKe 1 1 1\nmap_Kd none.png\nnewmtl blue\n");
     let scene = place.scene(&format!("{MESH}materials = {{ red = 'own' }}")).unwrap();
     assert_eq!((scene.material_names.len(), scene.textures.len()), (2, 0));
@@ -199,7 +198,6 @@ fn what_cannot_be_rendered_is_told_once() {
         let line = 1 + mtl.lines().count();
         let start = format!("in/a.mtl:{line}: material {told}");
         assert!(note.message.starts_with(&start), "{note}\n{start}");
-        // The other material has it too.
         let place = Place::new(&format!("newmtl red\n{mtl}\nnewmtl blue\n{mtl}\n"));
         let notes = place.scene(MESH).unwrap().notes;
         assert!(
@@ -207,7 +205,7 @@ fn what_cannot_be_rendered_is_told_once() {
             "{notes:?}"
         );
     }
-    // These change nothing, nor does a line that names no file.
+    // Without effect, like a line without a file name.
     let place =
         Place::new("newmtl red\nKs 0\nNs 0\nd 1\nTr 0\nKe 0 0 0\nmap_Ka a.png\nPr 1\nNi 1.5\nillum 2\nnewmtl blue\n");
     place.write("in/a.obj", &format!("mtllib\n{OBJ}"));
@@ -241,10 +239,9 @@ fn a_default_stands_in_for_missing_materials() {
     place.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", ""));
     let expected = note("\"blue\": the file names no MTL file");
     assert_eq!(notes("materials = { red = 'own' }"), [expected]);
-    // A group that names no material is no surprise.
+    // A group without a material causes no warning.
     place.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", "").replace("usemtl ", "g "));
     assert_eq!(notes(""), Vec::<String>::new());
-    // Many names.
     let many = (0..20).fold(OBJ.replace("mtllib a.mtl\n", ""), |text, i| {
         format!("{text}usemtl m{i}\nf 1/1 2/1 {}/1\n", i % 6 + 4)
     });

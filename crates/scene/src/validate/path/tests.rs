@@ -1,4 +1,4 @@
-//! What a scene of the path tracer becomes, and what is told of keys that only one integrator has.
+//! Tests of scenes of the path tracer, and of keys that only one integrator supports.
 
 mod messages;
 mod notes;
@@ -12,7 +12,7 @@ use super::super::super::{
     ValueDescription,
 };
 
-/// One of everything that paths have; every line is there once, so that a test can put another in its place.
+/// All features of the path tracer. Each line is unique, so that tests can replace it.
 const GOOD: &str = r#"
 image = { width = 4, height = 4 }
 camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
@@ -81,7 +81,7 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml")
 }
 
-/// The good scene with a line changed.
+/// Returns the valid scene with one line changed.
 fn with(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
     assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
@@ -233,7 +233,7 @@ fn metals_have_an_index_by_name_or_by_numbers() {
     assert_eq!(color, Color::Plain(DVec3::ONE));
     let found = (facets.roughness, facets.anisotropy, facets.rotation, facets.compensated);
     assert_eq!(found, (Value::Plain(0.5), 1.0, -90.0, false));
-    // Every name is on the page.
+    // The page lists all names.
     let page = include_str!("../../../../../docs/scene-format.md");
     for name in MetalIndex::names() {
         let (_, named, _) = index(&format!("metal = '{name}'"));
@@ -273,7 +273,7 @@ fn what_is_absent_has_defaults() {
     );
     let samples = |pattern, count| Samples { pattern, count };
     assert_eq!(render.pixel_samples, samples(Pattern::Sobol, 16));
-    // Each integrator has a usual pattern; what is said goes before it.
+    // The default pattern depends on the integrator.
     for (integrator, said, pattern) in [
         ("path", "", Pattern::Sobol),
         ("phong", "", Pattern::Grid),
@@ -287,7 +287,7 @@ fn what_is_absent_has_defaults() {
         let render = parse(&text).unwrap().render;
         assert_eq!(render.pixel_samples, samples(pattern, 9), "{integrator}");
     }
-    // So paths may be adaptive without a word on it.
+    // The default pattern of the path tracer supports adaptive sampling.
     parse(&with("clamp = 10", "adaptive = { error = 0.01 }")).unwrap();
 }
 
@@ -309,19 +309,19 @@ fn the_background_is_the_surroundings() {
             background: None,
         })
     );
-    // A black one is none, and stands beside the section.
+    // A black background has no effect.
     let text = GOOD.replace("[render]", "[render]\nbackground = [0, 0, 0]");
     assert_eq!(parse(&text).unwrap(), parse(GOOD).unwrap());
     let black = parse(&with("color = [0.5, 0.25, 0]", "color = [0, 0, 0]")).unwrap();
     assert_eq!(black.environment, None);
-    // Direct light has a background alone.
+    // Phong has only a background.
     let text = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n\
                 render = { background = [1, 1, 1] }\n";
     let scene = parse(text).unwrap();
     assert_eq!((scene.render.background, scene.environment), (DVec3::ONE, None));
 }
 
-/// What code says is what a file says.
+/// Tests that descriptions built in code equal those of a file.
 #[test]
 fn descriptions_made_in_code_are_read_back() {
     let mut clay = DiffuseDescription::new([0.5, 0.4, 0.3]);

@@ -1,8 +1,8 @@
-//! What is told of values that break a rule, and that values at the limits do not.
+//! Tests of invalid values, and of valid values at the limits.
 
 use super::*;
 
-/// A line of the good scene, a bad one in its place, and what is told of it.
+/// A line of the valid scene, its invalid replacement, and the error.
 const BAD: &[(&str, &str, &str)] = &[
     (
         "max_depth = 3",
@@ -222,7 +222,7 @@ fn values_at_the_limits_are_good() {
     ] {
         parse(&with(line, good)).unwrap_or_else(|error| panic!("{good}: {error}"));
     }
-    // A plane may have a material that could shine, and does not.
+    // A plane may have a black texture as emission.
     let dark = with(
         "emission = { texture = \"spots\" }",
         "emission = { texture = \"dark\" }",
@@ -230,7 +230,7 @@ fn values_at_the_limits_are_good() {
     parse(&dark.replace("material = \"clay\"", "material = \"coal\"")).unwrap();
 }
 
-/// A scene of direct light, and what it may not have.
+/// Tests a Phong scene with each feature of the path tracer.
 #[test]
 fn what_only_paths_have_is_refused_under_phong() {
     const START: &str = "image = { width = 1, height = 1 }\n\
@@ -292,7 +292,7 @@ fn what_only_paths_have_is_refused_under_phong() {
             "render.integrator is not set; using \"path\", which {key} requires. Set it in the scene to silence this warning"
         );
         assert_eq!(scene.notes[0], note);
-        // It is the integrator that counts, wherever it is from.
+        // An overridden integrator counts.
         let overrides = |integrator| Overrides {
             integrator: Some(integrator),
             ..Overrides::default()

@@ -1,4 +1,4 @@
-//! What is told of values that have no effect, or another one.
+//! Tests of warnings about values that are ignored or changed.
 
 use super::super::LIGHT_SAMPLES;
 use super::*;
@@ -35,7 +35,7 @@ fn what_paths_ignore_is_told() {
         let text = GOOD.replace("[render]", &format!("[render]\n{same}"));
         assert_eq!(notes(&text), Vec::<String>::new());
     }
-    // An option is told whatever its value, and once.
+    // The option causes one warning, whatever its value.
     for count in [16, 9] {
         let overrides = Overrides {
             light_samples: Some(count),
@@ -44,7 +44,7 @@ fn what_paths_ignore_is_told() {
         let scene = Scene::parse_with(GOOD, "s.toml", &overrides).unwrap();
         assert_eq!(scene.notes, [LIGHT_SAMPLES]);
     }
-    // Direct light does all of it.
+    // Phong supports all of it.
     let text = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n\
                 materials.a = { type = 'phong', color = [1, 1, 1] }\n\
                 render = { ambient = [1, 1, 1], shadows = 'transparent', light_samples = { count = 4 } }\n";
@@ -61,7 +61,7 @@ fn phong_materials_that_are_too_bright_are_told() {
         (specular, "specular = [0.501, 0, 0]", Some("\"red\" (1.01)")),
         (specular, "specular = [0.5, 1, 1]", None),
         (specular, "specular = [0, 1.5, 1]", Some("\"red\" (1.5)")),
-        // The largest of a texture's colours is 1, 2, 3.
+        // The maximum of the texture's colors is 1, 2, 3.
         (diffuse, "diffuse = { texture = 'spots' }", Some("\"red\" (3.5)")),
         (diffuse, "diffuse = { texture = 'dark' }", None),
         (specular, "specular = { texture = 'spots' }", Some("\"red\" (3)")),
@@ -70,7 +70,7 @@ fn phong_materials_that_are_too_bright_are_told() {
         let told: Vec<String> = told.map(|told| format!("{RULE}{told}")).into_iter().collect();
         assert_eq!(notes(&text), told, "{changed}");
     }
-    // Many are one note.
+    // Many materials share a warning.
     let materials: String = (0..10)
         .map(|i| format!("[materials.m{i}]\ntype = 'phong'\ncolor = [0.{i}, 0.8, 0]\n"))
         .collect();
@@ -104,7 +104,6 @@ fn alpha_that_nothing_asks_is_told() {
     ] {
         assert_eq!(leaf(keys), told, "{keys}");
     }
-    // Many are one note.
     let leaves: String = (0..9)
         .map(|i| format!("[materials.leaf{i}]\ntype = 'principled'\nalpha = 0.{i}\n"))
         .collect();
