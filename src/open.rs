@@ -21,7 +21,7 @@ pub(crate) fn cpu(scene: &Packed) -> Ready<'_> {
 /// Returns the reason why the CPU is faster for a scene than any adapter, if it is: measured in `docs/performance.md`.
 #[cfg(feature = "gpu")]
 pub(crate) fn faster_on_cpu(scene: &Packed) -> Option<String> {
-    if scene.specialization.in_tree == 0 {
+    if scene.specialization.tlas_kinds == 0 {
         return None;
     }
     let adapter = gpu::adapters().into_iter().next()?;

@@ -106,7 +106,11 @@ fn driver_cuts_loops() -> bool {
 
 /// Returns shaders that always report completion.
 fn without_check(shaders: &Shaders) -> Shaders {
-    let text = edited(shaders.text("completion.wgsl"), "atomicStore(&completion.cut, 1u);", "");
+    let text = edited(
+        shaders.text("completion.wgsl"),
+        "atomicStore(&completion.truncated, 1u);",
+        "",
+    );
     with(shaders, "completion.wgsl", &text)
 }
 
@@ -200,7 +204,7 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
         }
     }
     // A kernel that does not report completion is rejected on every driver.
-    let unsigned = edited_shaders("completion.wgsl", "atomicAdd(&completion.ended, 1u);", "");
+    let unsigned = edited_shaders("completion.wgsl", "atomicAdd(&completion.groups_done, 1u);", "");
     let device = adapter::device().expect("a device");
     let options = wgray_render::gpu::Options {
         exact: None,

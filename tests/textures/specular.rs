@@ -113,17 +113,8 @@ fn a_glass_ball_before_a_uniform_background_keeps_its_energy() {
 #[test]
 fn clear_glass_of_index_1_is_invisible() {
     let seen = |material: &str| cpu_picture(&ball("[0.1, 0.2, 0.3]", material, ROOM));
-    let without = seen(
-        "type = 'glass'\nior = 1\n[[shapes]]\ntype = 'sphere'\nmaterial = 'gray'\ncenter = [0, 0, -9]\nradius = 1",
-    );
     let clear = seen("type = 'glass'\nior = 1");
     let dense = seen("type = 'glass'\nior = 1.3");
-    let far_away = cpu_picture(&ball(
-        "[0.1, 0.2, 0.3]",
-        "type = 'glass'\nior = 1",
-        &format!("{ROOM}\n"),
-    ));
-    assert_eq!(clear, far_away);
     // Without the ball.
     let nothing = {
         let mut scene = ball("[0.1, 0.2, 0.3]", "type = 'glass'\nior = 1", ROOM);
@@ -136,7 +127,6 @@ fn clear_glass_of_index_1_is_invisible() {
     let visible = |picture: &[[f32; 3]]| farthest(picture, &nothing).iter().filter(|d| **d > 1e-3).count();
     assert!(visible(&clear) <= 2, "{}", visible(&clear)); // edges, due to ray offsets
     assert!(visible(&dense) > 100, "{}", visible(&dense));
-    assert_eq!(without.len(), clear.len());
 }
 
 #[test]

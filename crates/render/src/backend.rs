@@ -111,7 +111,7 @@ impl Rules {
         Rules {
             picture: Region::whole(scene.camera.width, scene.camera.height),
             form: scene.form(),
-            first_look: scene.specialization.first_look,
+            first_look: scene.specialization.pilot_samples,
         }
     }
 

@@ -5,10 +5,10 @@ use wgray_render::records::{BACKGROUND, LOBE_ANISOTROPY, LOBES, Packed, Speciali
 /// Returns all kernel features, each with a flag that is true if the scene uses it.
 pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
     let Specialization {
-        in_tree,
+        tlas_kinds,
         lens,
         panoramic,
-        hidden,
+        camera_invisible,
         filter_bins,
         bounces,
         differentials,
@@ -20,22 +20,22 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
         rough,
         anisotropic,
         lobes,
-        sees_through,
+        alpha_surfaces,
         absorption,
-        shines,
+        emissive,
         light_tree,
         emission_textures,
-        surroundings,
-        most_indirect,
+        environment_flags,
+        max_indirect,
         alpha,
         ..
     } = packed.specialization;
     let is_path = packed.integrator.follows_paths();
     let mut all = vec![
-        ("BVH", in_tree != 0),
+        ("BVH", tlas_kinds != 0),
         ("lens", lens != 0),
         ("panorama", panoramic != 0),
-        ("camera-invisible materials", hidden != 0),
+        ("camera-invisible materials", camera_invisible != 0),
         ("pixel filter", filter_bins != 0),
         ("adaptive sampling", packed.sampling.adaptive),
         ("textures", lookups + specular_lookups != 0),
@@ -54,14 +54,14 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
         (lobe.name, lobes & lobe.bit != 0 || is_in_metal)
     }));
     all.extend([
-        ("alpha", sees_through != 0),
+        ("alpha", alpha_surfaces != 0),
         ("absorption", absorption != 0),
-        ("emissive surfaces", shines != 0),
+        ("emissive surfaces", emissive != 0),
         ("emissive textures", emission_textures != 0),
         ("light tree", light_tree != 0),
         ("environment map", packed.specialization.has_environment_map()),
-        ("separate background", surroundings & BACKGROUND != 0),
-        ("clamp", most_indirect != 0),
+        ("separate background", environment_flags & BACKGROUND != 0),
+        ("clamp", max_indirect != 0),
         ("transparent background", alpha != 0),
     ]);
     all

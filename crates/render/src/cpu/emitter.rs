@@ -100,7 +100,7 @@ pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSam
         let (material, hit) = (&scene.materials[q.material as usize], hit_on_primitive(light.primitive));
         radiance = emission_at(scene, material, &standalone_hit_primitive(q), hit, uv);
     }
-    if scene.specialization.sees_through != 0 && !is_delta {
+    if scene.specialization.alpha_surfaces != 0 && !is_delta {
         let q = &scene.primitives[light.primitive as usize];
         let uv = primitive_uv(q, point_to_local(q, p + to));
         let (material, hit) = (&scene.materials[q.material as usize], hit_on_primitive(light.primitive));
@@ -147,7 +147,7 @@ pub fn sample_face(scene: &Packed, chosen: EmitterSelection, p: Vec3, u: Vec2) -
         let color = vertex_color(scene, hit);
         radiance *= Vec3::new(color.x, color.y, color.z);
     }
-    if scene.specialization.sees_through != 0 {
+    if scene.specialization.alpha_surfaces != 0 {
         radiance *= opacity_at(scene, material, &face, hit, face_uv(&face, b));
     }
     let density = if scene.specialization.light_tree != 0 {

@@ -26,7 +26,7 @@ use crate::records::{
 };
 
 pub fn closest_hit(scene: &Packed, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {
-    if scene.specialization.in_tree == 0 {
+    if scene.specialization.tlas_kinds == 0 {
         return closest_primitive(scene, ray, origin_prim.y, inside_prim.y);
     }
     let hit = closest_primitive(scene, ray, by_itself(origin_prim), by_itself(inside_prim));
@@ -35,7 +35,7 @@ pub fn closest_hit(scene: &Packed, ray: Ray, origin_prim: UVec2, inside_prim: UV
 
 pub fn occluded_samples(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock, unlit: u32) -> u32 {
     let bits = occluded_by_primitives(scene, surface, light, block);
-    if scene.specialization.in_tree == 0 {
+    if scene.specialization.tlas_kinds == 0 {
         return bits;
     }
     occluded_by_bvh(scene, bits | unlit, surface, light, block)
@@ -43,7 +43,7 @@ pub fn occluded_samples(scene: &Packed, surface: &Surface, light: &Light, block:
 
 pub fn is_occluded(scene: &Packed, before: bool, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
     let hidden = before || is_occluded_by_primitives(scene, surface, to, t_max, target_prim);
-    if scene.specialization.in_tree == 0 {
+    if scene.specialization.tlas_kinds == 0 {
         return hidden;
     }
     hidden || is_occluded_by_bvh(scene, surface, to, t_max, target_prim)
@@ -205,7 +205,7 @@ pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
         origin_prim: NO_PRIMITIVE,
         inside_prim: NO_PRIMITIVE,
     };
-    let is_occluded = scene.specialization.hidden != 0;
+    let is_occluded = scene.specialization.camera_invisible != 0;
     if is_occluded {
         path = skip_camera_invisible(scene, path);
     }
@@ -219,7 +219,7 @@ pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
 pub fn path_first_hit(scene: &Packed, path: Path) -> FirstHit {
     let ray = path.ray;
     let mut hit = closest_hit(scene, ray, path.origin_prim, path.inside_prim);
-    if scene.specialization.sees_through != 0 {
+    if scene.specialization.alpha_surfaces != 0 {
         hit = first_seen(scene, ray, hit);
     }
     if hit.primitive == NO_INDEX {

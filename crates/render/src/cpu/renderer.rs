@@ -124,7 +124,7 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
         layers,
     } = film;
     let region = *region;
-    let first_looks = scene.sampling.adaptive && samples.start < scene.specialization.first_look;
+    let first_looks = scene.sampling.adaptive && samples.start < scene.specialization.pilot_samples;
     let (looks_to_read, looks_to_write) = match first_looks {
         true => (&[][..], &mut looks[..]),
         false => (&looks[..], &mut [][..]),
@@ -225,7 +225,7 @@ fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, 
 /// Adds samples after the pilot samples to a pixel, as many as its neighbors' pilot samples require.
 fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, looks: Vec4) {
     let s = &scene.specialization;
-    let end = samples_wanted(looks, s.first_look, f32::from_bits(s.squared_error), samples.end);
+    let end = samples_wanted(looks, s.pilot_samples, f32::from_bits(s.squared_error), samples.end);
     for sample in samples.start..end {
         let (value, layers) = pixel_radiance(scene, pixel, sample);
         run.moments[x] = moments_with(run.moments[x], run.sums[x], value);

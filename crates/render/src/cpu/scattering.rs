@@ -254,7 +254,7 @@ pub fn direction_allowed(
     wi: Vec3,
 ) -> bool {
     let mut lit = is_lit(surface, wi);
-    if scene.specialization.in_tree & (1 << INSTANCE) != 0 {
+    if scene.specialization.tlas_kinds & (1 << INSTANCE) != 0 {
         lit &= face_lets_pass(prim, surface, wi);
     }
     if is_transmissive(material) {
@@ -282,7 +282,7 @@ pub fn lit_normal(surface: &Surface, material: &Material) -> Vec3 {
 pub fn flipped(scene: &Packed, surface: &Surface) -> Surface {
     let mut result = *surface;
     result.ray_origin = surface.position - (surface.ray_origin - surface.position);
-    if scene.specialization.in_tree & (1 << INSTANCE) != 0 {
+    if scene.specialization.tlas_kinds & (1 << INSTANCE) != 0 {
         result.ray_origin += surface.terminator_offset;
     }
     result.exclude_front = surface.exclude_back;

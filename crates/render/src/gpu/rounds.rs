@@ -38,14 +38,14 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
     let casters = casting().sum::<usize>() as f64;
     // Scenes in buffers are read by loops, baked scenes by statements.
     let (of_hit, of_lists) = if baked { (0.0, lists) } else { (all, lists + casters) };
-    let in_tree = if s.in_tree == 0 { 0.0 } else { ROUNDS_OF_TREE };
+    let in_tree = if s.tlas_kinds == 0 { 0.0 } else { ROUNDS_OF_TREE };
     let of_hit = of_hit + in_tree;
     // Camera rays skip camera-invisible surfaces.
-    let of_start = 1.0 + f64::from(s.hidden) * (1.0 + of_hit) * 2.0;
+    let of_start = 1.0 + f64::from(s.camera_invisible) * (1.0 + of_hit) * 2.0;
     if packed.integrator.follows_paths() {
         // Each bounce is an iteration, with a BSDF ray, a shadow ray and texture lookups.
         let to_light = if baked { in_tree } else { casters + in_tree };
-        let passing = if s.sees_through == 0 { 1.0 } else { ROUNDS_OF_PASSING };
+        let passing = if s.alpha_surfaces == 0 { 1.0 } else { ROUNDS_OF_PASSING };
         let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(LONGEST_ROULETTE)));
         // Descent of the light tree to select an emitter, and ascent for the PDF of a hit emitter.
         let levels = 2.0 * f64::from(packed.lighting.nodes.len().max(1).ilog2());

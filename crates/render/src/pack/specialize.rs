@@ -48,13 +48,13 @@ impl Parts<'_> {
         Specialization {
             primitives: self.kinds(|range| range.z),
             shadow_casters: self.kinds(|range| range.y),
-            in_tree: (self.trees.items.iter()).fold(0, |bits, item| bits | 1 << (item.kind & 0xff)),
+            tlas_kinds: (self.trees.items.iter()).fold(0, |bits, item| bits | 1 << (item.kind & 0xff)),
             lights: u32::from(area_lights > 0)
                 | u32::from(lights.len() > area_lights) << 1
                 | u32::from(lights.iter().any(|light| light.kind == SPOT)) << 2,
             lens: scene.camera.lens.is_some().into(),
             panoramic: (scene.camera.projection == Projection::Panorama).into(),
-            hidden: materials.iter().any(|material| material.hidden != 0).into(),
+            camera_invisible: materials.iter().any(|material| material.hidden != 0).into(),
             pixel_pattern: pattern(pixels),
             pixel_side: side(pixels),
             pixel_samples: pixels.count,
@@ -62,7 +62,7 @@ impl Parts<'_> {
             light_side: side(light_samples),
             light_samples: light_samples.count,
             filter_bins: self.filter_bins as u32,
-            first_look: adaptive.map_or(pixels.count, |adaptive| {
+            pilot_samples: adaptive.map_or(pixels.count, |adaptive| {
                 first_look(scene.render.integrator, pixels.count, adaptive.max_samples)
             }),
             squared_error: adaptive
@@ -83,7 +83,7 @@ impl Parts<'_> {
             texel_formats: appearances.formats(),
             ..match is_path {
                 true => Specialization {
-                    surroundings: self.around.bits(scene),
+                    environment_flags: self.around.bits(scene),
                     ..of_paths(scene, materials, appearances, self.shining, lights)
                 },
                 false => Specialization::default(),
@@ -178,9 +178,9 @@ fn of_paths(
         delta_kinds: delta_kinds(materials, appearances),
         anisotropic: any(|material| material.anisotropy > 0.0) | has_lookup(FOR_ANISOTROPY),
         lobes: lobes(materials, appearances),
-        sees_through: any(|material| material.alpha_mode != OPAQUE),
+        alpha_surfaces: any(|material| material.alpha_mode != OPAQUE),
         absorption: any(|material| material.absorption != Vec3::ZERO),
-        shines: any(|material| material.density > 0.0),
+        emissive: any(|material| material.density > 0.0),
         emitters: emitters.len().min(2) as u32,
         light_tree: (!shining.lighting.nodes.is_empty()).into(),
         emitter_kinds: lights
@@ -188,7 +188,7 @@ fn of_paths(
             .fold(u32::from(meshes_emit) << INSTANCE, |bits, light| bits | 1 << light.kind),
         emission_textures: has_lookup(FOR_EMISSION),
         rr_depth: scene.render.rr_depth,
-        most_indirect: scene.render.clamp.map_or(0, |clamp| (clamp as f32).to_bits()),
+        max_indirect: scene.render.clamp.map_or(0, |clamp| (clamp as f32).to_bits()),
         alpha: scene.render.alpha.into(),
         layers: scene.render.alpha.into(),
         ..Specialization::default()

@@ -15,7 +15,7 @@ macro_rules! specialization {
 
             /// Returns true if the scene has an environment map.
             pub fn has_environment_map(&self) -> bool {
-                self.surroundings & super::ENVIRONMENT_MAP != 0
+                self.environment_flags & super::ENVIRONMENT_MAP != 0
             }
 
             /// Returns the declarations of the overrides in WGSL.
@@ -32,7 +32,7 @@ specialization! {
     /// Bit i is set if any of these can cast a shadow.
     shadow_casters = "SHADOW_CASTERS",
     /// Bit i is set if the scene's BVH has primitives of kind i; [`INSTANCE`](super::INSTANCE) for meshes.
-    in_tree = "TLAS_KINDS",
+    tlas_kinds = "TLAS_KINDS",
     /// Bit 0 is set if area lights exist, bit 1 if other lights do, bit 2 if these include spot lights.
     lights = "LIGHTS",
     /// 1 if the camera has a lens, else 0.
@@ -40,7 +40,7 @@ specialization! {
     /// 1 if the camera is a panorama, else 0.
     panoramic = "PANORAMIC",
     /// 1 if any surface is invisible to the camera, else 0.
-    hidden = "CAMERA_INVISIBLE",
+    camera_invisible = "CAMERA_INVISIBLE",
     /// Pattern of the samples of a pixel.
     pixel_pattern = "PIXEL_PATTERN",
     /// Side of its grid of cells; number of samples for patterns without cells.
@@ -56,7 +56,7 @@ specialization! {
     /// Number of bins of the filter table; 0 for a box filter of one pixel.
     filter_bins = "FILTER_BINS",
     /// Number of pilot samples per pixel; all samples without adaptive sampling.
-    first_look = "PILOT_SAMPLES",
+    pilot_samples = "PILOT_SAMPLES",
     /// Bits of the `f32` that is the square of adaptive sampling's target error.
     squared_error = "SQUARED_ERROR",
     /// Bit length of the largest shininess if all are integers up to 4096, else 0.
@@ -90,11 +90,11 @@ specialization! {
     /// Bits of the lobes of [`PRINCIPLED`](super::PRINCIPLED) materials, such as [`LOBE_COAT`](super::LOBE_COAT).
     lobes = "LOBES",
     /// 1 if rays pass any surface by its alpha, else 0.
-    sees_through = "ALPHA_SURFACES",
+    alpha_surfaces = "ALPHA_SURFACES",
     /// 1 if any medium absorbs light, else 0.
     absorption = "ABSORPTION",
     /// 1 if any surface is emissive, else 0.
-    shines = "EMISSIVE",
+    emissive = "EMISSIVE",
     /// 0 if no light can be sampled, 1 for a single emitter, else 2.
     emitters = "EMITTERS",
     /// 1 if a light tree selects emitters, else 0.
@@ -105,11 +105,11 @@ specialization! {
     emission_textures = "EMISSION_TEXTURES",
     /// Flags [`ENVIRONMENT_MAP`](super::ENVIRONMENT_MAP), [`ENVIRONMENT_INVISIBLE`](super::ENVIRONMENT_INVISIBLE) and
     /// [`BACKGROUND`](super::BACKGROUND).
-    surroundings = "ENVIRONMENT_FLAGS",
+    environment_flags = "ENVIRONMENT_FLAGS",
     /// First bounce at which Russian roulette may end a path.
     rr_depth = "RR_DEPTH",
     /// Bits of the `f32` that limits the largest component of an indirect sample; 0 for no limit.
-    most_indirect = "MAX_INDIRECT",
+    max_indirect = "MAX_INDIRECT",
     /// 1 if the background is transparent, else 0.
     alpha = "ALPHA",
     /// 1 if the film has layers, else 0.

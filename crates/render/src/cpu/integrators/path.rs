@@ -71,7 +71,7 @@ pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
         inside_prim: NO_PRIMITIVE,
     };
     let mut skipped_distance = 0.0;
-    if scene.specialization.hidden != 0 {
+    if scene.specialization.camera_invisible != 0 {
         path = skip_camera_invisible(scene, path);
         skipped_distance = dot(path.ray.origin - start.ray.origin, path.ray.direction);
     }
@@ -100,13 +100,13 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
     if hit.primitive == NO_INDEX {
         state.ended = true;
-        let shown = ((s.alpha == 0) & (s.surroundings & ENVIRONMENT_INVISIBLE == 0)) | (path.depth > 0);
-        let arriving = if s.surroundings & ENVIRONMENT_MAP != 0 {
+        let shown = ((s.alpha == 0) & (s.environment_flags & ENVIRONMENT_INVISIBLE == 0)) | (path.depth > 0);
+        let arriving = if s.environment_flags & ENVIRONMENT_MAP != 0 {
             environment_mis(scene, path.ray.direction, state.pdf, state.prev_normal)
         } else {
             scene.environment.radiance
         };
-        let arriving = match s.surroundings & BACKGROUND != 0 && path.depth == 0 {
+        let arriving = match s.environment_flags & BACKGROUND != 0 && path.depth == 0 {
             true => scene.environment.background,
             false => arriving,
         };
@@ -129,7 +129,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
         looked = bounded(shading.material);
         (&looked, shading.normal, shading.coat_normal)
     };
-    if s.sees_through != 0
+    if s.alpha_surfaces != 0
         && !alpha_accepts(
             scene,
             material,
@@ -148,7 +148,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
         let absorption = if inside { material.absorption } else { state.absorption };
         state.path.throughput *= transmittance(absorption, hit.t + state.skipped_distance);
     }
-    if s.shines != 0 {
+    if s.emissive != 0 {
         add_emission(scene, state, &prim, hit, surface, material, true);
     }
     surface.shading_normal = shaded_normal(surface, material, normal);
@@ -180,7 +180,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     if is_delta(material) {
         sample_delta_bsdf(scene, state, surface, at, material, unit_float(choices.x));
     } else {
-        if s.in_tree & (1 << INSTANCE) != 0 {
+        if s.tlas_kinds & (1 << INSTANCE) != 0 {
             surface.ray_origin += surface.terminator_offset;
         }
         if has_facets(material) {
@@ -269,8 +269,8 @@ pub fn decision(scene: &Packed, key: UVec2, sample: u32) -> Vec2 {
 pub fn add_radiance(scene: &Packed, state: &mut PathState, found: Vec3, taken: bool, bounces: u32) {
     let s = &scene.specialization;
     let mut radiance = if taken { found } else { Vec3::ZERO };
-    if s.most_indirect != 0 && bounces > 1 {
-        let scale = f32::from_bits(s.most_indirect) / max(largest(found), 1e-30);
+    if s.max_indirect != 0 && bounces > 1 {
+        let scale = f32::from_bits(s.max_indirect) / max(largest(found), 1e-30);
         radiance *= min(scale, 1.0);
     }
     state.radiance += radiance;
@@ -309,7 +309,7 @@ pub fn add_emission(
     if weighs {
         let mut ray = state.path.ray;
         let mut seen = hit;
-        if scene.specialization.sees_through != 0 {
+        if scene.specialization.alpha_surfaces != 0 {
             ray.origin -= ray.direction * state.skipped_distance;
             seen.t += state.skipped_distance;
         }
@@ -322,7 +322,7 @@ pub fn add_emission(
 
 pub fn past(scene: &Packed, state: &mut PathState, surface: Surface, at: HitDifferential, t: f32) {
     state.path = pass_through_path(state.path, surface, at);
-    if scene.specialization.hidden != 0 && state.path.depth == 0 {
+    if scene.specialization.camera_invisible != 0 && state.path.depth == 0 {
         let start = state.path.ray;
         state.path = skip_camera_invisible(scene, state.path);
         state.skipped_distance += dot(state.path.ray.origin - start.origin, start.direction);
@@ -427,7 +427,7 @@ pub fn add_direct_light(
     };
     let most = largest(found);
     let dark = !(wanted && most > 0.0 && most < INFINITE_T);
-    if scene.specialization.sees_through != 0 {
+    if scene.specialization.alpha_surfaces != 0 {
         let bounce = state.path.depth + 1;
         let (t_max, target_prim) = (light.t_max, light.primitive);
         let veiled = is_occluded_alpha(
@@ -500,7 +500,7 @@ pub fn sample_bsdf(
     if scene.specialization.light_tree != 0 {
         state.prev_position = surface.ray_origin;
     }
-    if (scene.specialization.light_tree != 0) | (scene.specialization.surroundings & ENVIRONMENT_MAP != 0) {
+    if (scene.specialization.light_tree != 0) | (scene.specialization.environment_flags & ENVIRONMENT_MAP != 0) {
         state.prev_normal = lit_normal(surface, material);
     }
 }

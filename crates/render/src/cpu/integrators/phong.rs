@@ -33,7 +33,7 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
         origin_prim: NO_PRIMITIVE,
         inside_prim: NO_PRIMITIVE,
     };
-    if scene.specialization.hidden != 0 {
+    if scene.specialization.camera_invisible != 0 {
         path = skip_camera_invisible(scene, path);
     }
     if bounces == 0 {
@@ -157,7 +157,7 @@ pub fn lobes_of_light(
             key,
         };
         let mut unlit = 0;
-        if scene.specialization.in_tree != 0 {
+        if scene.specialization.tlas_kinds != 0 {
             unlit = unlit_mask(prim, surface, to, block);
         }
         let hidden = occluded_samples(scene, surface, light, block, unlit);
