@@ -278,7 +278,7 @@ mod tests {
                 (
                     "completion.wgsl",
                     "",
-                    "struct Receipts { ended: atomic<u32>, more: f32, cut: atomic<u32> }",
+                    "struct Receipts { groups_done: atomic<u32>, more: f32, truncated: atomic<u32> }",
                 ),
             ],
             &["bindings.wgsl: `completion` is not laid out .. `completion.more` is `f32`"],
