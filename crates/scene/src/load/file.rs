@@ -39,7 +39,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     })
 }
 
-/// Reads a file of at most [`MAX_FILE_BYTES`]; pipes and devices that may block are refused.
+/// Reads a file of at most 64 MiB; pipes and devices that may block are refused.
 pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     waiting::check(path)?;
     if path.is_dir() {
