@@ -83,11 +83,11 @@ constants! {
     /// [`Light::kind`](super::Light::kind): the environment map.
     pub const ENVIRONMENT: u32 = KINDS + 3;
 
-    /// [`Specialization::environment_flags`](super::Specialization::surroundings): the scene has an environment map.
+    /// [`Specialization::environment_flags`](super::Specialization::environment_flags): the scene has an environment map.
     pub const ENVIRONMENT_MAP: u32 = 1;
-    /// [`Specialization::environment_flags`](super::Specialization::surroundings): invisible to the camera.
+    /// [`Specialization::environment_flags`](super::Specialization::environment_flags): invisible to the camera.
     pub const ENVIRONMENT_INVISIBLE: u32 = 2;
-    /// [`Specialization::environment_flags`](super::Specialization::surroundings): the camera sees a single color.
+    /// [`Specialization::environment_flags`](super::Specialization::environment_flags): the camera sees a single color.
     pub const BACKGROUND: u32 = 4;
     /// Maximum number of blocks of an environment map's cells along a row or a column, a power of two.
     pub const ENVIRONMENT_BLOCKS: u32 = 32;
