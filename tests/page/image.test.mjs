@@ -73,7 +73,7 @@ test("the divider of a wipe is dragged in the image", async () => {
   assert.deepEqual(page.faults, []);
 });
 
-const spoil = (lines) => studio.edit("shaders/kernels/render.wgsl", "film[index] = sum;", `let zero = f32(work.samples.x) * 0.0;\n${lines}\nfilm[index] = sum;`);
+const spoil = (lines) => studio.edit("shaders/kernels/render.wgsl", "film[index] = sum;", `let zero = f32(params.samples.x) * 0.0;\n${lines}\nfilm[index] = sum;`);
 
 test("a badge on the image counts invalid pixels and leads to their numbers", async () => {
   const page = await open(browser, studio);

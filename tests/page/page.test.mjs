@@ -368,7 +368,7 @@ test("invalid pixels are marked and counted", async () => {
   const page = await open(browser, studio);
   const seen = await shown(page);
   assert.ok(await page.locator("#faults").isHidden());
-  const broken = `let zero = f32(work.samples.x) * 0.0;
+  const broken = `let zero = f32(params.samples.x) * 0.0;
     if pixel.y == 3u && pixel.x == 0u { sum.x = zero / zero; }
     if pixel.y == 3u && pixel.x == 1u { sum.x = 1.0 / zero; }
     if pixel.y == 3u && pixel.x == 2u { sum.x = -1.0 / zero; }
