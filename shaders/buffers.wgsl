@@ -23,11 +23,11 @@ fn closest_of(kind: u32, before: Hit, ray: Ray, origin_prim: u32, inside_prim: u
 // `t_max * to`.
 fn is_occluded_by(kind: u32, before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let range = counts.primitives[kind];
-    var hidden = before;
-    for (var i = range.x; i < range.y && !hidden; i++) {
-        hidden = is_occluded_by_primitive(kind, primitives[i], i, surface, to, t_max, target_prim);
+    var occluded = before;
+    for (var i = range.x; i < range.y && !occluded; i++) {
+        occluded = is_occluded_by_primitive(kind, primitives[i], i, surface, to, t_max, target_prim);
     }
-    return hidden;
+    return occluded;
 }
 
 fn emitter_count() -> u32 {

@@ -139,9 +139,9 @@ fn ray_pair(origin: vec3f, first: vec3f, second: vec3f, pad: f32) -> RayPair {
 }
 
 // Returns the children whose boxes a ray of the pair hits that is not yet occluded.
-fn children_hit_by_pair(node: Node, pair: RayPair, hidden: u32, t_max: f32) -> u32 {
-    return children_hit(node, pair.s[0], select(t_max, -1.0, (hidden & 1u) != 0u))
-        | children_hit(node, pair.s[1], select(t_max, -1.0, (hidden & 2u) != 0u));
+fn children_hit_by_pair(node: Node, pair: RayPair, occluded: u32, t_max: f32) -> u32 {
+    return children_hit(node, pair.s[0], select(t_max, -1.0, (occluded & 1u) != 0u))
+        | children_hit(node, pair.s[1], select(t_max, -1.0, (occluded & 2u) != 0u));
 }
 
 // Returns the mask of the samples of a block that any item occludes from a surface, and `before`.
@@ -159,8 +159,8 @@ fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlo
         wanted &= wanted - 1u;
         let second = select(firstTrailingBit(wanted), first, wanted == 0u);
         wanted &= wanted - 1u;
-        let hidden = occluded_pair(surface, to, light, block, vec2u(first, second), pad);
-        bits |= ((hidden & 1u) << first) | ((hidden >> 1u) << second);
+        let occluded = occluded_pair(surface, to, light, block, vec2u(first, second), pad);
+        bits |= ((occluded & 1u) << first) | ((occluded >> 1u) << second);
     }
     return bits;
 }
@@ -177,24 +177,24 @@ fn segments_to_two(to: Segments, block: SampleBlock, samples: vec2u) -> array<ve
 fn occluded_pair(surface: Surface, to: Segments, light: Light, block: SampleBlock, samples: vec2u, pad: f32) -> u32 {
     let directions = segments_to_two(to, block, samples);
     let pair = ray_pair(surface.ray_origin, directions[0], directions[1], pad);
-    var hidden = 0u;
+    var occluded = 0u;
     traversal_begin(&items_walk, octant_of(directions[0]));
-    while items_walk.depth > 0u && hidden != 3u {
+    while items_walk.depth > 0u && occluded != 3u {
         let node = load_node(5u * pop_node(&items_walk));
-        var leaves = push_children(&items_walk, node, children_hit_by_pair(node, pair, hidden, light.t_max));
-        while leaves != 0u && hidden != 3u {
+        var leaves = push_children(&items_walk, node, children_hit_by_pair(node, pair, occluded, light.t_max));
+        while leaves != 0u && occluded != 3u {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
             for (var k = 0u; k < items.y; k++) {
                 let item = load_item(items.x + k);
                 let passing = select(0u, 1u, interval_hits(box_interval(item.low, item.high, pair.s[0]), light.t_max))
                     | select(0u, 2u, interval_hits(box_interval(item.low, item.high, pair.s[1]), light.t_max));
-                let may = select(0u, passing & ~hidden, (item.kind & CASTS_SHADOW) != 0u);
-                hidden |= occluded_by_item(item, may, surface, light, block, samples);
+                let may = select(0u, passing & ~occluded, (item.kind & CASTS_SHADOW) != 0u);
+                occluded |= occluded_by_item(item, may, surface, light, block, samples);
             }
         }
     }
-    return hidden;
+    return occluded;
 }
 
 // Returns the samples in the mask `may` that an item occludes.
@@ -230,12 +230,12 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
     let pair = ray_pair(origin, directions[0], directions[1], mesh_pad(i, origin));
     let first_shear = shear_of(directions[0]);
     let second_shear = shear_of(directions[1]);
-    var hidden = 3u & ~may;
+    var occluded = 3u & ~may;
     traversal_begin(&mesh_walk, octant_of(directions[0]));
-    while mesh_walk.depth > 0u && hidden != 3u {
+    while mesh_walk.depth > 0u && occluded != 3u {
         let node = load_node(i.nodes + 5u * pop_node(&mesh_walk));
-        var leaves = push_children(&mesh_walk, node, children_hit_by_pair(node, pair, hidden, light.t_max));
-        while leaves != 0u && hidden != 3u {
+        var leaves = push_children(&mesh_walk, node, children_hit_by_pair(node, pair, occluded, light.t_max));
+        while leaves != 0u && occluded != 3u {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
             for (var k = 0u; k < triangles.y; k++) {
@@ -249,44 +249,44 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
                 let crosses = select(0u, 1u, first.met & (first.t > 0.0) & (first.t < light.t_max))
                     | select(0u, 2u, second.met & (second.t > 0.0) & (second.t < light.t_max));
                 let own = all(surface.exclude_front == vec2u(number + 1u, corners.w));
-                hidden |= select(0u, crosses, !own & triangle_casts(i, slot));
+                occluded |= select(0u, crosses, !own & triangle_casts(i, slot));
             }
         }
     }
-    return hidden;
+    return occluded;
 }
 
 // Returns true if `before`, or if any item except `target_prim` occludes the segment from a surface to `t_max` times
 // `to`.
 fn is_occluded_by_bvh(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
-    var hidden = before;
+    var occluded = before;
     let s = slabs(surface.ray_origin, to, item_pad(surface.ray_origin));
     traversal_begin(&items_walk, octant_of(to));
-    while items_walk.depth > 0u && !hidden {
+    while items_walk.depth > 0u && !occluded {
         let node = load_node(5u * pop_node(&items_walk));
         var leaves = push_children(&items_walk, node, children_hit(node, s, t_max));
-        while leaves != 0u && !hidden {
+        while leaves != 0u && !occluded {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
-            for (var k = 0u; k < items.y && !hidden; k++) {
+            for (var k = 0u; k < items.y && !occluded; k++) {
                 let item = load_item(items.x + k);
                 let passed = interval_hits(box_interval(item.low, item.high, s), t_max);
                 for (var once = passed & ((item.kind & CASTS_SHADOW) != 0u); once; once = false) {
-                    hidden = is_occluded_by_item(item, surface, to, t_max, target_prim);
+                    occluded = is_occluded_by_item(item, surface, to, t_max, target_prim);
                 }
             }
         }
     }
-    return hidden;
+    return occluded;
 }
 
 fn is_occluded_by_item(item: Item, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
-    var cut = false;
+    var occluded = false;
     let i = item.index;
     for (var once = has_kind(item, INSTANCE); once; once = false) {
-        cut = is_occluded_by_mesh(i, surface, to, t_max);
+        occluded = is_occluded_by_mesh(i, surface, to, t_max);
     }
-    return cut | is_occluded_by_primitive_item(item, surface, to, t_max, target_prim);
+    return occluded | is_occluded_by_primitive_item(item, surface, to, t_max, target_prim);
 }
 
 // Returns true if a triangle of instance `number`, except that of the surface, occludes the segment.
@@ -296,12 +296,12 @@ fn is_occluded_by_mesh(number: u32, surface: Surface, to: vec3f, t_max: f32) -> 
     let direction = vector_to_mesh(i, to);
     let s = slabs(origin, direction, mesh_pad(i, origin));
     let shear = shear_of(direction);
-    var cut = false;
+    var occluded = false;
     traversal_begin(&mesh_walk, octant_of(direction));
-    while mesh_walk.depth > 0u && !cut {
+    while mesh_walk.depth > 0u && !occluded {
         let node = load_node(i.nodes + 5u * pop_node(&mesh_walk));
         var leaves = push_children(&mesh_walk, node, children_hit(node, s, t_max));
-        while leaves != 0u && !cut {
+        while leaves != 0u && !occluded {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
             for (var k = 0u; k < triangles.y; k++) {
@@ -309,9 +309,9 @@ fn is_occluded_by_mesh(number: u32, surface: Surface, to: vec3f, t_max: f32) -> 
                 let found = triangle_crossing(load_position(i, corners.x), load_position(i, corners.y),
                                               load_position(i, corners.z), origin, shear, s);
                 let own = all(surface.exclude_front == vec2u(number + 1u, corners.w));
-                cut |= found.met & !own & (found.t > 0.0) & (found.t < t_max);
+                occluded |= found.met & !own & (found.t > 0.0) & (found.t < t_max);
             }
         }
     }
-    return cut;
+    return occluded;
 }

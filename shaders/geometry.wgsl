@@ -22,11 +22,11 @@ fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u
 // Returns true if `before`, or if a primitive except `target_prim` occludes the segment from the surface to
 // `t_max * to`. The surface's own primitive counts as in `occluded_samples`.
 fn is_occluded(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
-    let hidden = is_occluded_by_primitives(before, surface, to, t_max, target_prim);
+    let occluded = is_occluded_by_primitives(before, surface, to, t_max, target_prim);
     if TLAS_KINDS == 0u {
-        return hidden;
+        return occluded;
     }
-    return is_occluded_by_bvh(hidden, surface, to, t_max, target_prim);
+    return is_occluded_by_bvh(occluded, surface, to, t_max, target_prim);
 }
 
 fn is_on_mesh(hit: Hit) -> bool {
@@ -98,12 +98,12 @@ fn skip_camera_invisible(start: Path) -> Path {
             break;
         }
         let prim = fetch_hit_primitive(hit);
-        let hidden = material_of(prim).hidden;
-        if hidden == 0u {
+        let visibility = material_of(prim).camera_visibility;
+        if visibility == 0u {
             break;
         }
         let surface = surface_of(prim, hit, path.ray);
-        if (hidden == CULL_BACKFACE) & (surface.side > 0.0) {
+        if (visibility == CULL_BACKFACE) & (surface.side > 0.0) {
             break;
         }
         path = pass_through_path(path, surface, hit_differential(prim, hit, surface, path.ray, path.differential));

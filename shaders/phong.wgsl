@@ -41,12 +41,12 @@ fn phong_power(x: f32, material: Material, exponent_bits: u32) -> f32 {
 }
 
 // Adds the unoccluded samples of a block to the lobes, in order.
-fn phong_block(surface: Surface, material: Material, to: Segments, block: SampleBlock, hidden: u32, exponent_bits: u32,
+fn phong_block(surface: Surface, material: Material, to: Segments, block: SampleBlock, occluded: u32, exponent_bits: u32,
                sum: Lobes) -> Lobes {
     var lobes = sum;
     for (var i = 0u; i < block.count; i++) {
         let sample = phong_lobes(surface, material, segment(to, block_sample(block, i)), exponent_bits);
-        let visible = ((hidden >> i) & 1u) == 0u;
+        let visible = ((occluded >> i) & 1u) == 0u;
         lobes.diffuse += select(0.0, sample.diffuse, visible);
         lobes.specular += select(0.0, sample.specular, visible);
     }

@@ -271,7 +271,7 @@ probes! {
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
     is_lit(surface: &Surface, to: Vec3) -> bool;
     unlit_mask(prim: &HitPrimitive, surface: &Surface, to: Segments, block: SampleBlock) -> u32;
-    phong_block(surface: &Surface, material: &Material, to: Segments, block: SampleBlock, hidden: u32, exponent_bits: u32,
+    phong_block(surface: &Surface, material: &Material, to: Segments, block: SampleBlock, occluded: u32, exponent_bits: u32,
                 sum: Lobes) -> Lobes;
     camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
     camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative;

@@ -300,11 +300,11 @@ fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, mate
     let dark = !wanted | !(most > 0.0) | !(most < INFINITE_T);
     if ALPHA_SURFACES != 0u {
         let bounce = state.path.depth + 1u;
-        let veiled = is_occluded_alpha(dark, from_side, to, light.t_max, light.primitive, pixel, state.sample, bounce);
-        return add_radiance(state, found, !veiled, bounce);
+        let occluded = is_occluded_alpha(dark, from_side, to, light.t_max, light.primitive, pixel, state.sample, bounce);
+        return add_radiance(state, found, !occluded, bounce);
     }
-    let hidden = is_occluded(dark, from_side, to, light.t_max, light.primitive);
-    return add_radiance(state, found, !hidden, state.path.depth + 1u);
+    let occluded = is_occluded(dark, from_side, to, light.t_max, light.primitive);
+    return add_radiance(state, found, !occluded, state.path.depth + 1u);
 }
 
 // Samples the next direction.

@@ -117,8 +117,8 @@ fn lobes_of_light(prim: HitPrimitive, surface: Surface, material: Material, ligh
         if TLAS_KINDS != 0u {
             unlit = unlit_mask(prim, surface, to, block);
         }
-        let hidden = occluded_samples(surface, light, block, unlit);
-        lobes = phong_block(surface, material, to, block, hidden, EXPONENT_BITS, lobes);
+        let occluded = occluded_samples(surface, light, block, unlit);
+        lobes = phong_block(surface, material, to, block, occluded, EXPONENT_BITS, lobes);
     }
     return lobes;
 }

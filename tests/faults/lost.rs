@@ -17,16 +17,16 @@ const SUBMITS: usize = 5;
 const GPU: [&str; 2] = ["--device", "gpu"];
 const AUTO: [&str; 2] = ["--device", "auto"];
 
-/// Checks for `anew` warnings about a re-opened device, followed only by the lines `rest`.
-fn warned(ran: &Ran, anew: usize, rest: &[&str]) {
+/// Checks for `reopened` warnings about a re-opened device, followed only by the lines `rest`.
+fn warned(ran: &Ran, reopened: usize, rest: &[&str]) {
     let lines = ran.lines();
-    assert_eq!(lines.len(), anew + rest.len(), "{}", ran.stderr);
-    for line in &lines[..anew] {
+    assert_eq!(lines.len(), reopened + rest.len(), "{}", ran.stderr);
+    for line in &lines[..reopened] {
         assert!(line.starts_with("warning: llvmpipe"), "{line}");
         assert!(line.contains(": the device was lost: the driver ended it"), "{line}");
         assert!(line.ends_with("; re-opening it"), "{line}");
     }
-    for (line, start) in lines[anew..].iter().zip(rest) {
+    for (line, start) in lines[reopened..].iter().zip(rest) {
         assert!(line.starts_with(start), "{line}");
     }
 }

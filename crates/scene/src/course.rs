@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 use toml::Value;
 
-use super::define::Defines;
+use super::defines::Defines;
 use super::error::SceneError;
 use super::key_path::{KeyPath, Segment, cut};
 use super::problem::{At, Collector, Problem, Problems};

@@ -7,12 +7,8 @@ use toml::{Table, Value};
 use toml_parser::Source;
 use toml_parser::lexer::TokenKind;
 
-use super::error::SceneError;
-use super::key_path::list;
 use super::key_path::{KeyPath, Segment, cut};
-use super::problem::At as _;
-use super::problem::{Problem, Problems};
-use super::suggest;
+use super::problem::Problem;
 
 /// An override of the value of a key: `KEY=VALUE`.
 ///
@@ -20,8 +16,8 @@ use super::suggest;
 /// `shapes.2.radius`; list indices start at 0. `VALUE` is TOML; other text is a string without quotes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Define {
-    key: KeyPath,
-    value: Value,
+    pub(super) key: KeyPath,
+    pub(super) value: Value,
 }
 
 impl Define {
@@ -70,7 +66,7 @@ impl fmt::Display for Define {
     }
 }
 
-fn about(key: &KeyPath, message: String) -> Problem {
+pub(super) fn about(key: &KeyPath, message: String) -> Problem {
     let key = key.clone();
     Problem {
         key,
@@ -81,14 +77,6 @@ fn about(key: &KeyPath, message: String) -> Problem {
 fn unreadable(text: &str) -> Problem {
     let rule = "must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5";
     Problem::new(format!("{} {rule}", cut(text)))
-}
-
-impl Problems {
-    /// Returns the error of the first problem that an override caused.
-    pub(super) fn of_define(&self, defines: &Defines) -> Option<SceneError> {
-        let problem = self.iter().find(|problem| defines.brought(&problem.key))?;
-        Some(SceneError::Override(problem.clone().at("define")))
-    }
 }
 
 impl FromStr for KeyPath {
@@ -162,7 +150,7 @@ fn read_key(text: &str, unreadable: fn(&str) -> Problem) -> Result<(KeyPath, &st
     }
 }
 
-fn index(text: &str) -> Option<usize> {
+pub(super) fn index(text: &str) -> Option<usize> {
     let digits = text.bytes().all(|byte| byte.is_ascii_digit());
     text.parse().ok().filter(|_| digits)
 }
@@ -187,186 +175,11 @@ fn read_value(text: &str) -> Result<Value, String> {
     }
 }
 
-/// Overrides that are applied while a file is parsed. Their paths are kept to attribute errors to them.
-pub(super) struct Defines<'a> {
-    given: &'a [Define],
-    /// Applied and failed ones.
-    put: Vec<Put>,
-}
-
-struct Put {
-    number: usize,
-    /// The key, with indices for list elements.
-    path: Vec<Segment>,
-    /// Length of the path of the outermost table or value that the override created or replaced.
-    own: usize,
-}
-
-impl<'a> Defines<'a> {
-    pub fn new(given: &'a [Define]) -> Defines<'a> {
-        Defines { given, put: Vec::new() }
-    }
-
-    pub fn anew(&self) -> Defines<'a> {
-        Defines::new(self.given)
-    }
-
-    /// Resets the state to read the file again.
-    pub fn restart(&mut self) {
-        self.put.clear();
-    }
-
-    /// Returns true if an override set the value of this key or of a table around it.
-    pub fn brought(&self, key: &KeyPath) -> bool {
-        let key = key.0.as_slice();
-        self.put.iter().any(|put| {
-            let is_below = put.path.get(..put.own).is_some_and(|own| key.starts_with(own));
-            let rest = put.path.strip_prefix(key);
-            is_below || rest.is_some_and(|rest| rest.iter().all(|step| matches!(step, Segment::Index(_))))
-        })
-    }
-
-    /// Applies the overrides that belong to the table at this path; with an empty path, those for which `is_elsewhere`
-    /// is false.
-    pub fn put(
-        &mut self,
-        at: &[Segment],
-        whole: &mut Table,
-        is_elsewhere: impl Fn(&str) -> bool,
-    ) -> Result<(), Problem> {
-        let belongs = |define: &Define| match (define.key.0.first(), at) {
-            (Some(Segment::Key(first)), []) => !is_elsewhere(first),
-            (_, []) => true,
-            _ => define.key.0.len() >= at.len() && define.key.0.iter().zip(at).all(|(a, b)| is_step(a, b)),
-        };
-        let (given, mut value) = (self.given, Value::Table(std::mem::take(whole)));
-        for (number, define) in given.iter().enumerate().filter(|(_, define)| belongs(define)) {
-            let mut path = at.to_vec();
-            let put = put(&mut value, &mut path, &define.key.0[at.len()..], &define.value);
-            let own = match &put {
-                Ok(own) => *own,
-                Err(_) => path.len(),
-            };
-            let key = KeyPath(path.clone());
-            self.put.push(Put { number, path, own });
-            put.map_err(|message| about(&key, message))?;
-        }
-        match value {
-            Value::Table(table) => *whole = table,
-            other => {
-                let message = format!("{} must be a table", cut(&other.to_string()));
-                return Err(about(&KeyPath(at.to_vec()), message));
-            }
-        }
-        Ok(())
-    }
-
-    pub fn not_there(&mut self, key: &KeyPath) -> Problem {
-        self.put.push(Put {
-            number: self.given.len(),
-            path: key.0.clone(),
-            own: key.0.len(),
-        });
-        about(key, "does not exist".to_owned())
-    }
-
-    /// Returns a key that was not applied to any table.
-    pub fn left(&self) -> Option<&'a KeyPath> {
-        let is_put = |number: usize| self.put.iter().any(|put| put.number == number);
-        let mut left = self.given.iter().enumerate().filter(|(number, _)| !is_put(*number));
-        left.next().map(|(_, define)| &define.key)
-    }
-}
-
 /// Compares segments; an index may be written as a name.
-fn is_step(written: &Segment, step: &Segment) -> bool {
+pub(super) fn is_step(written: &Segment, step: &Segment) -> bool {
     match (written, step) {
         (Segment::Key(name), Segment::Index(number)) => index(name) == Some(*number),
         _ => written == step,
-    }
-}
-
-/// Returns true if the value at a path is a sample count, which is short for a table.
-fn is_samples(path: &[Segment]) -> bool {
-    let names = ["pixel_samples", "light_samples"];
-    matches!(path, [Segment::Key(section), Segment::Key(key)] if section == "render" && names.contains(&key.as_str()))
-}
-
-/// Sets a value in a tree of tables and lists. Creates missing tables, except named textures, materials and meshes.
-/// Appends the path of the value, or of the failure, to `path`. Returns the length of the path of the outermost created
-/// table, or else of the value.
-fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
-    let mut own = None;
-    let mut value = root;
-    for (i, step) in key.iter().enumerate() {
-        let is_last = i + 1 == key.len();
-        let is_named = matches!(path.as_slice(), [Segment::Key(kind)] if ["textures", "materials", "meshes"].contains(&kind.as_str()));
-        if let (Value::Integer(count), true) = (&*value, is_samples(path)) {
-            *value = Value::Table(Table::from_iter([("count".to_owned(), Value::from(*count))]));
-        }
-        let kind = kind_of(value);
-        let next = match (value, step) {
-            (Value::Table(table), Segment::Key(name)) => {
-                path.push(step.clone());
-                if !table.contains_key(name) {
-                    if is_named && !is_last {
-                        return Err(match table.is_empty() {
-                            true => "does not exist; the scene has none".to_owned(),
-                            false => match suggest::hint(name, table.keys().map(String::as_str)) {
-                                hint if hint.is_empty() => {
-                                    format!("does not exist; the scene has {}", list(table.keys()))
-                                }
-                                hint => format!("does not exist{hint}"),
-                            },
-                        });
-                    }
-                    if let Some(Segment::Index(_)) = key.get(i + 1) {
-                        return Err("does not exist, so it has no elements".to_owned());
-                    }
-                    own.get_or_insert(path.len());
-                    table.insert(name.clone(), Value::Table(Table::new()));
-                }
-                table.get_mut(name)
-            }
-            (Value::Array(list), step) => {
-                let number = match step {
-                    Segment::Index(number) => Some(*number),
-                    Segment::Key(name) => index(name),
-                };
-                let Some(number) = number else {
-                    return Err("is a list; add the index of an element, such as [0]".to_owned());
-                };
-                path.push(Segment::Index(number));
-                let count = list.len();
-                match list.get_mut(number) {
-                    None => return Err(format!("does not exist; the list has {count} elements, counted from 0")),
-                    found => found,
-                }
-            }
-            _ => {
-                return Err(format!(
-                    "is {kind} and has no {step}",
-                    step = KeyPath(vec![step.clone()])
-                ));
-            }
-        };
-        match next {
-            Some(next) => value = next,
-            None => return Err("does not exist".to_owned()),
-        }
-    }
-    *value = new.clone();
-    Ok(own.unwrap_or(path.len()))
-}
-
-fn kind_of(value: &Value) -> &'static str {
-    match value {
-        Value::Table(_) => "a table",
-        Value::Array(_) => "a list",
-        Value::String(_) => "a text",
-        Value::Integer(_) | Value::Float(_) => "a number",
-        Value::Boolean(_) => "true or false",
-        Value::Datetime(_) => "a time",
     }
 }
 

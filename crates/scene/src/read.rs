@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::define::Defines;
+use crate::defines::Defines;
 use crate::error::SceneError;
 use crate::parse::is_course;
 use crate::{Description, course};

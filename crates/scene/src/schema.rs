@@ -2,6 +2,7 @@
 //! validation uses (`limits.rs`).
 
 pub(crate) mod fields;
+pub(crate) mod range;
 
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};

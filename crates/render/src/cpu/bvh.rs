@@ -244,16 +244,16 @@ fn occluded_by_groups(
         bounds,
         |slot, passing| {
             let [v0, v1, v2] = corners(mesh, slot);
-            let mut hidden = 0;
+            let mut occluded = 0;
             for sample in bits_of(passing) {
                 let d = segments.directions.get(sample as usize);
                 let s = slabs(segments.o, d, segments.pad);
                 let found = triangle_crossing(v0, v1, v2, segments.o, shear_of(d), s);
                 if found.met & (found.t > 0.0) & (found.t < segments.t_max) {
-                    hidden |= 1 << sample;
+                    occluded |= 1 << sample;
                 }
             }
-            hidden
+            occluded
         },
     )
 }
@@ -273,12 +273,12 @@ pub fn is_occluded_by_bvh(scene: &Packed, surface: &Surface, to: Vec3, t_max: f3
         return scene.bvh.items.iter().any(cuts);
     }
     let line = Line::new(surface.ray_origin, to, pad);
-    let mut hidden = false;
+    let mut occluded = false;
     traversal::leaves(*LEVEL, cast_slice(&scene.bvh.nodes), &line, t_max, |items, limit| {
-        hidden |= scene.bvh.items[items].iter().any(cuts);
-        if hidden { f32::NEG_INFINITY } else { limit }
+        occluded |= scene.bvh.items[items].iter().any(cuts);
+        if occluded { f32::NEG_INFINITY } else { limit }
     });
-    hidden
+    occluded
 }
 
 fn is_occluded_by_item(scene: &Packed, item: &Item, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {

@@ -42,11 +42,11 @@ pub fn occluded_samples(scene: &Packed, surface: &Surface, light: &Light, block:
 }
 
 pub fn is_occluded(scene: &Packed, before: bool, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
-    let hidden = before || is_occluded_by_primitives(scene, surface, to, t_max, target_prim);
+    let occluded = before || is_occluded_by_primitives(scene, surface, to, t_max, target_prim);
     if scene.specialization.tlas_kinds == 0 {
-        return hidden;
+        return occluded;
     }
-    hidden || is_occluded_by_bvh(scene, surface, to, t_max, target_prim)
+    occluded || is_occluded_by_bvh(scene, surface, to, t_max, target_prim)
 }
 
 pub fn is_on_mesh(hit: Hit) -> bool {
@@ -180,12 +180,12 @@ pub fn skip_camera_invisible(scene: &Packed, start: Path) -> Path {
             break;
         }
         let prim = fetch_hit_primitive(scene, hit);
-        let hidden = material_of(scene, &prim).hidden;
-        if hidden == 0 {
+        let visibility = material_of(scene, &prim).camera_visibility;
+        if visibility == 0 {
             break;
         }
         let surface = surface_of(scene, &prim, hit, path.ray);
-        if (hidden == CULL_BACKFACE) & (surface.side > 0.0) {
+        if (visibility == CULL_BACKFACE) & (surface.side > 0.0) {
             break;
         }
         let at = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);

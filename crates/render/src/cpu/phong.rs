@@ -65,7 +65,7 @@ pub fn phong_block(
     material: &Material,
     to: Segments,
     block: SampleBlock,
-    hidden: u32,
+    occluded: u32,
     exponent_bits: u32,
     sum: Lobes,
 ) -> Lobes {
@@ -73,7 +73,7 @@ pub fn phong_block(
     let all = lobes_of_all(*LEVEL, surface, material, &to, exponent_bits);
     let mut lobes = sum;
     for (i, (diffuse, specular)) in all[0].iter().zip(&all[1]).enumerate().take(to.count) {
-        let visible = (hidden >> i) & 1 == 0;
+        let visible = (occluded >> i) & 1 == 0;
         lobes.diffuse += if visible { *diffuse } else { 0.0 };
         lobes.specular += if visible { *specular } else { 0.0 };
     }

@@ -101,15 +101,15 @@ pub fn bake(packed: &Packed) -> String {
     write_function(
         &mut out,
         "is_occluded_by_primitives(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
-        "var hidden = before;",
-        "hidden",
+        "var occluded = before;",
+        "occluded",
         |body| {
             for (kind, range) in packed.shadow_casters() {
                 for i in range {
                     let record = &records[i];
                     let _ = writeln!(
                         body,
-                        "    hidden |= is_occluded_by_primitive({kind}u, {record}, {i}u, surface, to, t_max, target_prim);"
+                        "    occluded |= is_occluded_by_primitive({kind}u, {record}, {i}u, surface, to, t_max, target_prim);"
                     );
                 }
             }

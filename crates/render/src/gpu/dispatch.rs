@@ -26,9 +26,9 @@ pub fn linear_loops() -> String {
             ),
             (
                 "is_occluded_by_primitives(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
-                "var hidden = before;",
-                "if (SHADOW_CASTERS & (1u << KIND)) != 0u { hidden = is_occluded_by(KIND, hidden, surface, to, t_max, target_prim); }",
-                "hidden",
+                "var occluded = before;",
+                "if (SHADOW_CASTERS & (1u << KIND)) != 0u { occluded = is_occluded_by(KIND, occluded, surface, to, t_max, target_prim); }",
+                "occluded",
             ),
         ],
     )
@@ -58,11 +58,11 @@ pub fn item_tests() -> String {
             ),
             (
                 "is_occluded_by_primitive_item(item: Item, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
-                "var cut = false;",
+                "var occluded = false;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
-        cut = is_occluded_by_primitive(KIND, primitives[item.index], item.index, surface, to, t_max, target_prim);
+        occluded = is_occluded_by_primitive(KIND, primitives[item.index], item.index, surface, to, t_max, target_prim);
     }",
-                "cut",
+                "occluded",
             ),
         ],
     )

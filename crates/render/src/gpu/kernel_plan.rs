@@ -1,8 +1,8 @@
 //! The kernel that a device would run for a scene, predicted without opening the device.
 
+use super::adapter::Info;
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, RENDER, Shaders};
-use super::device::Info;
 use super::scene::bytes_of_scene;
 use crate::records::Packed;
 

@@ -1,5 +1,6 @@
 //! The GPU path: kernels in WGSL, run by wgpu. Only this module names wgpu.
 
+mod adapter;
 mod bake;
 mod compile;
 pub mod compose;
@@ -26,12 +27,11 @@ mod timer;
 mod validate;
 mod wording;
 
+pub use adapter::{Choice, Choice as AdapterChoice, HOW_TO_GET_VULKAN, Info, adapters, preferred};
 pub use bake::bake;
 pub use compile::{Checked, check};
 pub use controls::FloatControls;
-pub use device::{
-    Choice, Choice as AdapterChoice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose, choose_among, preferred,
-};
+pub use device::{Device, choose, choose_among};
 pub use kernel_plan::{KernelPlan, plan_kernel};
 pub use renderer::{Call, Gpu, Options};
 pub use rounding::Rounding;

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use glam::UVec4;
 
+use super::adapter::Info;
 use super::bake::{mesh_rows_count, node_rows_count};
-use super::device::Info;
 use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
 use crate::error::RenderError;
 use crate::records::Packed;

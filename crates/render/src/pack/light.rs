@@ -41,7 +41,7 @@ pub(super) fn pack_lights(
             materials.push(Material {
                 kind: EMITTER,
                 emission: color.as_vec3(),
-                hidden: (!visible).into(),
+                camera_visibility: (!visible).into(),
                 ..Material::zeroed()
             });
         }

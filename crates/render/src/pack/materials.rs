@@ -34,7 +34,7 @@ pub struct Appearances {
 }
 
 /// Camera visibility flags.
-fn hidden(material: &scene::Material) -> u32 {
+fn camera_visibility(material: &scene::Material) -> u32 {
     match &material.reflection {
         _ if !material.visible => 1,
         Reflection::Principled(principled) if !principled.double_sided => CULL_BACKFACE,
@@ -216,7 +216,7 @@ impl Appearances {
         let has = |purpose: u32| lookups.0.iter().any(|lookup| lookup.purposes & purpose != 0);
         let textured = has(FOR_ROUGHNESS);
         let mut record = simplest(record, textured);
-        record.hidden = hidden(material);
+        record.camera_visibility = camera_visibility(material);
         let passes = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
         let parts = match record.kind {
             METAL | THIN if record.energy != NO_INDEX => Some(Parts::Mirror),

@@ -3,6 +3,7 @@
 mod camera;
 mod emitters;
 pub mod energy;
+mod environment_map;
 pub mod filter;
 mod geometry;
 mod light;
@@ -15,13 +16,13 @@ mod primitive;
 mod pyramid;
 mod shadow_casters;
 mod specialize;
-mod surroundings;
 
 use bytemuck::Zeroable as _;
 use glam::{UVec2, UVec4, Vec3};
 
 pub use self::camera::pack_camera;
 use self::emitters::PackedEmitters;
+use self::environment_map::EnvironmentMap;
 pub use self::geometry::MAX_LINEAR_PRIMITIVES;
 use self::light::{DISTANT, connect_lights, pack_lights, t_max};
 use self::materials::Appearances;
@@ -30,7 +31,6 @@ use self::primitive::pack_shapes;
 #[cfg(test)]
 pub(crate) use self::primitive::primitive;
 use self::specialize::Parts;
-use self::surroundings::EnvironmentMap;
 use crate::records::*;
 use wgray_scene::{PixelFilter, PixelFilterKind, Scene};
 

@@ -3,8 +3,8 @@
 use glam::{UVec4, Vec3};
 
 use super::emitters::PackedEmitters;
+use super::environment_map::EnvironmentMap;
 use super::materials::Appearances;
-use super::surroundings::EnvironmentMap;
 use super::{
     Counts, DIFFUSE, FACET_KINDS, FOR_ANISOTROPY, FOR_EMISSION, FOR_ROUGHNESS, GRID, HALTON, INSTANCE, JITTERED, Light,
     Material, NO_COLORS, OPAQUE, PRINCIPLED, RANDOM, ROTATED_GRID, SOBOL, SPECULAR_KINDS, SPOT, Specialization,
@@ -54,7 +54,7 @@ impl Parts<'_> {
                 | u32::from(lights.iter().any(|light| light.kind == SPOT)) << 2,
             lens: scene.camera.lens.is_some().into(),
             panoramic: (scene.camera.projection == Projection::Panorama).into(),
-            camera_invisible: materials.iter().any(|material| material.hidden != 0).into(),
+            camera_invisible: materials.iter().any(|material| material.camera_visibility != 0).into(),
             pixel_pattern: pattern(pixels),
             pixel_side: side(pixels),
             pixel_samples: pixels.count,

@@ -95,7 +95,7 @@ constants! {
     pub const NORMAL_BINS: u32 = 17;
     /// [`Light::kind`](super::Light::kind): a spot light.
     pub const SPOT: u32 = KINDS + 4;
-    /// [`Material::hidden`]: camera rays pass its back faces.
+    /// [`Material::camera_visibility`]: camera rays pass its back faces.
     pub const CULL_BACKFACE: u32 = 2;
     /// [`Material::vertex_colors`]: vertex colors are ignored.
     pub const NO_COLORS: u32 = 0;

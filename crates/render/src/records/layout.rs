@@ -171,7 +171,7 @@ records! {
         /// 1 for a thin sheet, else 0.
         pub thin: u32,
         /// Any kind: 1 if it is invisible to the camera, [`CULL_BACKFACE`] if its back faces are, else 0.
-        pub hidden: u32,
+        pub camera_visibility: u32,
         /// 1 + offset of the albedo table of anisotropic lobes in the texels; 0 without a table.
         pub aniso_table: u32,
         /// The use of vertex colors: [`COLORS_OF_BASE`], [`COLORS_OF_EMISSION`] or [`NO_COLORS`].

@@ -1,14 +1,12 @@
 //! Conversion of glTF materials (section 3.9, KHR_materials_*) to `principled`, whose parameters have the same names.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use gltf_json::material::AlphaMode as JsonAlphaMode;
-use gltf_json::mesh::Primitive;
 use gltf_json::validation::Checked;
 use serde_json::{Map, Value};
 
-use super::ImportedMaterial;
 use super::document::Document;
 use super::error::GltfError;
 use super::light::note;
@@ -26,214 +24,21 @@ pub struct Images {
     pub absent: BTreeMap<String, String>,
 }
 
-type Textures = BTreeMap<String, TextureDescription>;
+pub(super) type Textures = BTreeMap<String, TextureDescription>;
 
 /// Maximum emitted radiance in a scene.
 const BRIGHTEST: f64 = 1e6;
-/// Maximum length of a name in characters; all instances store it.
-const LONGEST_NAME: usize = 200;
 /// Indices of refraction in a scene.
 const IORS: (f64, f64) = (1.0, 100.0);
 
-/// The materials in use.
-pub struct Materials<'a> {
-    document: &'a Document,
-    variant: Option<usize>,
-    /// Indices into `used` by material of the file; `None` is the default.
-    numbers: BTreeMap<Option<usize>, usize>,
-    used: Vec<Used>,
-}
-
-pub struct Used {
-    /// Material index of the file.
-    index: Option<usize>,
-    /// Used with vertex colours.
-    is_colored: bool,
-    /// Required texture coordinate sets.
-    pub sets: BTreeSet<u32>,
-    /// Normal or anisotropy map.
-    pub tangents: Option<Slot>,
-}
-
-impl<'a> Materials<'a> {
-    pub fn of(document: &'a Document, variant: Option<usize>) -> Materials<'a> {
-        Materials {
-            document,
-            variant,
-            numbers: BTreeMap::new(),
-            used: Vec::new(),
-        }
-    }
-
-    /// Returns the index of a primitive's material, which becomes used.
-    pub fn number(&mut self, primitive: &Primitive, place: &str, is_colored: bool) -> Result<usize, GltfError> {
-        let index = self.index(primitive);
-        let count = self.document.json.materials.len();
-        if let Some(index) = index
-            && index >= count
-        {
-            let rule = format!("{index} is out of range; the file has {count} materials");
-            return Err(self.document.fault(format!("{place}.material"), rule));
-        }
-        let number = match self.numbers.get(&index) {
-            Some(number) => *number,
-            None => {
-                self.used.push(Used::of(self.document, index)?);
-                self.numbers.insert(index, self.used.len() - 1);
-                self.used.len() - 1
-            }
-        };
-        self.used[number].is_colored |= is_colored;
-        Ok(number)
-    }
-
-    pub fn get(&self, number: usize) -> &Used {
-        &self.used[number]
-    }
-
-    /// Returns a primitive's material in the file, by variant.
-    fn index(&self, primitive: &Primitive) -> Option<usize> {
-        let extension = || primitive.extensions.as_ref()?.others.get("KHR_materials_variants");
-        let mappings = || extension()?.get("mappings")?.as_array();
-        let is_of = |mapping: &&Value, variant: usize| {
-            let variants = mapping.get("variants").and_then(Value::as_array);
-            variants.is_some_and(|all| all.iter().any(|of| of.as_u64() == Some(variant as u64)))
-        };
-        let varied = self.variant.and_then(|variant| {
-            let mapping = mappings()?.iter().find(|mapping| is_of(mapping, variant))?;
-            usize::try_from(mapping.get("material")?.as_u64()?).ok()
-        });
-        varied.or(primitive.material.map(|material| material.value()))
-    }
-
-    pub fn finish(self, notes: &mut Vec<String>) -> Result<(Vec<ImportedMaterial>, Images), GltfError> {
-        let mut images = Images::default();
-        let mut names = BTreeSet::new();
-        // Next suffix of each name.
-        let mut next: BTreeMap<String, usize> = BTreeMap::new();
-        let mut materials = Vec::with_capacity(self.used.len());
-        for used in &self.used {
-            let mut name = match used.index {
-                None => "default".to_owned(),
-                Some(i) => (self.document.json.materials[i].name.clone()).unwrap_or_else(|| format!("material {i}")),
-            };
-            if let Some((end, _)) = name.char_indices().nth(LONGEST_NAME) {
-                name.truncate(end);
-            }
-            let plain = name.clone();
-            while !names.insert(name.clone()) {
-                let number = next.entry(plain.clone()).or_insert(2);
-                name = format!("{plain} ({number})");
-                *number += 1;
-            }
-            let mut maker = Maker {
-                document: self.document,
-                place: String::new(),
-                name: name.clone(),
-                textures: Textures::new(),
-                images: &mut images,
-                notes,
-            };
-            let description = match used.index {
-                None => PrincipledDescription::default(),
-                Some(index) => maker.material(index, used.is_colored)?,
-            };
-            let description = match (used.index, used.is_colored) {
-                (None, true) => PrincipledDescription {
-                    vertex_colors: VertexColors::BaseColor,
-                    ..description
-                },
-                _ => description,
-            };
-            let textures = maker.textures;
-            materials.push(ImportedMaterial {
-                name,
-                description: description.into(),
-                textures,
-            });
-        }
-        Ok((materials, images))
-    }
-}
-
-const EXTENSION_TEXTURES: [(&str, &str); 14] = [
-    ("KHR_materials_transmission", "transmissionTexture"),
-    ("KHR_materials_specular", "specularTexture"),
-    ("KHR_materials_specular", "specularColorTexture"),
-    ("KHR_materials_clearcoat", "clearcoatTexture"),
-    ("KHR_materials_clearcoat", "clearcoatRoughnessTexture"),
-    ("KHR_materials_clearcoat", "clearcoatNormalTexture"),
-    ("KHR_materials_sheen", "sheenColorTexture"),
-    ("KHR_materials_sheen", "sheenRoughnessTexture"),
-    ("KHR_materials_anisotropy", "anisotropyTexture"),
-    ("KHR_materials_iridescence", "iridescenceTexture"),
-    ("KHR_materials_iridescence", "iridescenceThicknessTexture"),
-    ("KHR_materials_pbrSpecularGlossiness", "diffuseTexture"),
-    ("KHR_materials_pbrSpecularGlossiness", "specularGlossinessTexture"),
-    ("KHR_materials_volume", "thicknessTexture"),
-];
-
-impl Used {
-    fn of(document: &Document, index: Option<usize>) -> Result<Used, GltfError> {
-        let mut used = Used {
-            index,
-            is_colored: false,
-            sets: BTreeSet::new(),
-            tangents: None,
-        };
-        let Some(index) = index else {
-            return Ok(used);
-        };
-        let material = &document.json.materials[index];
-        let place = format!("materials[{index}]");
-        let pbr = &material.pbr_metallic_roughness;
-        let infos = [
-            pbr.base_color_texture.as_ref(),
-            pbr.metallic_roughness_texture.as_ref(),
-            material.emissive_texture.as_ref(),
-        ];
-        for info in infos.into_iter().flatten() {
-            let others = info.extensions.as_ref().map(|all| &all.others);
-            let slot = Slot::new(document, &place, (info.index.value(), info.tex_coord), others)?;
-            used.sets.insert(slot.set);
-        }
-        let others = material.extensions.as_ref().map(|all| &all.others);
-        let extension = |name: &str| others.and_then(|all| all.get(name));
-        for (extension, texture) in EXTENSION_TEXTURES.map(|(name, texture)| (extension(name), texture)) {
-            if let Some(value) = extension.and_then(|extension| extension.get(texture)) {
-                let (slot, _) = Slot::of_value(document, &format!("{place}.{texture}"), value)?;
-                used.sets.insert(slot.set);
-                if ["clearcoatNormalTexture", "anisotropyTexture"].contains(&texture) {
-                    used.tangents = Some(slot);
-                }
-            }
-        }
-        let strength = extension("KHR_materials_anisotropy").and_then(|of| of.get("anisotropyStrength")?.as_f64());
-        if used.tangents.is_none() && strength.is_some_and(|strength| strength != 0.0) {
-            used.sets.insert(0);
-            used.tangents = Some(Slot {
-                texture: 0,
-                set: 0,
-                transform: Default::default(),
-            });
-        }
-        if let Some(normal) = &material.normal_texture {
-            let others = normal.extensions.as_ref().map(|all| &all.others);
-            let slot = Slot::new(document, &place, (normal.index.value(), normal.tex_coord), others)?;
-            used.sets.insert(slot.set);
-            used.tangents = Some(slot);
-        }
-        Ok(used)
-    }
-}
-
-struct Maker<'a> {
-    document: &'a Document,
-    place: String,
-    name: String,
-    textures: Textures,
-    images: &'a mut Images,
-    notes: &'a mut Vec<String>,
+/// Conversion of a material.
+pub(super) struct Converter<'a> {
+    pub document: &'a Document,
+    pub place: String,
+    pub name: String,
+    pub textures: Textures,
+    pub images: &'a mut Images,
+    pub notes: &'a mut Vec<String>,
 }
 
 const R: Channel = Channel::R;
@@ -241,8 +46,8 @@ const G: Channel = Channel::G;
 const B: Channel = Channel::B;
 const A: Channel = Channel::A;
 
-impl Maker<'_> {
-    fn material(&mut self, index: usize, is_colored: bool) -> Result<PrincipledDescription, GltfError> {
+impl Converter<'_> {
+    pub fn material(&mut self, index: usize, is_colored: bool) -> Result<PrincipledDescription, GltfError> {
         self.place = format!("materials[{index}]");
         let json = &self.document.json.materials[index];
         let others = json.extensions.as_ref().map(|all| &all.others);

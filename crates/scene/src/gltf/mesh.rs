@@ -10,7 +10,7 @@ use gltf_json::validation::Checked;
 use super::budget::Thing;
 use super::document::Document;
 use super::error::GltfError;
-use super::material::{Materials, Used};
+use super::materials::{Materials, Used};
 use super::node::{Nodes, Pose};
 use super::skin::Skin;
 use super::tangent::{generated, unturned};

@@ -25,6 +25,7 @@ mod light;
 #[cfg(test)]
 mod made;
 mod material;
+mod materials;
 mod mesh;
 mod meshopt;
 mod node;
@@ -45,7 +46,7 @@ use rayon::prelude::*;
 
 use self::budget::Thing;
 use self::document::Document;
-use self::material::Materials;
+use self::materials::Materials;
 use self::mesh::{Key, Meshes};
 use self::node::{Nodes, Pose};
 use crate::limits::TIMES;

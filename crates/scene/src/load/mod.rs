@@ -16,7 +16,7 @@ pub use self::gltf_file::is_gltf;
 pub use self::model::{is_mesh, is_model};
 pub use self::overrides::Overrides;
 use crate::course;
-use crate::define::Defines;
+use crate::defines::Defines;
 use crate::error::SceneError;
 use crate::gltf::GltfError;
 use crate::key_path::KeyPath;

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use super::parts::{Broken, Kind, Part, Parts, Rest};
 use super::{Problems, Read, invalid, is_course, read, read_camera, read_file, tagged};
-use crate::define::Defines;
+use crate::defines::Defines;
 use crate::error::SceneError;
 use crate::key_path::{KeyPath, Segment};
 use crate::problem::At;

@@ -22,7 +22,7 @@ pub fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> Scene
     let at = text.floor_char_boundary(at);
     SceneError::Syntax {
         origin: origin.to_owned(),
-        line: super::line_number(text, at),
+        line: line_number(text, at),
         column: text[line_start(text, at)..at].chars().count() + 1,
         message: visible(message).into_owned(),
     }
@@ -57,6 +57,12 @@ fn hint(line: &str, before: &str, rest: &str) -> &'static str {
 
 fn line_start(text: &str, at: usize) -> usize {
     text[..at].rfind('\n').map_or(0, |newline| newline + 1)
+}
+
+/// Returns the line, from 1, of a byte offset.
+pub(super) fn line_number(text: &str, at: usize) -> usize {
+    let newlines = text.bytes().take(at).filter(|&byte| byte == b'\n');
+    1 + newlines.count()
 }
 
 #[cfg(test)]

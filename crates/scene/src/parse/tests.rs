@@ -7,6 +7,7 @@ use super::super::{
     ShapeDescription, TextureDescription,
 };
 use super::*;
+use crate::description::tagged::Tagged;
 
 const PAGE: &str = include_str!("../../../../docs/scene-format.md");
 

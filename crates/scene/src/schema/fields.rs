@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Value as Json, json};
 use toml::{Table, Value};
 
+use super::range::{Slider, gap_of, range_of, slider};
 use super::{SPLIT, definition, of_files};
 use crate::CameraDescription;
 use crate::key_path::{KeyPath, Segment, cut};
@@ -72,19 +73,6 @@ pub enum Kind {
     Switch,
     /// Any text.
     Text,
-}
-
-/// The range of a slider.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Slider {
-    /// Left end.
-    pub from: f64,
-    /// Right end.
-    pub to: f64,
-    /// Step of a linear slider.
-    pub step: f64,
-    /// True if equal distances are equal factors.
-    pub logarithmic: bool,
 }
 
 /// The names that keys of a scene may refer to.
@@ -334,7 +322,7 @@ impl Found<'_> {
         let now = value.as_ref().or(place.default);
         let slider = match kind {
             Kind::Number | Kind::Whole => slider(numbers, kind == Kind::Whole, unit, now.and_then(Json::as_f64)),
-            Kind::Color if shines(path) => {
+            Kind::Color if is_emitter_color(path) => {
                 let list = now.and_then(Json::as_array).into_iter().flatten();
                 slider(numbers, false, unit, list.filter_map(Json::as_f64).reduce(f64::max))
             }
@@ -488,96 +476,12 @@ fn unit_of(schema: &Json) -> Option<&'static str> {
 }
 
 /// Returns true for colors of emitters, which are not limited to 1.
-fn shines(path: &[Segment]) -> bool {
+fn is_emitter_color(path: &[Segment]) -> bool {
     let is_any = |segment: Option<&Segment>, names: &[&str]| match segment {
         Some(Segment::Key(key)) => names.contains(&key.as_str()),
         _ => false,
     };
     is_any(path.first(), &["lights", "environment", "render"]) || is_any(path.last(), &["emission"])
-}
-
-/// Distance of the displayed from the excluded ends of a range, relative to its width.
-const INSIDE: f64 = 1e-3;
-
-fn ends(schema: &Json) -> Option<(f64, f64)> {
-    if let Some(only) = schema.get("const").and_then(Json::as_f64) {
-        return Some((only, only));
-    }
-    let end = |name: &str| schema.get(name).and_then(Json::as_f64);
-    match (end("exclusiveMinimum"), end("exclusiveMaximum")) {
-        (Some(low), Some(high)) => Some((low + INSIDE * (high - low), high - INSIDE * (high - low))),
-        _ => Some((end("minimum")?, end("maximum")?)),
-    }
-}
-
-fn ranges(schema: &Json) -> Vec<(f64, f64)> {
-    match schema.get("anyOf").and_then(Json::as_array) {
-        Some(all) => all.iter().filter_map(ends).collect(),
-        None => ends(schema).into_iter().collect(),
-    }
-}
-
-fn range_of(schema: &Json) -> Option<(f64, f64)> {
-    let all = ranges(schema);
-    let ends = all.iter().copied().reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
-    ends.filter(|(low, high)| low < high)
-}
-
-fn gap_of(schema: &Json) -> Option<(f64, f64)> {
-    let [a, b] = ranges(schema).try_into().ok()?;
-    Some(if a.0 < b.0 { (a.1, b.0) } else { (b.1, a.0) })
-}
-
-/// Maximum width of a range that a linear slider covers.
-const WIDE: f64 = 1000.0;
-/// Minimum ratio of the ends of a logarithmic range.
-const RATIO: f64 = 50.0;
-/// Maximum factor from a value to the ends of its slider.
-const FACTOR: f64 = 100.0;
-
-fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Option<f64>) -> Option<Slider> {
-    let at = now.unwrap_or(0.0);
-    let ranges = ranges(schema);
-    let (low, high) = match ranges.iter().find(|(low, high)| (*low..=*high).contains(&at)) {
-        Some(range) if range.0 < range.1 => *range,
-        _ => range_of(schema)?,
-    };
-    let linear = |from: f64, to: f64| {
-        let step = 10f64.powf(((to - from) / 100.0).log10().floor());
-        let step = if is_whole { step.max(1.0) } else { step };
-        Some(Slider {
-            from,
-            to,
-            step,
-            logarithmic: false,
-        })
-    };
-    if low > 0.0 && high / low >= RATIO && unit != Some("°") {
-        let around = if at > 0.0 { at } else { 1.0 };
-        let (from, to) = ((around / FACTOR).max(low), (around * FACTOR).min(high));
-        return Some(Slider {
-            from,
-            to,
-            step: 0.0,
-            logarithmic: true,
-        });
-    }
-    if high - low <= WIDE {
-        return linear(low, high);
-    }
-    let least = if is_whole { 10.0 } else { 1.0 };
-    let reach = round_up((4.0 * at.abs()).max(least));
-    linear(low.max(-reach), high.min(reach))
-}
-
-/// Rounds up to 1, 2 or 5 times a power of ten.
-fn round_up(x: f64) -> f64 {
-    let power = 10f64.powf(x.log10().floor());
-    let found = [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .map(|digit| digit * power)
-        .find(|rounded| *rounded >= x * 0.999);
-    found.unwrap_or(x)
 }
 
 fn json_of(value: &Value) -> Json {

@@ -8,7 +8,7 @@ use super::super::limits::{ELEVATIONS, ENVIRONMENT_SCALES, TURBIDITIES, TURNS};
 use super::super::sky::{Sky, sky};
 use super::super::studio::studio;
 use super::super::{EnvironmentDescription, EnvironmentImage, EnvironmentName, EnvironmentRotation, Image, Rotation};
-use super::appearance::Images;
+use super::images::Images;
 use super::mesh::turn;
 use super::path::needs_path;
 use super::{At, Checked, Description, Environment, Integrator, Problem, between, check, color, show};

@@ -2,17 +2,19 @@
 //!
 //! The limits keep all derived values, including squared lengths, in the range of `f32`.
 
-mod appearance;
 mod camera;
 mod default_material;
 mod environment;
+mod images;
 mod integrator;
 mod light;
+mod material;
 mod mesh;
 mod mtl;
 mod path;
 mod principled;
 mod shape;
+mod texture;
 
 use crate::note::Note;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,11 +22,12 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use self::appearance::{Images, Textures};
+use self::images::Images;
 pub(super) use self::light::light;
 use self::mesh::{NamedMesh, SceneLookup};
 use self::mtl::Looks;
 use self::shape::shape;
+use self::texture::Textures;
 use super::key_path::cut;
 use super::key_path::list;
 use super::limits::{
@@ -38,7 +41,7 @@ use super::{
     RenderDescription, Samples, SamplesDescription, Scene, Shadows, Shape, Texture, ViewSettings,
 };
 
-pub(super) use self::appearance::TEXEL_MEMORY;
+pub(super) use self::images::TEXEL_MEMORY;
 pub(crate) use self::integrator::note as integrator_note;
 pub(super) use self::mesh::{placement, turned_up};
 pub(super) use self::path::LIGHT_SAMPLES;
@@ -86,9 +89,9 @@ impl Description {
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
         let reads_files = settings.is_ok();
         let mut images = Images::new(assets, reads_files);
-        let (mut textures, replaced, of_textures) = appearance::textures(&self.textures, &mut images);
+        let (mut textures, replaced, of_textures) = texture::textures(&self.textures, &mut images);
         let alphas = match reads_files && of_textures.is_ok() {
-            true => appearance::alphas(&self.materials, &self.textures, &mut images, &mut textures),
+            true => texture::alphas(&self.materials, &self.textures, &mut images, &mut textures),
             false => BTreeMap::new(),
         };
         let known = Textures {

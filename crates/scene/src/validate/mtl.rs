@@ -12,8 +12,9 @@ use super::super::image_file::{Part, Place};
 use super::super::key_path::{cut, cut_to};
 use super::super::limits::{BRIGHTEST, SHININESS};
 use super::super::{Color, ImageTextureDescription, Integrator, Material, Reflection, Texture};
-use super::appearance::{Images, image_texture};
 use super::default_material::default_materials;
+use super::images::Images;
+use super::texture::image_texture;
 use super::{Checked, Problem, number, show};
 use crate::mesh::{Mesh, MtlMaterial, file_beside};
 

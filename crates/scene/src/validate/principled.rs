@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::super::limits::{ABSORPTIONS, ATTENUATION_DISTANCES, PRINCIPLED_IORS, SHARES, THICKNESSES, TURNS};
 use super::super::{AlphaMode, Color, Principled, PrincipledDescription, Value, VertexColors};
-use super::appearance::Textures;
+use super::texture::Textures;
 use super::{At, Checked, Problem, between, check};
 
 impl Textures<'_> {

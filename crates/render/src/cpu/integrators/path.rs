@@ -430,7 +430,7 @@ pub fn add_direct_light(
     if scene.specialization.alpha_surfaces != 0 {
         let bounce = state.path.depth + 1;
         let (t_max, target_prim) = (light.t_max, light.primitive);
-        let veiled = is_occluded_alpha(
+        let occluded = is_occluded_alpha(
             scene,
             dark,
             from_side,
@@ -441,10 +441,10 @@ pub fn add_direct_light(
             state.sample,
             bounce,
         );
-        return add_radiance(scene, state, found, !veiled, bounce);
+        return add_radiance(scene, state, found, !occluded, bounce);
     }
-    let hidden = is_occluded(scene, dark, from_side, to, light.t_max, light.primitive);
-    add_radiance(scene, state, found, !hidden, state.path.depth + 1)
+    let occluded = is_occluded(scene, dark, from_side, to, light.t_max, light.primitive);
+    add_radiance(scene, state, found, !occluded, state.path.depth + 1)
 }
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]

@@ -160,13 +160,13 @@ pub fn lobes_of_light(
         if scene.specialization.tlas_kinds != 0 {
             unlit = unlit_mask(prim, surface, to, block);
         }
-        let hidden = occluded_samples(scene, surface, light, block, unlit);
+        let occluded = occluded_samples(scene, surface, light, block, unlit);
         lobes = phong_block(
             surface,
             material,
             to,
             block,
-            hidden,
+            occluded,
             scene.specialization.exponent_bits,
             lobes,
         );
