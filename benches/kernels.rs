@@ -1,4 +1,4 @@
-//! `cargo bench`: the twins one by one, and whole pictures on the first adapter and on the CPU.
+//! Benchmarks of single twin functions, and of whole images on the first adapter and on the CPU.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -17,8 +17,8 @@ use wgray_render::cpu::rectangle::intersect_rectangle;
 use wgray_render::cpu::shadow::{SampleBlock, light_frustum, may_block, occlusion_mask};
 use wgray_render::cpu::surface::surface_at;
 use wgray_render::cpu::triangle::intersect_triangle;
-use wgray_render::gpu::{self, Choice, Gpu, Options, compose::Shaders};
-use wgray_render::job::{self, Cut};
+use wgray_render::gpu::{self, AdapterChoice, Gpu, Options, compose::Shaders};
+use wgray_render::job::{self, WorkSplit};
 use wgray_render::pack::pack;
 use wgray_render::records::{ELLIPSOID, GRID, INFINITE_T, Packed, RECTANGLE, TRIANGLE};
 
@@ -32,8 +32,8 @@ fn scene(path: &str, size: u32) -> Packed {
     pack(&Scene::load_with(&path, &overrides).expect("the project's scenes are valid"))
 }
 
-/// The machine's arithmetic limit: multiplications and additions of eight f32 at a time, without any memory, on one core.
-/// The throughput is in operations.
+/// Measures the peak arithmetic throughput of one core: multiplications and additions of eight f32 per instruction,
+/// without memory accesses. Throughput in operations.
 #[cfg(target_arch = "x86_64")]
 fn peak(criterion: &mut Criterion) {
     use std::arch::x86_64::{__m256, _mm256_add_ps, _mm256_mul_ps, _mm256_set1_ps};
@@ -67,7 +67,7 @@ fn peak(criterion: &mut Criterion) {
 #[cfg(not(target_arch = "x86_64"))]
 fn peak(_: &mut Criterion) {}
 
-/// One call of each function that a picture spends its time in.
+/// Single calls of the functions that dominate the render time.
 fn twins(criterion: &mut Criterion) {
     let scene = scene("scenes/cornell.toml", 400);
     let of_kind = |kind| {
@@ -124,9 +124,9 @@ fn twins(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Whole pictures; the throughput is in nominal rays.
-fn pictures(criterion: &mut Criterion) {
-    let device = gpu::choose(&Choice::Auto).expect("benchmarks need an adapter");
+/// Whole images. Throughput in nominal rays.
+fn images(criterion: &mut Criterion) {
+    let device = gpu::choose(&AdapterChoice::Auto).expect("benchmarks need an adapter");
     let adapter = device.info.name.clone();
     for path in ["scenes/cornell.toml", "benches/peers/ellipsoids20.toml"] {
         let scene = scene(path, 128);
@@ -154,14 +154,14 @@ fn pictures(criterion: &mut Criterion) {
                         backend.as_mut(),
                         region,
                         samples,
-                        &Cut::default(),
+                        &WorkSplit::default(),
                         &mut |_| true,
                         &mut |film| {
                             black_box(film);
                             Ok(())
                         },
                     )
-                    .expect("nothing cancels it")
+                    .expect("the job is not cancelled")
                 });
             });
         }
@@ -169,5 +169,5 @@ fn pictures(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, peak, twins, pictures);
+criterion_group!(benches, peak, twins, images);
 criterion_main!(benches);

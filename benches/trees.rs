@@ -1,22 +1,22 @@
-//! `cargo bench --bench trees`: trees of boxes over triangles, and walks over them, on all threads.
+//! Benchmarks of BVH construction over triangles and of BVH traversal, on all threads: `cargo bench --bench trees`.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use rayon::prelude::*;
-use wgray_render::bvh::{Aabb, MOST_IN_LEAF, Tree, build};
+use wgray_render::bvh::{Aabb, MAX_LEAF_SIZE, Tree, build};
 use wgray_render::cpu::traversal::{Directions, Level, Line, Mesh, Nearest, Segments, closest, occluded};
 
-/// Triangles, three corners each.
+/// An indexed triangle mesh.
 struct Surface {
     corners: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
 }
 
 impl Surface {
-    /// A net of `columns` x `rows` squares, each of two triangles.
-    fn net(columns: u32, rows: u32, at: impl Fn(f32, f32) -> Vec3) -> Surface {
+    /// Returns a grid of `columns` x `rows` cells of two triangles each. `at` maps (0..1, 0..1) to positions.
+    fn grid(columns: u32, rows: u32, at: impl Fn(f32, f32) -> Vec3) -> Surface {
         let mut surface = Surface {
             corners: Vec::new(),
             triangles: Vec::new(),
@@ -39,7 +39,7 @@ impl Surface {
     }
 
     fn bumpy_sphere(rows: u32) -> Surface {
-        Surface::net(2 * rows, rows, |x, y| {
+        Surface::grid(2 * rows, rows, |x, y| {
             let (a, b) = (y * std::f32::consts::PI, x * std::f32::consts::TAU);
             let d = Vec3::new(a.sin() * b.cos(), a.sin() * b.sin(), a.cos());
             d * (1.0 + 0.03 * (20.0 * d.x).sin() * (23.0 * d.y).sin() * (17.0 * d.z).cos())
@@ -47,7 +47,7 @@ impl Surface {
     }
 
     fn terrain(side: u32) -> Surface {
-        Surface::net(side, side, |x, y| {
+        Surface::grid(side, side, |x, y| {
             let (x, y) = (10.0 * x, 10.0 * y);
             let hills = 0.5 * (1.3 * x).sin() * (1.7 * y).cos() + 0.1 * (9.0 * x).sin() * (11.0 * y).sin();
             Vec3::new(x, y, hills + 0.02 * (57.0 * x + 31.0 * y).sin())
@@ -67,7 +67,7 @@ impl Surface {
 }
 
 fn builds(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("build a tree");
+    let mut group = criterion.benchmark_group("build a BVH");
     group.sample_size(10);
     let surfaces = [
         ("sphere of 70k", Surface::bumpy_sphere(132)),
@@ -77,17 +77,17 @@ fn builds(criterion: &mut Criterion) {
     for (name, surface) in surfaces {
         let boxes = surface.boxes();
         group.throughput(Throughput::Elements(boxes.len() as u64));
-        group.bench_function(name, |b| b.iter(|| build(black_box(&boxes), MOST_IN_LEAF)));
+        group.bench_function(name, |b| b.iter(|| build(black_box(&boxes), MAX_LEAF_SIZE)));
     }
     group.finish();
 }
 
-/// Pixels of a picture's side.
+/// Width and height of the image in pixels.
 const SIDE: usize = 512;
 const PAD: f32 = 1e-6;
 
-/// A bumpy sphere on a floor, seen by a camera, under a square light: a ray for each pixel, and 16 segments to the light from
-/// what it meets.
+/// A bumpy sphere on a floor, with a camera and a square area light: one camera ray per pixel, and 16 shadow rays from
+/// each hit to the light.
 struct View {
     surface: Surface,
     tree: Tree,
@@ -107,7 +107,7 @@ impl View {
         surface
             .triangles
             .extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
-        let tree = build(&surface.boxes(), MOST_IN_LEAF);
+        let tree = build(&surface.boxes(), MAX_LEAF_SIZE);
         let numbered = |i: &u32| {
             let [a, b, c] = surface.triangles[*i as usize];
             [a, b, c, *i]
@@ -146,7 +146,7 @@ impl View {
         closest(level, &self.mesh(), &line, 0.0, u32::MAX, none)
     }
 
-    /// Which of the samples of the light are occluded; `None` where the light is behind the surface.
+    /// Returns the mask of the occluded light samples; `None` if the light is behind the surface or the ray misses.
     fn occluded(&self, level: Level, pixel: usize, hit: Nearest) -> Option<u32> {
         let triangle = self.surface.triangles.get(hit.number as usize)?;
         let [a, b, c] = triangle.map(|i| self.surface.corners[i as usize]);
@@ -172,23 +172,23 @@ impl View {
     }
 }
 
-fn walks(criterion: &mut Criterion) {
+fn traversals(criterion: &mut Criterion) {
     let view = View::new();
     let level = Level::new();
     let pixels = SIDE * SIDE;
     let hits: Vec<Nearest> = (0..pixels).map(|i| view.first_hit(level, i)).collect();
     let to_light = (0..pixels).filter_map(|i| view.occluded(level, i, hits[i])).count();
-    let mut group = criterion.benchmark_group("walk over 70k triangles");
+    let mut group = criterion.benchmark_group("traverse 70k triangles");
     group.sample_size(20);
     group.throughput(Throughput::Elements(pixels as u64));
-    group.bench_function("rays of a camera", |b| {
+    group.bench_function("camera rays", |b| {
         b.iter(|| -> usize {
             let rays = (0..pixels).into_par_iter().with_min_len(SIDE);
             rays.filter(|i| view.first_hit(level, *i).number != u32::MAX).count()
         });
     });
     group.throughput(Throughput::Elements(16 * to_light as u64));
-    group.bench_function("16 segments to a light", |b| {
+    group.bench_function("16 shadow rays to a light", |b| {
         b.iter(|| -> u32 {
             let rays = (0..pixels).into_par_iter().with_min_len(SIDE);
             rays.map(|i| view.occluded(level, i, hits[i]).unwrap_or(0).count_ones())
@@ -198,5 +198,5 @@ fn walks(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(trees, builds, walks);
+criterion_group!(trees, builds, traversals);
 criterion_main!(trees);

@@ -1,5 +1,5 @@
-//! Builds a scene in code, without a file: a row of balls on a checkered ground, one of them with an image that is made
-//! here too. Writes the picture with its depth and normals as layers of an OpenEXR file.
+//! Builds a scene in code, without a scene file: a row of balls on a checkered ground plane, one of them with a texture
+//! image that is also built here. Writes the image with depth and normal layers to an OpenEXR file.
 //!
 //! ```sh
 //! cargo run --release --example build_scene -- balls.exr
@@ -41,7 +41,7 @@ fn main() -> Result<(), Error> {
         .with_shape(SphereDescription::new("striped", [0.0, 0.0, 0.9], 0.9))
         .with_shape(SphereDescription::new("glass", [2.0, -0.5, 0.9], 0.9));
 
-    // An image in memory, by the name that the texture has for its file.
+    // A texture image in memory, under the file name that the texture refers to.
     let colors: Vec<[u8; 3]> = (0..32)
         .map(|i| if i % 4 < 2 { [200, 40, 40] } else { [240, 230, 200] })
         .collect();
@@ -64,9 +64,9 @@ fn main() -> Result<(), Error> {
     picture.save(&file)?;
 
     if let Some(Channel::Floats(depths)) = picture.channel("depth.Z") {
-        let seen = depths.iter().filter(|depth| **depth > 0.0);
-        let nearest = seen.copied().fold(f32::INFINITY, f32::min);
-        println!("{file}: the nearest thing is {nearest} away");
+        let hits = depths.iter().filter(|depth| **depth > 0.0);
+        let nearest = hits.copied().fold(f32::INFINITY, f32::min);
+        println!("{file}: the nearest surface is at distance {nearest}");
     }
     Ok(())
 }

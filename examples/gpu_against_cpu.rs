@@ -1,4 +1,4 @@
-//! Renders a scene on an adapter and on the CPU, and compares the two pictures bit by bit.
+//! Renders a scene on an adapter and on the CPU, and compares the two images bit by bit.
 //!
 //! ```sh
 //! cargo run --release --example gpu_against_cpu -- scenes/textures.toml
@@ -28,18 +28,18 @@ fn main() -> Result<ExitCode, Error> {
     };
     let (gpu, cpu) = (render(Device::Gpu)?, render(Device::Cpu)?);
     if gpu.device() == cpu.device() {
-        eprintln!("the adapter cannot render this scene, and the CPU did so");
+        eprintln!("the adapter cannot render this scene; the CPU rendered it instead");
         return Ok(ExitCode::FAILURE);
     }
-    let Some(apart) = difference(&gpu.pixels(), &cpu.pixels(), 0.0) else {
-        return Ok(ExitCode::FAILURE); // of two sizes: never so
+    let Some(difference) = difference(&gpu.pixels(), &cpu.pixels(), 0.0) else {
+        return Ok(ExitCode::FAILURE); // Only for images of different sizes.
     };
     let name = &gpu.device().name;
     println!(
-        "{name}: {} pixels differ from the CPU's, by {} at most",
-        apart.unequal, apart.largest
+        "{name}: {} pixels differ from the CPU's; largest difference {}",
+        difference.unequal, difference.largest
     );
-    Ok(match apart.unequal {
+    Ok(match difference.unequal {
         0 => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
     })

@@ -1,4 +1,4 @@
-//! Renders a scene file to a picture file.
+//! Renders a scene file to an image file.
 //!
 //! ```sh
 //! cargo run --release --example render_file -- scenes/cornell.toml cornell.png

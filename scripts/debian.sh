@@ -1,6 +1,6 @@
-# Of the scripts that source it: what they install, and what they find in Chromium.
+# Shell functions that install Debian packages and find Vulkan drivers, sourced by other scripts.
 
-# Installs packages of Debian, as root or by sudo. Where there is no apt, the first argument says what to do instead.
+# Installs Debian packages, as root or with sudo. Without apt, prints the first argument and exits.
 install() {
     if ! command -v apt-get >/dev/null; then
         echo "$0: $1" >&2
@@ -11,17 +11,17 @@ install() {
     if [ "$(id -u)" != 0 ]; then
         sudo=sudo
     fi
-    echo "$0: installing by ${sudo:+$sudo }apt-get: $*" >&2
+    echo "$0: installing with ${sudo:+$sudo }apt-get: $*" >&2
     $sudo env DEBIAN_FRONTEND=noninteractive apt-get update -q
     $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "$@"
 }
 
-# Whether programs find Vulkan's loader, by which they reach drivers.
+# Succeeds if the Vulkan loader is installed.
 vulkan_loader_found() {
     { ldconfig -p 2>/dev/null || /sbin/ldconfig -p; } | grep -q 'libvulkan\.so\.1'
 }
 
-# Sets WGRAY_CHROMIUM, where it is not set, to the path of Chromium, which is installed if there is none.
+# Sets WGRAY_CHROMIUM, unless it is set, to the path of Chromium; installs Chromium if it is missing.
 find_chromium() {
     if [ -z "${WGRAY_CHROMIUM:-}" ]; then
         WGRAY_CHROMIUM=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
@@ -32,7 +32,7 @@ find_chromium() {
     fi
 }
 
-# Prints the path of the file by which Vulkan's loader finds the SwiftShader that lies beside Chromium.
+# Prints the path of the driver manifest of the SwiftShader that Chromium includes.
 swiftshader() {
     for folder in "$(dirname "$(readlink -f "$WGRAY_CHROMIUM")")" /usr/lib/chromium /usr/lib/chromium-browser; do
         if [ -e "$folder/libvk_swiftshader.so" ] && [ -e "$folder/vk_swiftshader_icd.json" ]; then

@@ -59,15 +59,15 @@ fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
 // Returns a pixel's sample count from its neighbors' pilot statistics over `first` samples each. Doubles it until the
 // mean square error is small enough, if the evidence allows: the effective sample size y^2 / z is 1 where a single
 // sample deviates, and the full count where half of them do.
-fn samples_wanted(looks: vec4f, first: u32, squared_error: f32, most: u32) -> u32 {
-    if !(looks.w > 0.0) | !(squared_error > 0.0) {
+fn samples_wanted(pilot_sum: vec4f, first: u32, squared_error: f32, most: u32) -> u32 {
+    if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
         return most;
     }
-    let variance = looks.x / looks.w * f32(first);
+    let variance = pilot_sum.x / pilot_sum.w * f32(first);
     var count = first;
     while count < most {
         let enough = variance <= squared_error * f32(count);
-        let evident = looks.y * looks.y >= looks.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * (f32(2u * count / first) - 1.0));
+        let evident = pilot_sum.y * pilot_sum.y >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * (f32(2u * count / first) - 1.0));
         if enough | !evident {
             break;
         }

@@ -20,8 +20,8 @@ fn with_opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) ->
         if i < material.lookups.y {
             let lookup = load_lookup(material.lookups.x + i);
             if (lookup.purposes & FOR_OPACITY) != 0u {
-                let place = uv_in_set(uv, prim, hit, lookup.uv_set);
-                let color = texture_color(load_texture(lookup.texture), Footprint(place, vec2f(0.0), vec2f(0.0)));
+                let set_uv = uv_in_set(uv, prim, hit, lookup.uv_set);
+                let color = texture_color(load_texture(lookup.texture), Footprint(set_uv, vec2f(0.0), vec2f(0.0)));
                 material.opacity = channel_of(color, lookup, OPACITY_CHANNEL);
             }
         }
@@ -46,52 +46,52 @@ fn is_occluded_alpha(before: bool, surface: Surface, to: vec3f, t_max: f32, targ
     if before {
         return true;
     }
-    let way = sqrt(dot(to, to));
-    var ray = Ray(surface.ray_origin, to * (1.0 / way));
+    let distance = sqrt(dot(to, to));
+    var ray = Ray(surface.ray_origin, to * (1.0 / distance));
     var origin_prim = surface.exclude_front;
     var inside_prim = surface.exclude_back;
-    var rest = way * t_max;
+    var remaining = distance * t_max;
     for (var i = 0u; i <= MAX_ALPHA_SKIPS; i++) {
         let hit = closest_hit(ray, origin_prim, inside_prim);
-        if (hit.primitive == NO_INDEX) | !(hit.t < rest) {
+        if (hit.primitive == NO_INDEX) | !(hit.t < remaining) {
             return false;
         }
         let prim = fetch_hit_primitive(hit);
-        let met = surface_of(prim, hit, ray);
-        let material = with_opacity_at(material_of(prim), prim, hit, met.uv);
-        let is_goal = (hit.instance == 0u) & (hit.primitive == target_prim);
-        if !is_goal & alpha_accepts(material, pixel, sample, bounce, RAY_SHADOW, hit, met.side) {
+        let skipped = surface_of(prim, hit, ray);
+        let material = with_opacity_at(material_of(prim), prim, hit, skipped.uv);
+        let is_target = (hit.instance == 0u) & (hit.primitive == target_prim);
+        if !is_target & alpha_accepts(material, pixel, sample, bounce, RAY_SHADOW, hit, skipped.side) {
             return true;
         }
-        rest -= hit.t;
-        ray.origin = met.position - (met.ray_origin - met.position);
-        origin_prim = met.exclude_back;
-        inside_prim = met.exclude_front;
+        remaining -= hit.t;
+        ray.origin = skipped.position - (skipped.ray_origin - skipped.position);
+        origin_prim = skipped.exclude_back;
+        inside_prim = skipped.exclude_front;
     }
     return true;
 }
 
-// Returns the first hit from `met` on that reaches its cutoff or is half opaque; t is measured from the origin of
+// Returns the first hit from `skipped` on that reaches its cutoff or is half opaque; t is measured from the origin of
 // `ray`.
-fn first_seen(ray: Ray, met: Hit) -> Hit {
-    var hit = met;
-    var onward = ray;
-    var way = 0.0;
+fn skip_transparent(ray: Ray, first: Hit) -> Hit {
+    var hit = first;
+    var continued = ray;
+    var distance = 0.0;
     for (var i = 0u; i < MAX_ALPHA_SKIPS; i++) {
         if hit.primitive == NO_INDEX {
             break;
         }
         let prim = fetch_hit_primitive(hit);
-        let surface = surface_of(prim, hit, onward);
+        let surface = surface_of(prim, hit, continued);
         let material = with_opacity_at(material_of(prim), prim, hit, surface.uv);
         let least = select(0.5, material.cutoff, material.alpha_mode == MASK);
         if (material.alpha_mode == OPAQUE) | (material.opacity >= least) {
             break;
         }
-        way += hit.t;
-        onward.origin = surface.position - (surface.ray_origin - surface.position);
-        hit = closest_hit(onward, surface.exclude_back, surface.exclude_front);
+        distance += hit.t;
+        continued.origin = surface.position - (surface.ray_origin - surface.position);
+        hit = closest_hit(continued, surface.exclude_back, surface.exclude_front);
     }
-    hit.t += way;
+    hit.t += distance;
     return hit;
 }

@@ -35,10 +35,10 @@ fn emitter_count() -> u32 {
 }
 
 // Returns a mask of the at most 32 primitives in `first..end` that may occlude a light: bit i is `first + i`.
-fn shadow_candidates(first: u32, end: u32, cone: Cone) -> u32 {
+fn shadow_candidates(first: u32, end: u32, frustum: ShadowFrustum) -> u32 {
     var candidates = 0u;
     for (var i = 0u; i < 32u && first + i < end; i++) {
-        candidates |= select(0u, 1u << i, may_block(bounds[first + i], cone));
+        candidates |= select(0u, 1u << i, may_block(bounds[first + i], frustum));
     }
     return candidates;
 }

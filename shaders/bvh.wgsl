@@ -6,7 +6,7 @@
 struct TraversalStack {
     octant: u32,
     depth: u32,
-    waiting: array<vec2u, BVH_MAX_DEPTH>,
+    pending: array<vec2u, BVH_MAX_DEPTH>,
 }
 
 // Not in functions, where they are zeroed for each ray: a fifth of the time on software Vulkan.
@@ -16,17 +16,17 @@ var<private> mesh_walk: TraversalStack;
 fn traversal_begin(walk: ptr<private, TraversalStack>, octant: u32) {
     (*walk).octant = octant;
     (*walk).depth = 1u;
-    (*walk).waiting[0] = vec2u(0u, 1u | (256u << octant)); // the root, as the only child
+    (*walk).pending[0] = vec2u(0u, 1u | (256u << octant)); // the root, as the only child
 }
 
 // Returns the index of the next node in its BVH. One must be pending.
 fn pop_node(walk: ptr<private, TraversalStack>) -> u32 {
     let top = (*walk).depth - 1u;
-    let group = (*walk).waiting[top];
-    let place = firstTrailingBit(group.y >> 8u);
-    let slot = place ^ (*walk).octant;
-    let rest = group.y & ~(256u << place);
-    (*walk).waiting[top].y = rest;
+    let group = (*walk).pending[top];
+    let bit = firstTrailingBit(group.y >> 8u);
+    let slot = bit ^ (*walk).octant;
+    let rest = group.y & ~(256u << bit);
+    (*walk).pending[top].y = rest;
     (*walk).depth = select(top + 1u, top, (rest >> 8u) == 0u);
     return group.x + countOneBits(group.y & ((1u << slot) - 1u));
 }
@@ -34,9 +34,9 @@ fn pop_node(walk: ptr<private, TraversalStack>) -> u32 {
 // Pushes the hit children that are nodes, and returns those that are leaves.
 fn push_children(walk: ptr<private, TraversalStack>, node: Node, passed: u32) -> u32 {
     let inner = node.scales >> 24u;
-    let waiting = in_order(passed & inner, (*walk).octant);
-    if waiting != 0u {
-        (*walk).waiting[(*walk).depth] = vec2u(node.first_child, inner | (waiting << 8u));
+    let inner_in_order = in_order(passed & inner, (*walk).octant);
+    if inner_in_order != 0u {
+        (*walk).pending[(*walk).depth] = vec2u(node.first_child, inner | (inner_in_order << 8u));
         (*walk).depth += 1u;
     }
     return passed & ~inner;
@@ -65,21 +65,21 @@ fn closest_in_tree(before: Hit, ray: Ray, origin_prim: vec2u, inside_prim: vec2u
     return hit;
 }
 
-fn closest_of_item(before: Hit, item: Item, ray: Ray, s: Slabs, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
+fn closest_of_item(before: Hit, item: BvhItem, ray: Ray, s: Slabs, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     var hit = before;
-    let passage = box_interval(item.low, item.high, s);
-    if !interval_hits(passage, hit.t) {
+    let interval = box_interval(item.low, item.high, s);
+    if !interval_hits(interval, hit.t) {
         return hit;
     }
     // A loop instead of an `if`: software Vulkan skips it.
     for (var once = has_kind(item, INSTANCE); once; once = false) {
-        hit = closest_of_mesh(hit, item.index, ray, max(passage.x, 0.0), origin_prim);
+        hit = closest_of_mesh(hit, item.index, ray, max(interval.x, 0.0), origin_prim);
     }
-    return closest_of_primitive_item(hit, item, ray, passage.x, origin_prim, inside_prim);
+    return closest_of_primitive_item(hit, item, ray, interval.x, origin_prim, inside_prim);
 }
 
 // Returns true if an item is of a kind, at no cost if no item of the scene is.
-fn has_kind(item: Item, kind: u32) -> bool {
+fn has_kind(item: BvhItem, kind: u32) -> bool {
     if (TLAS_KINDS & (1u << kind)) == 0u {
         return false;
     }
@@ -87,9 +87,9 @@ fn has_kind(item: Item, kind: u32) -> bool {
 }
 
 // Returns the hit on primitive i, no nearer than its box.
-fn hit_by_itself(kind: u32, i: u32, ray: Ray, near: f32, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
-    let t = max(intersect(kind, primitives[i], i == by_itself(inside_prim), ray, INFINITE_T), near);
-    return Hit(select(INFINITE_T, t, i != by_itself(origin_prim)), 0u, i, 0u, vec2f(0.0));
+fn standalone_hit(kind: u32, i: u32, ray: Ray, near: f32, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
+    let t = max(intersect(kind, primitives[i], i == standalone_prim(inside_prim), ray, INFINITE_T), near);
+    return Hit(select(INFINITE_T, t, i != standalone_prim(origin_prim)), 0u, i, 0u, vec2f(0.0));
 }
 
 // Returns an upper bound, rounding included, of the distance beyond `start` of hits nearer than t.
@@ -120,8 +120,8 @@ fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, origin_prim: 
                                               load_position(i, corners.z), origin, shear, s);
                 let t = start + max(found.t, 0.0);
                 let own = (origin_prim.x == number + 1u) & (origin_prim.y == corners.w);
-                let met = found.met & !own & (t > 0.0);
-                hit = nearer_hit(hit, Hit(select(INFINITE_T, t, met), number + 1u, corners.w, slot, found.barycentric));
+                let is_hit = found.is_hit & !own & (t > 0.0);
+                hit = nearer_hit(hit, Hit(select(INFINITE_T, t, is_hit), number + 1u, corners.w, slot, found.barycentric));
             }
         }
     }
@@ -151,8 +151,8 @@ fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlo
     let to = segments_to_light(light, surface.ray_origin);
     let pad = item_pad(surface.ray_origin);
     // Most often no ray to the light comes near anything.
-    let fan = interval_to_light(surface.ray_origin, to, pad);
-    let some = children_in_interval(load_node(0u), fan, light.t_max) != 0u;
+    let interval = interval_to_light(surface.ray_origin, to, pad);
+    let some = children_in_interval(load_node(0u), interval, light.t_max) != 0u;
     var wanted = select(0u, all & ~bits, some);
     while wanted != 0u {
         let first = firstTrailingBit(wanted);
@@ -165,16 +165,16 @@ fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlo
     return bits;
 }
 
-fn interval_to_light(origin: vec3f, to: Segments, pad: f32) -> RayInterval {
+fn interval_to_light(origin: vec3f, to: LightSegments, pad: f32) -> RayInterval {
     return ray_interval(origin, to.towards - abs(to.u) - abs(to.v), to.towards + abs(to.u) + abs(to.v), pad);
 }
 
-fn segments_to_two(to: Segments, block: SampleBlock, samples: vec2u) -> array<vec3f, 2> {
+fn segments_to_two(to: LightSegments, block: SampleBlock, samples: vec2u) -> array<vec3f, 2> {
     return array(segment(to, block_sample(block, samples.x)), segment(to, block_sample(block, samples.y)));
 }
 
 // Returns the mask, bits 0 and 1, of two samples that any item occludes.
-fn occluded_pair(surface: Surface, to: Segments, light: Light, block: SampleBlock, samples: vec2u, pad: f32) -> u32 {
+fn occluded_pair(surface: Surface, to: LightSegments, light: Light, block: SampleBlock, samples: vec2u, pad: f32) -> u32 {
     let directions = segments_to_two(to, block, samples);
     let pair = ray_pair(surface.ray_origin, directions[0], directions[1], pad);
     var occluded = 0u;
@@ -198,15 +198,15 @@ fn occluded_pair(surface: Surface, to: Segments, light: Light, block: SampleBloc
 }
 
 // Returns the samples in the mask `may` that an item occludes.
-fn occluded_by_item(item: Item, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
+fn occluded_by_item(item: BvhItem, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
     var bits = 0u;
     for (var once = has_kind(item, INSTANCE) & (may != 0u); once; once = false) {
         bits = may & occluded_by_mesh(item.index, may, surface, light, block, samples);
     }
     let i = item.index;
     let p = surface.ray_origin;
-    let is_inside = i == by_itself(surface.exclude_back);
-    var other = select(may, 0u, i == by_itself(surface.exclude_front));
+    let is_inside = i == standalone_prim(surface.exclude_back);
+    var other = select(may, 0u, i == standalone_prim(surface.exclude_front));
     if (TLAS_KINDS & ~(1u << INSTANCE)) == 0u {
         other = 0u;
     }
@@ -225,7 +225,7 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
     let i = load_instance(number);
     let origin = point_to_mesh(i, surface.ray_origin);
     let to = segments_to_light(light, surface.ray_origin);
-    let to_mesh = Segments(vector_to_mesh(i, to.towards), vector_to_mesh(i, to.u), vector_to_mesh(i, to.v));
+    let to_mesh = LightSegments(vector_to_mesh(i, to.towards), vector_to_mesh(i, to.u), vector_to_mesh(i, to.v));
     let directions = segments_to_two(to_mesh, block, samples);
     let pair = ray_pair(origin, directions[0], directions[1], mesh_pad(i, origin));
     let first_shear = shear_of(directions[0]);
@@ -246,8 +246,8 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
                 let v2 = load_position(i, corners.z);
                 let first = triangle_crossing(v0, v1, v2, origin, first_shear, pair.s[0]);
                 let second = triangle_crossing(v0, v1, v2, origin, second_shear, pair.s[1]);
-                let crosses = select(0u, 1u, first.met & (first.t > 0.0) & (first.t < light.t_max))
-                    | select(0u, 2u, second.met & (second.t > 0.0) & (second.t < light.t_max));
+                let crosses = select(0u, 1u, first.is_hit & (first.t > 0.0) & (first.t < light.t_max))
+                    | select(0u, 2u, second.is_hit & (second.t > 0.0) & (second.t < light.t_max));
                 let own = all(surface.exclude_front == vec2u(number + 1u, corners.w));
                 occluded |= select(0u, crosses, !own & triangle_casts(i, slot));
             }
@@ -280,7 +280,7 @@ fn is_occluded_by_bvh(before: bool, surface: Surface, to: vec3f, t_max: f32, tar
     return occluded;
 }
 
-fn is_occluded_by_item(item: Item, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
+fn is_occluded_by_item(item: BvhItem, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     var occluded = false;
     let i = item.index;
     for (var once = has_kind(item, INSTANCE); once; once = false) {
@@ -309,7 +309,7 @@ fn is_occluded_by_mesh(number: u32, surface: Surface, to: vec3f, t_max: f32) -> 
                 let found = triangle_crossing(load_position(i, corners.x), load_position(i, corners.y),
                                               load_position(i, corners.z), origin, shear, s);
                 let own = all(surface.exclude_front == vec2u(number + 1u, corners.w));
-                occluded |= found.met & !own & (found.t > 0.0) & (found.t < t_max);
+                occluded |= found.is_hit & !own & (found.t > 0.0) & (found.t < t_max);
             }
         }
     }

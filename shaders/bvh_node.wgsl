@@ -19,21 +19,21 @@ fn smaller(a: vec4f, b: vec4f) -> vec4f {
 }
 
 // Returns the mask of the intervals that are not empty and overlap [0, limit].
-fn passed_bits(near: vec4f, far: vec4f, limit: f32) -> u32 {
+fn hit_bits(near: vec4f, far: vec4f, limit: f32) -> u32 {
     let passed = (near <= far) & (far >= vec4f(0.0)) & (near <= vec4f(limit));
     return select(0u, 1u, passed.x) | select(0u, 2u, passed.y) | select(0u, 4u, passed.z) | select(0u, 8u, passed.w);
 }
 
 // Returns the mask of the children whose boxes the ray hits.
 fn children_hit(node: Node, s: Slabs, limit: f32) -> u32 {
-    let first = four_passed(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
+    let first = four_hit(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
                             vec3u(node.high_x.x, node.high_y.x, node.high_z.x), s, limit);
-    let second = four_passed(node, vec3u(node.low_x.y, node.low_y.y, node.low_z.y),
+    let second = four_hit(node, vec3u(node.low_x.y, node.low_y.y, node.low_z.y),
                              vec3u(node.high_x.y, node.high_y.y, node.high_z.y), s, limit);
     return first | (second << 4u);
 }
 
-fn four_passed(node: Node, low: vec3u, high: vec3u, s: Slabs, limit: f32) -> u32 {
+fn four_hit(node: Node, low: vec3u, high: vec3u, s: Slabs, limit: f32) -> u32 {
     let x = step_length(node, 0u);
     let y = step_length(node, 1u);
     let z = step_length(node, 2u);
@@ -45,19 +45,19 @@ fn four_passed(node: Node, low: vec3u, high: vec3u, s: Slabs, limit: f32) -> u32
     let high_z = (node.base.z + steps(high.z) * z - s.high_origin.z) * s.inverse.z;
     let near = larger(larger(smaller(low_x, high_x), smaller(low_y, high_y)), smaller(low_z, high_z));
     let far = smaller(smaller(larger(low_x, high_x), larger(low_y, high_y)), larger(low_z, high_z));
-    return passed_bits(near, far, limit);
+    return hit_bits(near, far, limit);
 }
 
 // Returns the mask of the children whose boxes any ray of the interval may hit.
 fn children_in_interval(node: Node, f: RayInterval, limit: f32) -> u32 {
-    let first = four_in_fan(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
+    let first = four_in_interval(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
                             vec3u(node.high_x.x, node.high_y.x, node.high_z.x), f, limit);
-    let second = four_in_fan(node, vec3u(node.low_x.y, node.low_y.y, node.low_z.y),
+    let second = four_in_interval(node, vec3u(node.low_x.y, node.low_y.y, node.low_z.y),
                              vec3u(node.high_x.y, node.high_y.y, node.high_z.y), f, limit);
     return first | (second << 4u);
 }
 
-fn four_in_fan(node: Node, low: vec3u, high: vec3u, f: RayInterval, limit: f32) -> u32 {
+fn four_in_interval(node: Node, low: vec3u, high: vec3u, f: RayInterval, limit: f32) -> u32 {
     let x = step_length(node, 0u);
     let y = step_length(node, 1u);
     let z = step_length(node, 2u);
@@ -73,7 +73,7 @@ fn four_in_fan(node: Node, low: vec3u, high: vec3u, f: RayInterval, limit: f32) 
     let far_x = far_side(low_x, high_x, f.far_low.x, f.far_high.x);
     let far_y = far_side(low_y, high_y, f.far_low.y, f.far_high.y);
     let far_z = far_side(low_z, high_z, f.far_low.z, f.far_high.z);
-    return passed_bits(larger(larger(near_x, near_y), near_z), smaller(smaller(far_x, far_y), far_z), limit);
+    return hit_bits(larger(larger(near_x, near_y), near_z), smaller(smaller(far_x, far_y), far_z), limit);
 }
 
 // Returns the largest t at which a ray of the interval leaves a box along an axis.

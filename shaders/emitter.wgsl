@@ -142,8 +142,8 @@ fn emission_at(material: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> v
         if i < material.lookups.y {
             let lookup = load_lookup(material.lookups.x + i);
             if (lookup.purposes & FOR_EMISSION) != 0u {
-                let place = uv_in_set(uv, prim, hit, lookup.uv_set);
-                emission = texture_color(load_texture(lookup.texture), Footprint(place, vec2f(0.0), vec2f(0.0)));
+                let set_uv = uv_in_set(uv, prim, hit, lookup.uv_set);
+                emission = texture_color(load_texture(lookup.texture), Footprint(set_uv, vec2f(0.0), vec2f(0.0)));
             }
         }
     }

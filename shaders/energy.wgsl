@@ -22,21 +22,21 @@ fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part
     let rows = vec2u(texel_word(start), texel_word(start + 1u));
     let rough = min(max(material.roughness, 0.0), 1.0) * f32(rows.x - 1u);
     let long = min(max(material.anisotropy, 0.0), 1.0) * f32(rows.y - 1u);
-    let place = streak_place(alpha, wo);
-    let line = place.x * f32(STREAK_LINES - 1u);
-    let column = place.y * f32(STREAK_COLUMNS - 1u);
+    let position = aniso_table_position(alpha, wo);
+    let line = position.x * f32(ANISO_LINES - 1u);
+    let column = position.y * f32(ANISO_COLUMNS - 1u);
     let r = max(min(floor(rough), f32(rows.x) - 2.0), 0.0);
     let s = max(min(floor(long), f32(rows.y) - 2.0), 0.0);
-    let i = min(floor(line), f32(STREAK_LINES) - 2.0);
-    let j = min(floor(column), f32(STREAK_COLUMNS) - 2.0);
-    let first = start + 2u + part * rows.x * rows.y * (STREAK_LINES * STREAK_COLUMNS);
+    let i = min(floor(line), f32(ANISO_LINES) - 2.0);
+    let j = min(floor(column), f32(ANISO_COLUMNS) - 2.0);
+    let first = start + 2u + part * rows.x * rows.y * (ANISO_LINES * ANISO_COLUMNS);
     var sum = 0.0;
     for (var k = 0u; k < select(1u, 2u, rows.x > 1u); k++) {
         for (var l = 0u; l < select(1u, 2u, rows.y > 1u); l++) {
             let row = (u32(r) + k) * rows.y + u32(s) + l;
-            let at = first + (row * STREAK_LINES + u32(i)) * STREAK_COLUMNS + u32(j);
+            let at = first + (row * ANISO_LINES + u32(i)) * ANISO_COLUMNS + u32(j);
             let across = bitcast<vec2f>(vec2u(texel_word(at), texel_word(at + 1u)));
-            let along = bitcast<vec2f>(vec2u(texel_word(at + STREAK_COLUMNS), texel_word(at + STREAK_COLUMNS + 1u)));
+            let along = bitcast<vec2f>(vec2u(texel_word(at + ANISO_COLUMNS), texel_word(at + ANISO_COLUMNS + 1u)));
             let both = across + (along - across) * (line - i);
             let rougher = select(1.0 - (rough - r), rough - r, k == 1u);
             let longer = select(1.0 - (long - s), long - s, l == 1u);

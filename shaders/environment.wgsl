@@ -73,8 +73,8 @@ fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
 
 // Returns the radiance of a ray that leaves the scene, with its MIS weight; `pdf` is the ray's, `normal` its surface's.
 fn environment_mis(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
-    let arriving = environment_eval(direction, normal);
-    return arriving.radiance * select(1.0, power_heuristic(pdf, arriving.pdf), pdf > 0.0);
+    let eval = environment_eval(direction, normal);
+    return eval.radiance * select(1.0, power_heuristic(pdf, eval.pdf), pdf > 0.0);
 }
 
 // Samples the map for a surface with this normal, or 0 if light may arrive from both sides. Inverts the distributions
@@ -89,9 +89,9 @@ fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
     let height = environment.height;
     let down = environment.shifts >> 8u;
     let along = environment.shifts & 255u;
-    let left = vec2u(width - (column.index << along), height + 1u - (row.index << down));
+    let remaining = vec2u(width - (column.index << along), height + 1u - (row.index << down));
     let full = vec2u(1u << along, 1u << down);
-    let size = select(left, full, full < left);
+    let size = select(remaining, full, full < remaining);
     let x = column.position * f32(size.x);
     let y = row.position * f32(size.y);
     let cell = vec2u(u32(x), u32(y));
@@ -102,6 +102,6 @@ fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
     let inside = vec2f(x - f32(cell.x), y - f32(cell.y));
     let d = direction_in_cell(chosen & 65535u, chosen >> 16u, inside, width, height);
     let to = normalize(environment.x * d.x + environment.y * d.y + environment.z * d.z);
-    let arriving = environment_eval(to, normal);
-    return LightSample(to, arriving.radiance, arriving.pdf, false, light.t_max, NO_INDEX);
+    let eval = environment_eval(to, normal);
+    return LightSample(to, eval.radiance, eval.pdf, false, light.t_max, NO_INDEX);
 }

@@ -6,7 +6,7 @@ fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     if TLAS_KINDS == 0u {
         return closest_primitive(ray, origin_prim.y, inside_prim.y);
     }
-    return closest_in_tree(closest_primitive(ray, by_itself(origin_prim), by_itself(inside_prim)), ray, origin_prim, inside_prim);
+    return closest_in_tree(closest_primitive(ray, standalone_prim(origin_prim), standalone_prim(inside_prim)), ray, origin_prim, inside_prim);
 }
 
 // Returns the mask of a block's occluded samples. The surface's own primitive occludes none above it, unless it is a
@@ -46,8 +46,8 @@ fn fetch_hit_primitive(hit: Hit) -> HitPrimitive {
 // Returns the surface at a hit.
 fn surface_of(prim: HitPrimitive, hit: Hit, ray: Ray) -> Surface {
     if is_on_mesh(hit) {
-        let place = vec2u(hit.instance, hit.primitive);
-        return face_surface(prim, place, hit.barycentric, ray.direction, environment.shadow_epsilon);
+        let prim_id = vec2u(hit.instance, hit.primitive);
+        return face_surface(prim, prim_id, hit.barycentric, ray.direction, environment.shadow_epsilon);
     }
     let q = prim.primitive;
     let surface = surface_at(q, hit.primitive, ray, hit.t, environment.shadow_epsilon);
@@ -82,11 +82,11 @@ fn footprint_of(prim: HitPrimitive, hit: Hit, surface: Surface, at: HitDifferent
 }
 
 // Returns the camera ray through an image point and the lens center.
-fn view_ray(place: vec2f) -> Ray {
+fn view_ray(raster: vec2f) -> Ray {
     if PANORAMIC != 0u {
-        return panorama_ray(camera, place);
+        return panorama_ray(camera, raster);
     }
-    return camera_ray(camera, place);
+    return camera_ray(camera, raster);
 }
 
 // Moves a camera path behind the surfaces in front that are invisible to the camera.
@@ -129,7 +129,7 @@ fn path_first_hit(path: Path) -> FirstHit {
     let ray = path.ray;
     var hit = closest_hit(ray, path.origin_prim, path.inside_prim);
     if ALPHA_SURFACES != 0u {
-        hit = first_seen(ray, hit);
+        hit = skip_transparent(ray, hit);
     }
     if hit.primitive == NO_INDEX {
         let zero = vec3f(0.0);

@@ -1,23 +1,23 @@
 // Vectors from a point to the samples of a light, and the falloff of spot lights.
 
 // Vectors towards + u a + v b to a light's samples, a and b in -1..1.
-struct Segments {
+struct LightSegments {
     towards: vec3f,
     u: vec3f,
     v: vec3f,
 }
 
-fn segments_to_light(light: Light, p: vec3f) -> Segments {
-    return Segments(light.center - p * light.finite, light.u, light.v);
+fn segments_to_light(light: Light, p: vec3f) -> LightSegments {
+    return LightSegments(light.center - p * light.finite, light.u, light.v);
 }
 
 // Transforms the vectors to local space.
-fn segments_to_local(q: Primitive, to: Segments) -> Segments {
-    return Segments(vector_to_local(q, to.towards), vector_to_local(q, to.u), vector_to_local(q, to.v));
+fn segments_to_local(q: Primitive, to: LightSegments) -> LightSegments {
+    return LightSegments(vector_to_local(q, to.towards), vector_to_local(q, to.u), vector_to_local(q, to.v));
 }
 
 // Returns the vector to the sample at `at` in the unit square.
-fn segment(to: Segments, at: vec2f) -> vec3f {
+fn segment(to: LightSegments, at: vec2f) -> vec3f {
     return to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0);
 }
 

@@ -57,15 +57,15 @@ fn light_tree_pdf(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
 
 // Returns the leaf of a hit in the light tree, encoded as `LightNode.parent`, or NO_INDEX.
 fn light_leaf(hit: Hit) -> u32 {
-    var place = hit.primitive;
+    var position_in_tree = hit.primitive;
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
         if hit.instance != 0u {
             let leaves = load_instance(hit.instance - 1u).leaves;
             if leaves == NO_INDEX {
                 return NO_INDEX;
             }
-            place = leaves + hit.slot;
+            position_in_tree = leaves + hit.slot;
         }
     }
-    return word_of(records[counts.emitters.w + place / 4u], place % 4u);
+    return word_of(records[counts.emitters.w + position_in_tree / 4u], position_in_tree % 4u);
 }

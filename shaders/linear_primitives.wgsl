@@ -2,16 +2,16 @@
 // software Vulkan cannot skip a branch, but leaves a loop once no lane needs it.
 
 // Returns the mask of the samples of a block that primitives of a kind, `range.x` to before `range.y`, occlude.
-fn occluded_by(kind: u32, range: vec2u, surface: Surface, cone: Cone, light: Light, block: SampleBlock) -> u32 {
+fn occluded_by(kind: u32, range: vec2u, surface: Surface, frustum: ShadowFrustum, light: Light, block: SampleBlock) -> u32 {
     var bits = 0u;
     for (var first = range.x; first < range.y; first += 32u) {
-        let own = by_itself(surface.exclude_front) - first;
-        var candidates = shadow_candidates(first, range.y, cone);
+        let own = standalone_prim(surface.exclude_front) - first;
+        var candidates = shadow_candidates(first, range.y, frustum);
         candidates &= ~select(0u, 1u << (own & 31u), own < 32u);
         while candidates != 0u {
             let i = first + firstTrailingBit(candidates);
             candidates &= candidates - 1u;
-            bits |= occlusion_mask(kind, load_blocker(kind, i), cone.apex, i == by_itself(surface.exclude_back), light, block);
+            bits |= occlusion_mask(kind, load_blocker(kind, i), frustum.apex, i == standalone_prim(surface.exclude_back), light, block);
         }
     }
     return bits;
@@ -19,6 +19,6 @@ fn occluded_by(kind: u32, range: vec2u, surface: Surface, cone: Cone, light: Lig
 
 // Returns true if primitive i, which is q, occludes the segment from a surface to `t_max` times `to`.
 fn is_occluded_by_primitive(kind: u32, q: Primitive, i: u32, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
-    let is_inside = i == by_itself(surface.exclude_back);
-    return (i != by_itself(surface.exclude_front)) & (i != target_prim) & occludes_segment(kind, q, surface.ray_origin, is_inside, to, t_max);
+    let is_inside = i == standalone_prim(surface.exclude_back);
+    return (i != standalone_prim(surface.exclude_front)) & (i != target_prim) & occludes_segment(kind, q, surface.ray_origin, is_inside, to, t_max);
 }

@@ -67,8 +67,8 @@ fn half_vector(wo: vec3f, wi: vec3f) -> vec3f {
 fn facet_eval(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     let o = abs(wo.z);
     let i = abs(wi.z);
-    let seen = 0.5 * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
-    return ggx_d(alpha, half_vector(wo, wi)) * seen;
+    let masking = 0.5 * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
+    return ggx_d(alpha, half_vector(wo, wi)) * masking;
 }
 
 // Returns the PDF of reflection by visible normals, per solid angle.
@@ -84,13 +84,13 @@ fn facet_weight(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
 
 // Returns the coordinates of w in an anisotropic albedo table, 0 to 1. x: the roughness in the azimuth of w, from
 // alpha.y to alpha.x, finer near alpha.y. y: the cosine, finer near 0 at low roughness.
-fn streak_place(alpha: vec2f, w: vec3f) -> vec2f {
+fn aniso_table_position(alpha: vec2f, w: vec3f) -> vec2f {
     let x = alpha.x * w.x;
     let y = alpha.y * w.y;
     let square = (x * x + y * y) / max(w.x * w.x + w.y * w.y, 1e-30);
-    let seen = max(sqrt(square), alpha.y);
-    let line = sqrt(min((seen - alpha.y) / max(alpha.x - alpha.y, 1e-6), 1.0));
-    let half_way = 0.5 * sqrt(seen);
+    let roughness = max(sqrt(square), alpha.y);
+    let line = sqrt(min((roughness - alpha.y) / max(alpha.x - alpha.y, 1e-6), 1.0));
+    let half_way = 0.5 * sqrt(roughness);
     let cosine = min(max(w.z, 0.0), 1.0);
     return vec2f(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)));
 }
@@ -98,6 +98,6 @@ fn streak_place(alpha: vec2f, w: vec3f) -> vec2f {
 // Returns the energy lost to multiple scattering as a multiple of the single-scattering albedo; less the error of the
 // fit, which therefore creates no energy. Anisotropic lobes use a table if they have one.
 fn facet_loss(alpha: vec2f, wo: vec3f) -> f32 {
-    let once = ggx_albedo_along(alpha, wo);
-    return max(1.0 / (once.x + once.y) - 1.005, 0.0);
+    let albedo = ggx_albedo_along(alpha, wo);
+    return max(1.0 / (albedo.x + albedo.y) - 1.005, 0.0);
 }

@@ -26,7 +26,7 @@ fn sheared(v: vec3f, shear: Shear) -> vec3f {
 }
 
 struct Crossing {
-    met: bool,
+    is_hit: bool,
     t: f32,
     barycentric: vec2f,    // weights of the second and third vertex
 }
@@ -44,9 +44,9 @@ fn triangle_crossing(v0: vec3f, v1: vec3f, v2: vec3f, origin: vec3f, shear: Shea
     let sum = u + v + w;
     let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
     let t = (u * a.z + v * b.z + w * c.z) / sum;
-    let passage = box_interval(lowest(v0, v1, v2), highest(v0, v1, v2), s);
-    let met = inside & (abs(sum) > 0.0) & interval_hits(passage, INFINITE_T);
-    return Crossing(met, min(passage.y, max(passage.x, t)), vec2f(v / sum, w / sum));
+    let interval = box_interval(lowest(v0, v1, v2), highest(v0, v1, v2), s);
+    let is_hit = inside & (abs(sum) > 0.0) & interval_hits(interval, INFINITE_T);
+    return Crossing(is_hit, min(interval.y, max(interval.x, t)), vec2f(v / sum, w / sum));
 }
 
 fn lowest(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
@@ -96,7 +96,7 @@ struct HitPrimitive {
     tangents_1: Tangents,
     tangents_2: Tangents,
     anchor: vec3f,         // origin of object space
-    condition: f32,        // condition number of the transform
+    condition_number: f32,        // condition number of the transform
 }
 
 fn standalone_hit_primitive(q: Primitive) -> HitPrimitive {
@@ -120,19 +120,19 @@ fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material
 }
 
 // Returns the surface at barycentric coordinates b, hit from direction d.
-fn face_surface(face: HitPrimitive, place: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> Surface {
+fn face_surface(face: HitPrimitive, prim_id: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> Surface {
     let q = face.primitive;
     let from_anchor = face.edge_1 * b.x + face.edge_2 * b.y;
     let position = q.anchor + from_anchor;
     let side = select(1.0, -1.0, dot(q.z, d) > 0.0);
     let normal = q.z * side;
     let edge = max(max(largest(face.edge_1), largest(face.edge_2)), largest(face.edge_2 - face.edge_1));
-    let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition);
+    let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition_number);
     // Offset towards the viewer too: a hit on an edge is then inside of the other faces at that edge.
     let start = position + (normal - d) * (epsilon * size);
     let tangents = face_frame(face, b);
     let smooth_normal = face_normal(face, b) * side;
-    return Surface(position, normal, smooth_normal, smooth_normal, -d, start, face_bulge(face, b, side), side, place, place,
+    return Surface(position, normal, smooth_normal, smooth_normal, -d, start, face_terminator_offset(face, b, side), side, prim_id, prim_id,
                    face_uv(face, b), tangents.u, tangents.v);
 }
 
@@ -150,36 +150,36 @@ fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let length2 = dot(n, n);
     let unit = n / sqrt(max(length2, 1e-12));
-    return select(face.primitive.z, turned_to(unit, face.primitive.z), length2 > 1e-12);
+    return select(face.primitive.z, flipped_to(unit, face.primitive.z), length2 > 1e-12);
 }
 
 // Returns v or -v, towards `side`: normals in files may be on either side of their triangles.
-fn turned_to(v: vec3f, side: vec3f) -> vec3f {
+fn flipped_to(v: vec3f, side: vec3f) -> vec3f {
     return v * select(1.0, -1.0, dot(v, side) < 0.0);
 }
 
 // Returns the offset from the triangle up to the smooth surface that its vertex normals imply, so that a coarse mesh
 // does not shadow itself in grazing light: Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, chapter
 // 4.
-fn face_bulge(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
+fn face_terminator_offset(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
-    let lift_0 = lift(turned_to(face.normal_0, up), p, up);
-    let lift_1 = lift(turned_to(face.normal_1, up), p - face.edge_1, up);
-    let lift_2 = lift(turned_to(face.normal_2, up), p - face.edge_2, up);
+    let lift_0 = lift(flipped_to(face.normal_0, up), p, up);
+    let lift_1 = lift(flipped_to(face.normal_1, up), p - face.edge_1, up);
+    let lift_2 = lift(flipped_to(face.normal_2, up), p - face.edge_2, up);
     return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
 }
 
-// Returns the offset from a point, `way` from a vertex, up to the tangent plane of the vertex; 0 if the point is above
+// Returns the offset from a point, `to_vertex` from a vertex, up to the tangent plane of the vertex; 0 if the point is above
 // it. A normal more than 37 degrees off the triangle normal `up` implies no surface nearby, as at the corner of a cube:
 // objects on the cube would lose their contact shadows.
-fn lift(n: vec3f, way: vec3f, up: vec3f) -> vec3f {
-    return n * select(0.0, max(-dot(n, way), 0.0), dot(n, up) > 0.8);
+fn lift(n: vec3f, to_vertex: vec3f, up: vec3f) -> vec3f {
+    return n * select(0.0, max(-dot(n, to_vertex), 0.0), dot(n, up) > 0.8);
 }
 
 // Returns true unless the triangle itself occludes the origin of shadow rays from direction `to`. Light from behind may
 // pass its edges, up to the terminator offset.
-fn face_lets_pass(face: HitPrimitive, surface: Surface, to: vec3f) -> bool {
+fn face_direction_allowed(face: HitPrimitive, surface: Surface, to: vec3f) -> bool {
     let fall = -dot(surface.normal, to);
     let height = dot(surface.normal, surface.terminator_offset);
     let crossing = surface.position + surface.terminator_offset + to * (height / max(fall, 1e-30));

@@ -40,7 +40,7 @@ fn face_of(i: Instance, hit: Hit) -> HitPrimitive {
     let zero = vec3f(0.0);
     let none = Tangents(zero, zero);
     var face = HitPrimitive(q, edge_1, edge_2, vec2f(0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0), zero, zero, zero, none, none, none,
-                    i.anchor, i.condition);
+                    i.anchor, i.condition_number);
     if i.attributes != NO_INDEX {
         let row_0 = bitcast<vec4f>(meshes[i.attributes + corners.x]);
         let row_1 = bitcast<vec4f>(meshes[i.attributes + corners.y]);

@@ -24,11 +24,11 @@ fn is_lit(surface: Surface, to: vec3f) -> bool {
 }
 
 // Returns the mask of the samples of a block that do not light the surface of `prim` and need no shadow ray.
-fn unlit_mask(prim: HitPrimitive, surface: Surface, to: Segments, block: SampleBlock) -> u32 {
+fn unlit_mask(prim: HitPrimitive, surface: Surface, to: LightSegments, block: SampleBlock) -> u32 {
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {
         let d = segment(to, block_sample(block, i));
-        bits |= select(1u << i, 0u, is_lit(surface, d) & face_lets_pass(prim, surface, d));
+        bits |= select(1u << i, 0u, is_lit(surface, d) & face_direction_allowed(prim, surface, d));
     }
     return bits;
 }
@@ -41,7 +41,7 @@ fn phong_power(x: f32, material: Material, exponent_bits: u32) -> f32 {
 }
 
 // Adds the unoccluded samples of a block to the lobes, in order.
-fn phong_block(surface: Surface, material: Material, to: Segments, block: SampleBlock, occluded: u32, exponent_bits: u32,
+fn phong_block(surface: Surface, material: Material, to: LightSegments, block: SampleBlock, occluded: u32, exponent_bits: u32,
                sum: Lobes) -> Lobes {
     var lobes = sum;
     for (var i = 0u; i < block.count; i++) {

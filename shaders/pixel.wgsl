@@ -13,16 +13,16 @@ fn camera_sample(pixel: vec2u, sample: u32) -> CameraSample {
     let index = sample % PIXEL_SAMPLES;
     let u = sample_square(PIXEL_PATTERN, PIXEL_SIDE, index, round, sample_key(pixel, camera.seed, 0u));
     let at = filtered(u);
-    let place = vec2f(pixel) + at.xy;
-    var ray = view_ray(place);
+    let raster = vec2f(pixel) + at.xy;
+    var ray = view_ray(raster);
     if LENS != 0u {
-        ray = lens_ray(camera, place, lens_place(pixel, sample));
+        ray = lens_ray(camera, raster, lens_point(pixel, sample));
     }
-    return CameraSample(ray, differential_at(place), at.z);
+    return CameraSample(ray, differential_at(raster), at.z);
 }
 
 // Returns the lens position of a sample, from a point set of its own over the samples of the pixel.
-fn lens_place(pixel: vec2u, sample: u32) -> vec2f {
+fn lens_point(pixel: vec2u, sample: u32) -> vec2f {
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 0u)).zw;
     var u = sobol_sample(sample, key);
     if PIXEL_PATTERN == RANDOM {
@@ -41,15 +41,15 @@ struct Layers {
 }
 
 // Returns the differential of the camera ray through the center of the lens, by image position.
-fn differential_at(place: vec2f) -> Differential {
+fn differential_at(raster: vec2f) -> Differential {
     if DIFFERENTIALS == 0u {
         return Differential();
     }
     let spacing = 1.0 / sqrt(f32(PIXEL_SAMPLES));
     if PANORAMIC != 0u {
-        return panorama_differential(camera, place, spacing);
+        return panorama_differential(camera, raster, spacing);
     }
-    return camera_differential(camera, place, spacing);
+    return camera_differential(camera, raster, spacing);
 }
 
 // Warps a uniform position to the filter distribution, relative to the pixel corner; z is the weight.

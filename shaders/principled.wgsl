@@ -12,10 +12,10 @@ struct PrincipledLobes {
     f0: vec3f,             // its reflectance at normal incidence, with multiple scattering
     f90: vec3f,            // the same at grazing angles
     glass: f32,            // weight of glass, with multiple scattering
-    passed: vec3f,         // the same for transmitted light
+    transmission_tint: vec3f,         // the same for transmitted light
     glass_f0: vec3f,       // reflectance of glass at normal incidence
     glass_f90: f32,        // the same at grazing angles
-    head_on: f32,          // reflectance by the index alone, at normal incidence
+    f0_ior: f32,          // reflectance by the index alone, at normal incidence
     ratio: f32,            // of the indices before and behind the surface, thin or not
     eta: f32,              // the same for refraction: 1 if thin
     thin: bool,            // transmission keeps the direction
@@ -24,7 +24,7 @@ struct PrincipledLobes {
     coat_normal: vec3f,
     sheen: vec3f,          // weight of the sheen lobe
     sheen_alpha: f32,
-    chances: vec4f,        // probabilities of diffuse, specular, glass and coat; the rest is that of sheen
+    lobe_probs: vec4f,        // probabilities of diffuse, specular, glass and coat; the rest is that of sheen
 }
 
 // Returns the lobes seen from wo, only those with a bit in `lobes`. `energy` has tabulated albedos: x and y are the
@@ -39,7 +39,7 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
     let volume = (material.thin == 0u) & (material.transmission > 0.0);
     m.thin = material.thin != 0u;
     m.eta = select(1.0, select(material.ior, 1.0 / material.ior, outside), volume);
-    var left = 1.0;
+    var layer_throughput = 1.0;
     m.coat_normal = coat_normal;
     let over = outside | !volume;
     var coat_share = 0.0;
@@ -49,67 +49,67 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
         m.coat = select(0.0, material.clearcoat, over & (cosine > 0.0));
         let reflected = ggx_albedo(m.coat_alpha, max(cosine, 0.0));
         coat_share = min(m.coat * (COAT_F0 * reflected.x + reflected.y), 1.0);
-        left = 1.0 - coat_share;
+        layer_throughput = 1.0 - coat_share;
     }
     var sheen_share = 0.0;
     if (lobes & LOBE_SHEEN) != 0u {
-        let roughness = max(material.sheen_roughness, LEAST_SHEEN);
+        let roughness = max(material.sheen_roughness, MIN_SHEEN_ROUGHNESS);
         m.sheen_alpha = roughness * roughness;
         let albedo = sheen_albedo(roughness, wo.z);
-        m.sheen = material.sheen * (select(0.0, left, over) / max(albedo, 1.0));
+        m.sheen = material.sheen * (select(0.0, layer_throughput, over) / max(albedo, 1.0));
         let bounded = min(albedo, 1.0);
         sheen_share = luminance(m.sheen) * albedo;
-        left *= select(1.0, max(1.0 - largest(material.sheen) * bounded, 0.0), over);
+        layer_throughput *= select(1.0, max(1.0 - largest(material.sheen) * bounded, 0.0), over);
     }
     let base = material.diffuse;
     let dielectric = 1.0 - material.metallic;
-    let ground = dielectric * (1.0 - material.transmission);
+    let diffuse_weight = dielectric * (1.0 - material.transmission);
     let ratio = (material.ior - 1.0) / (material.ior + 1.0);
     var reflected = vec3f(0.0);
     var inner = vec3f(0.0);
     var share = vec2f(0.0);
-    var lost = 0.0;
+    var compensation = 0.0;
     if (lobes & (LOBE_SPECULAR | LOBE_TRANSMISSION)) != 0u {
         share = ggx_albedo(m.alpha.y, wo.z);
-        var certain = 1.005; // beyond the error of the fit
+        var lower_bound = 1.005; // beyond the error of the fit
         if (lobes & LOBE_ANISOTROPY) != 0u {
             if material.aniso_table != 0u {
                 share = energy.xy;
-                certain = 1.0;
+                lower_bound = 1.0;
             }
         }
         // Turquin, "Practical multiple scattering compensation for microfacet models", 2019.
-        lost = max(1.0 / max(share.x + share.y, 1e-3) - certain, 0.0);
+        compensation = max(1.0 / max(share.x + share.y, 1e-3) - lower_bound, 0.0);
         let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
         // With the index of air nothing reflects at any angle: Lagarde and de Rousiers, "Moving Frostbite to Physically
         // Based Rendering", SIGGRAPH 2014 course, section 3.
         let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
-        let inner_gain = vec3f(1.0) + inner_f0 * lost;
-        let metal_gain = (vec3f(1.0) + base * lost) * (material.metallic * left);
-        m.f0 = inner_f0 * inner_gain * (ground * left) + base * metal_gain;
-        m.f90 = inner_gain * (inner_f90 * (ground * left)) + metal_gain;
+        let inner_gain = vec3f(1.0) + inner_f0 * compensation;
+        let metal_gain = (vec3f(1.0) + base * compensation) * (material.metallic * layer_throughput);
+        m.f0 = inner_f0 * inner_gain * (diffuse_weight * layer_throughput) + base * metal_gain;
+        m.f90 = inner_gain * (inner_f90 * (diffuse_weight * layer_throughput)) + metal_gain;
         reflected = m.f0 * share.x + m.f90 * share.y;
         inner = (inner_f0 * share.x + vec3f(inner_f90 * share.y)) * inner_gain;
     }
-    m.diffuse = base * (ground * left * max(1.0 - largest(inner), 0.0));
-    var clear = 0.0;
+    m.diffuse = base * (diffuse_weight * layer_throughput * max(1.0 - largest(inner), 0.0));
+    var glass_weight = 0.0;
     if (lobes & LOBE_TRANSMISSION) != 0u {
-        let head_on = ratio * ratio;
-        m.head_on = select(head_on, 2.0 * head_on / (1.0 + head_on), m.thin);
-        m.glass_f0 = bounded_color(material.specular * m.head_on) * material.specular_weight;
+        let f0_ior = ratio * ratio;
+        m.f0_ior = select(f0_ior, 2.0 * f0_ior / (1.0 + f0_ior), m.thin);
+        m.glass_f0 = bounded_color(material.specular * m.f0_ior) * material.specular_weight;
         m.glass_f90 = material.specular_weight;
         m.ratio = select(material.ior, 1.0 / material.ior, outside | m.thin);
-        let kept = max(energy.z, 1e-3);
-        let gain = select(1.0, select(1.0 / kept, 1.0 + lost, m.thin), !passes_straight(m));
-        let glass = dielectric * material.transmission * left;
+        let glass_albedo = max(energy.z, 1e-3);
+        let gain = select(1.0, select(1.0 / glass_albedo, 1.0 + compensation, m.thin), !transmits_straight(m));
+        let glass = dielectric * material.transmission * layer_throughput;
         m.glass = glass * gain;
-        m.passed = base * m.glass;
+        m.transmission_tint = base * m.glass;
         let mirrored = min(luminance(m.glass_f0 * share.x + vec3f(m.glass_f90 * share.y)), 1.0);
-        clear = glass * (luminance(base) * (1.0 - mirrored) + mirrored);
+        glass_weight = glass * (luminance(base) * (1.0 - mirrored) + mirrored);
     }
-    let weights = vec4f(luminance(m.diffuse), luminance(reflected), clear, coat_share);
+    let weights = vec4f(luminance(m.diffuse), luminance(reflected), glass_weight, coat_share);
     let sum = weights.x + weights.y + weights.z + weights.w + sheen_share;
-    m.chances = select(vec4f(1.0, 0.0, 0.0, 0.0), weights * (1.0 / max(sum, 1e-30)), sum > 1e-30);
+    m.lobe_probs = select(vec4f(1.0, 0.0, 0.0, 0.0), weights * (1.0 / max(sum, 1e-30)), sum > 1e-30);
     return m;
 }
 
@@ -122,8 +122,8 @@ fn luminance(color: vec3f) -> f32 {
     return 0.2126 * color.x + 0.7152 * color.y + 0.0722 * color.z;
 }
 
-fn sheen_chance(m: PrincipledLobes) -> f32 {
-    return max(1.0 - (m.chances.x + m.chances.y + m.chances.z + m.chances.w), 0.0);
+fn sheen_probability(m: PrincipledLobes) -> f32 {
+    return max(1.0 - (m.lobe_probs.x + m.lobe_probs.y + m.lobe_probs.z + m.lobe_probs.w), 0.0);
 }
 
 // Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", Computer Graphics Forum 13(3), 1994.
@@ -139,18 +139,18 @@ fn glass_fresnel(m: PrincipledLobes, cosine: f32) -> vec3f {
     let behind = refracted_cosine(c, m.ratio);
     let once = fresnel(c, behind, m.ratio);
     let exact = select(once, 2.0 * once / (1.0 + once), m.thin);
-    let x = (exact - m.head_on) / max(1.0 - m.head_on, 1e-6);
+    let x = (exact - m.f0_ior) / max(1.0 - m.f0_ior, 1e-6);
     let f = m.glass_f0 + (vec3f(m.glass_f90) - m.glass_f0) * x;
     return select(bounded_color(vec3f(max(f.x, 0.0), max(f.y, 0.0), max(f.z, 0.0))), vec3f(1.0), behind == 0.0);
 }
 
 // Returns the probability that a microfacet of glass reflects.
-fn glass_chance(m: PrincipledLobes, cosine: f32) -> f32 {
+fn glass_probability(m: PrincipledLobes, cosine: f32) -> f32 {
     return min(luminance(glass_fresnel(m, cosine)), 1.0);
 }
 
 // Returns true if transmission is a delta: smooth, or without a change of the index.
-fn passes_straight(m: PrincipledLobes) -> bool {
+fn transmits_straight(m: PrincipledLobes) -> bool {
     return is_flat(m.alpha) | (!m.thin & (abs(m.eta - 1.0) < 1e-3));
 }
 
@@ -195,7 +195,7 @@ fn principled_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> vec3
         }
     }
     if (lobes & LOBE_TRANSMISSION) != 0u {
-        if !passes_straight(m) {
+        if !transmits_straight(m) {
             value += glass_eval(m, wo, wi);
         }
     }
@@ -219,25 +219,25 @@ fn glass_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> vec3f {
         let up = vec3f(wi.x, wi.y, abs(wi.z));
         let half = half_between(wo, up);
         let reflected = glass_fresnel(m, dot(wo, half));
-        let factor = select(m.passed * (vec3f(1.0) - reflected), reflected * m.glass, above);
+        let factor = select(m.transmission_tint * (vec3f(1.0) - reflected), reflected * m.glass, above);
         return factor * facets_eval(m.alpha, wo, up, half);
     }
     let half = refracting_half(wo, wi, m.eta);
     let reflected = glass_fresnel(m, dot(wo, half));
     let seen = ggx_pdf(m.alpha, wo, half) * ggx_g1(m.alpha, wi);
     let density = seen * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta);
-    return m.passed * (vec3f(1.0) - reflected) * density;
+    return m.transmission_tint * (vec3f(1.0) - reflected) * density;
 }
 
 fn glass_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> f32 {
     let above = wi.z > 0.0;
     if above | m.thin {
         let half = half_between(wo, vec3f(wi.x, wi.y, abs(wi.z)));
-        let chance = glass_chance(m, dot(wo, half));
+        let chance = glass_probability(m, dot(wo, half));
         return mirrored_pdf(m.alpha, wo, half) * select(1.0 - chance, chance, above);
     }
     let half = refracting_half(wo, wi, m.eta);
-    let chance = glass_chance(m, dot(wo, half));
+    let chance = glass_probability(m, dot(wo, half));
     return ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta) * (1.0 - chance);
 }
 
@@ -260,27 +260,27 @@ fn to_frame_around(n: vec3f, v: vec3f) -> vec3f {
 
 // Returns the PDF of `principled_sample`, per solid angle, without delta lobes.
 fn principled_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
-    var pdf = m.chances.x * (max(wi.z, 0.0) * 0.31830988618379067);
+    var pdf = m.lobe_probs.x * (max(wi.z, 0.0) * 0.31830988618379067);
     if (lobes & LOBE_SPECULAR) != 0u {
         if (wi.z > 0.0) & !is_flat(m.alpha) {
-            pdf += m.chances.y * mirrored_pdf(m.alpha, wo, half_between(wo, wi));
+            pdf += m.lobe_probs.y * mirrored_pdf(m.alpha, wo, half_between(wo, wi));
         }
     }
     if (lobes & LOBE_TRANSMISSION) != 0u {
-        if (m.chances.z > 0.0) & !passes_straight(m) {
-            pdf += m.chances.z * glass_pdf(m, wo, wi);
+        if (m.lobe_probs.z > 0.0) & !transmits_straight(m) {
+            pdf += m.lobe_probs.z * glass_pdf(m, wo, wi);
         }
     }
     if (lobes & LOBE_COAT) != 0u {
         let o = to_frame_around(m.coat_normal, wo);
         let i = to_frame_around(m.coat_normal, wi);
         let alpha = vec2f(m.coat_alpha);
-        if (m.chances.w > 0.0) & (i.z > 0.0) & !is_flat(alpha) {
-            pdf += m.chances.w * mirrored_pdf(alpha, o, half_between(o, i));
+        if (m.lobe_probs.w > 0.0) & (i.z > 0.0) & !is_flat(alpha) {
+            pdf += m.lobe_probs.w * mirrored_pdf(alpha, o, half_between(o, i));
         }
     }
     if (lobes & LOBE_SHEEN) != 0u {
-        pdf += select(0.0, sheen_chance(m) * 0.15915494309189535, wi.z > 0.0);
+        pdf += select(0.0, sheen_probability(m) * 0.15915494309189535, wi.z > 0.0);
     }
     return pdf;
 }
@@ -291,7 +291,7 @@ fn mirrored_pdf(alpha: vec2f, wo: vec3f, half: vec3f) -> f32 {
     return select(0.0, ggx_pdf(alpha, wo, half) / (4.0 * max(cosine, 1e-6)), cosine > 0.0);
 }
 
-fn nowhere() -> LobeSample {
+fn no_sample() -> LobeSample {
     return LobeSample(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 0.0, 1.0);
 }
 
@@ -302,53 +302,53 @@ fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes
     var is_delta = false;
     var weight = vec3f(0.0); // of a delta lobe
     var eta = 1.0;
-    var rest = random - m.chances.x;
+    var rest = random - m.lobe_probs.x;
     if (lobes & LOBE_SPECULAR) != 0u {
-        if (rest >= 0.0) & (rest < m.chances.y) {
+        if (rest >= 0.0) & (rest < m.lobe_probs.y) {
             is_delta = is_flat(m.alpha);
             let half = select(ggx_sample(m.alpha, wo, u), vec3f(0.0, 0.0, 1.0), is_delta);
             wi = half * (2.0 * dot(wo, half)) - wo;
-            weight = schlick(m.f0, m.f90, wo.z) * (1.0 / m.chances.y);
+            weight = schlick(m.f0, m.f90, wo.z) * (1.0 / m.lobe_probs.y);
             if wi.z <= 0.0 {
-                return nowhere();
+                return no_sample();
             }
         }
-        rest -= m.chances.y;
+        rest -= m.lobe_probs.y;
     }
     if (lobes & LOBE_TRANSMISSION) != 0u {
-        if (rest >= 0.0) & (rest < m.chances.z) {
-            is_delta = passes_straight(m);
+        if (rest >= 0.0) & (rest < m.lobe_probs.z) {
+            is_delta = transmits_straight(m);
             let half = select(ggx_sample(m.alpha, wo, u), vec3f(0.0, 0.0, 1.0), is_delta);
             let cosine = max(dot(wo, half), 1e-6);
             let reflected = glass_fresnel(m, cosine);
-            let chance = glass_chance(m, cosine);
-            let mirrors = rest < m.chances.z * chance;
+            let chance = glass_probability(m, cosine);
+            let mirrors = rest < m.lobe_probs.z * chance;
             let mirrored = half * (2.0 * cosine) - wo;
             let behind = refracted_cosine(cosine, m.eta);
             let bent = refracted_direction(-wo, half, m.eta, cosine, behind);
             let through = select(bent, vec3f(mirrored.x, mirrored.y, -mirrored.z), m.thin);
             wi = normalize(select(through, mirrored, mirrors));
             eta = select(m.eta, 1.0, mirrors);
-            let passing = m.passed * (vec3f(1.0) - reflected) * (m.eta * m.eta);
-            let share = max(m.chances.z * select(1.0 - chance, chance, mirrors), 1e-30);
+            let passing = m.transmission_tint * (vec3f(1.0) - reflected) * (m.eta * m.eta);
+            let share = max(m.lobe_probs.z * select(1.0 - chance, chance, mirrors), 1e-30);
             weight = select(passing, reflected * m.glass, mirrors) * (1.0 / share);
             if wi.z * select(-1.0, 1.0, mirrors) <= 0.0 {
-                return nowhere();
+                return no_sample();
             }
         }
-        rest -= m.chances.z;
+        rest -= m.lobe_probs.z;
     }
     if (lobes & LOBE_COAT) != 0u {
-        if (rest >= 0.0) & (rest < m.chances.w) {
+        if (rest >= 0.0) & (rest < m.lobe_probs.w) {
             let alpha = vec2f(m.coat_alpha);
             is_delta = is_flat(alpha);
             let o = to_frame_around(m.coat_normal, wo);
             let half = select(ggx_sample(alpha, o, u), vec3f(0.0, 0.0, 1.0), is_delta);
             wi = vector_around(m.coat_normal, half * (2.0 * dot(o, half)) - o);
-            let reflected = schlick(vec3f(COAT_F0), vec3f(1.0), o.z) * (m.coat / m.chances.w);
+            let reflected = schlick(vec3f(COAT_F0), vec3f(1.0), o.z) * (m.coat / m.lobe_probs.w);
             weight = select(vec3f(0.0), reflected, wi.z > 0.0);
         }
-        rest -= m.chances.w;
+        rest -= m.lobe_probs.w;
     }
     if (lobes & LOBE_SHEEN) != 0u {
         if rest >= 0.0 {

@@ -33,7 +33,7 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let apart = wide_x | wide_y | (near_x & (abs(offset.x) >= 0.5 * t_max.x)) | (near_y & (abs(offset.y) >= 0.5 * t_max.y));
     let crossed = max(min(abs(long.x), abs(long.y)), min(abs(short.x), abs(short.y)));
     var together = 0.0;
-    if crossed > MOST_PERIODS {
+    if crossed > MAX_PERIODS {
         together = far_product(at, long, short, on);
     } else {
         let near = near_x & near_y;
@@ -129,7 +129,7 @@ fn along_edge(tail: vec2f, head: vec2f, on: f32, near: bool) -> f32 {
     let rise = high.y - low.y;
     let inverse = run / rise;
     let first = select(floor(low.y), 0.0, near);
-    let last = select(min(floor(high.y) - first, MOST_PERIODS + 2.0), 0.0, near);
+    let last = select(min(floor(high.y) - first, MAX_PERIODS + 2.0), 0.0, near);
     let value_low = wave_value(low.y, on, near);
     let value_high = wave_value(high.y, on, near);
     let height = select(1.0, 2.0, near);
@@ -159,7 +159,7 @@ fn far_product(at: vec2f, long: vec2f, short: vec2f, on: f32) -> f32 {
     let ratio = min(abs(a.y) / abs(a.x), 1000.0);
     let turn = select(1.0, -1.0, a.x * a.y > 0.0);
     var sum = 0.0;
-    for (var i = 1.0; i <= MOST_HARMONICS; i += 1.0) {
+    for (var i = 1.0; i <= MAX_HARMONICS; i += 1.0) {
         let n = turn * i;
         let m = floor(i * ratio + 0.5);
         let along = sine_ratio(m * a.x + n * a.y) * sine_ratio(m * b.x + n * b.y);
@@ -175,9 +175,9 @@ fn sine_ratio(x: f32) -> f32 {
 }
 
 // Terms of the Fourier series.
-const MOST_HARMONICS: f32 = 8.0;
+const MAX_HARMONICS: f32 = 8.0;
 // Maximum periods of an edge along both axes without that series, which bounds the work.
-const MOST_PERIODS: f32 = 32.0;
+const MAX_PERIODS: f32 = 32.0;
 // Minimum width of a footprint, relative to its length or a period.
 const THINNEST: f32 = 0.001;
 // Extent along an axis beyond which the mean is that of the whole pattern.

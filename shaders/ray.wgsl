@@ -20,8 +20,8 @@ fn no_hit() -> Hit {
 }
 
 // Returns the index of a standalone primitive from instance and primitive; NO_INDEX for a mesh triangle.
-fn by_itself(place: vec2u) -> u32 {
-    return select(NO_INDEX, place.y, place.x == 0u);
+fn standalone_prim(prim_id: vec2u) -> u32 {
+    return select(NO_INDEX, prim_id.y, prim_id.x == 0u);
 }
 
 fn point_to_local(q: Primitive, p: vec3f) -> vec3f {

@@ -213,7 +213,7 @@ fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Princ
 fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, wi: vec3f) -> bool {
     var lit = is_lit(surface, wi);
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
-        lit &= face_lets_pass(prim, surface, wi);
+        lit &= face_direction_allowed(prim, surface, wi);
     }
     if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
         let behind = (dot(surface.shading_normal, wi) < 0.0) & (dot(surface.smooth_normal, wi) < 0.0);

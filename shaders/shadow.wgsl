@@ -37,31 +37,31 @@ fn block_sample(block: SampleBlock, i: u32) -> vec2f {
 }
 
 // The frustum of shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
-struct Cone {
+struct ShadowFrustum {
     apex: vec3f,
-    to: Segments,
+    to: LightSegments,
     length2: f32,          // |towards|^2
     inverse_depth: f32,    // 1 / (the minimum of dot(towards, ray)); negative if that is not positive
 }
 
-fn light_frustum(light: Light, p: vec3f) -> Cone {
+fn light_frustum(light: Light, p: vec3f) -> ShadowFrustum {
     let to = segments_to_light(light, p);
     let length2 = dot(to.towards, to.towards);
     let depth = length2 - abs(dot(to.towards, to.u)) - abs(dot(to.towards, to.v));
-    return Cone(p, to, length2, select(-1.0, 1.0 / depth, depth > 0.0));
+    return ShadowFrustum(p, to, length2, select(-1.0, 1.0 / depth, depth > 0.0));
 }
 
 // Returns false if a plane through the apex separates the sphere from the frustum. Its normal is n = m - towards slope,
 // where m is the part of the vector to the sphere's center perpendicular to `towards`, and `slope` the least that keeps
 // all rays of the frustum below the plane.
-fn may_block(sphere: Sphere, cone: Cone) -> bool {
-    let w = sphere.center - cone.apex;
-    let along = dot(w, cone.to.towards);
-    let m = w - cone.to.towards * (along / cone.length2);
+fn may_block(sphere: Sphere, frustum: ShadowFrustum) -> bool {
+    let w = sphere.center - frustum.apex;
+    let along = dot(w, frustum.to.towards);
+    let m = w - frustum.to.towards * (along / frustum.length2);
     let m2 = dot(m, m);
-    let slope = (abs(dot(m, cone.to.u)) + abs(dot(m, cone.to.v))) * cone.inverse_depth;
+    let slope = (abs(dot(m, frustum.to.u)) + abs(dot(m, frustum.to.v))) * frustum.inverse_depth;
     let height = m2 - slope * along;
     let radius2 = sphere.radius * sphere.radius;
     return (slope < 0.0) | (height <= 0.0)
-        | (height * height <= radius2 * (m2 + slope * slope * cone.length2));
+        | (height * height <= radius2 * (m2 + slope * slope * frustum.length2));
 }

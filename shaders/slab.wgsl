@@ -32,8 +32,8 @@ fn box_interval(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
 }
 
 // Returns true if the interval is not empty and overlaps [0, limit].
-fn interval_hits(passage: vec2f, limit: f32) -> bool {
-    return (passage.x <= passage.y) & (passage.y >= 0.0) & (passage.x <= limit);
+fn interval_hits(interval: vec2f, limit: f32) -> bool {
+    return (interval.x <= interval.y) & (interval.y >= 0.0) & (interval.x <= limit);
 }
 
 // All rays from one point with directions in a box. Box tests are conservative: they hit what any of the rays hits.

@@ -24,19 +24,19 @@ fn largest(v: vec3f) -> f32 {
 // onto the primitive, up to the rounding of its coordinates and of its offset from the anchor. Rays start `epsilon`
 // times the largest of these above it.
 fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
-    let met = ray.origin + ray.direction * t;
-    let way = met - q.anchor;
-    let from_anchor = vector_to_local(q, way);
+    let point = ray.origin + ray.direction * t;
+    let offset = point - q.anchor;
+    let from_anchor = vector_to_local(q, offset);
     let gradient = primitive_gradient(q, from_anchor - q.middle);
     let inverse_slope = 1.0 / sqrt(dot(gradient, gradient));
     let outward = gradient * inverse_slope;
     let solid = is_solid(q.kind);
     let height = primitive_height(q, from_anchor);
-    let position = met - outward * (height * inverse_slope);
+    let position = point - outward * (height * inverse_slope);
     let inside = dot(outward, ray.direction) > 0.0;
     let side = select(1.0, -1.0, inside);
     let normal = outward * side;
-    let size = max(largest(position), largest(way));
+    let size = max(largest(position), largest(offset));
     let start = position + normal * (epsilon * size);
     let above = vec2u(0u, select(i, NO_INDEX, solid & inside));
     let below = vec2u(0u, select(i, NO_INDEX, solid & !inside));

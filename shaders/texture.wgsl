@@ -164,8 +164,8 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
 }
 
 // Returns the channel of a color that a scalar parameter uses.
-fn channel_of(color: vec3f, lookup: Lookup, place: u32) -> f32 {
-    let channel = (lookup.channels >> (2u * place)) & 3u;
+fn channel_of(color: vec3f, lookup: Lookup, slot: u32) -> f32 {
+    let channel = (lookup.channels >> (2u * slot)) & 3u;
     return select(select(color.x, color.y, channel == 1u), color.z, channel == 2u);
 }
 

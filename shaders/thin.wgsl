@@ -11,13 +11,13 @@ fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
 }
 
 // A direction on the viewer's side: what is behind the sheet, mirrored by it.
-fn turned_up(wi: vec3f) -> vec3f {
+fn to_upper_side(wi: vec3f) -> vec3f {
     return vec3f(wi.x, wi.y, abs(wi.z));
 }
 
 // The BSDF times the cosine of wi, which may be below the surface.
 fn thin_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
-    let up = turned_up(wi);
+    let up = to_upper_side(wi);
     let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));
     let share = select(material.tint * (1.0 - reflected), vec3f(reflected), wi.z > 0.0);
     let value = share * (facet_eval(facet_alpha(material), wo, up) * dielectric_gain(material));
@@ -26,7 +26,7 @@ fn thin_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
 
 // The density of `thin_sample`, per solid angle.
 fn thin_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
-    let up = turned_up(wi);
+    let up = to_upper_side(wi);
     let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));
     let share = select(1.0 - reflected, reflected, wi.z > 0.0);
     return select(0.0, share * facet_pdf(facet_alpha(material), wo, up), (wo.z > 0.0) & (up.z > 0.0));

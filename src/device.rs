@@ -53,8 +53,8 @@ impl DeviceInfo {
 }
 
 #[cfg(feature = "gpu")]
-impl From<&wgray_render::gpu::Info> for DeviceInfo {
-    fn from(adapter: &wgray_render::gpu::Info) -> DeviceInfo {
+impl From<&wgray_render::gpu::GpuInfo> for DeviceInfo {
+    fn from(adapter: &wgray_render::gpu::GpuInfo) -> DeviceInfo {
         DeviceInfo {
             name: adapter.name.clone(),
             driver: adapter.driver.clone(),

@@ -21,7 +21,7 @@ pub struct DevicePlan {
     pub why: String,
     /// The adapter and its plan, unless it is the CPU.
     #[cfg(feature = "gpu")]
-    pub adapter: Option<(gpu::Info, gpu::KernelPlan)>,
+    pub adapter: Option<(gpu::GpuInfo, gpu::KernelPlan)>,
 }
 
 /// Returns the device that a render would use, without opening it. A render uses the next device, or the CPU, if that one cannot be opened

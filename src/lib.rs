@@ -10,16 +10,16 @@
 //!     let scene = Scene::load("scenes/orthographic.toml")?;
 //! #   let smaller = wgray::Overrides { size: Some((48, 48)), ..Default::default() }; // a quick test
 //! #   let scene = Scene::load_with("scenes/orthographic.toml", &smaller)?;
-//!     let picture = wgray::render(&scene, &Options::default())?;
+//!     let image = wgray::render(&scene, &Options::default())?;
 //! #   let folder = tempfile::tempdir().expect("a temporary folder");
-//! #   std::env::set_current_dir(&folder).expect("the folder is there");
-//!     picture.save("spheres.png")
+//! #   std::env::set_current_dir(&folder).expect("the folder exists");
+//!     image.save("spheres.png")
 //! }
 //! ```
 //!
 //! - [`Options`] selects the device, a region of the image, and layers such as depth and normals. [`Overrides`] with
 //!   [`Scene::load_with`] replaces the size, number of samples or seed of the file.
-//! - [`render_growing`] shows the image while it renders, and can be cancelled.
+//! - [`render_progressive`] shows the image while it renders, and can be cancelled.
 //! - [`Picture`] provides the linear pixels and layers, and writes PNG, OpenEXR, JPEG and WebP files.
 //! - [`Description::new`] builds a scene in code, without a file:
 //!
@@ -35,8 +35,8 @@
 //!         .with_shape(SphereDescription::new("red", [0.0, 0.0, 0.5], 0.5))
 //!         .validate()?;
 //!     let options = Options { device: Device::Cpu, ..Options::default() };
-//!     let picture = wgray::render(&scene, &options)?;
-//!     assert!(picture.pixels().colors.iter().any(|[red, ..]| *red > 0.5));
+//!     let image = wgray::render(&scene, &options)?;
+//!     assert!(image.pixels().colors.iter().any(|[red, ..]| *red > 0.5));
 //!     Ok(())
 //! }
 //! ```
@@ -80,11 +80,34 @@ pub use glam::DVec3;
 pub use image::{Aov, AovSource, Pixels};
 pub use options::Options;
 pub use picture::{Channel, Picture};
-pub use render::{Growing, render, render_growing};
+pub use render::{Progressive, render, render_progressive};
 pub use scene::{Description, Overrides, Scene};
 pub use wgray_image::Region;
 pub use wgray_render::film;
 #[cfg(feature = "gpu")]
-pub use wgray_render::gpu::{Info, adapters};
+pub use wgray_render::gpu::{GpuInfo, adapters};
 pub use wgray_scene as scene;
 pub use wgray_scene::mesh;
+
+/// Earlier name of [`Progressive`].
+#[deprecated(since = "0.2.0", note = "use `Progressive`")]
+pub type Growing<'a> = Progressive<'a>;
+
+/// Earlier name of [`GpuInfo`].
+#[cfg(feature = "gpu")]
+#[deprecated(since = "0.2.0", note = "use `GpuInfo`")]
+pub type Info = GpuInfo;
+
+/// Earlier name of [`render_progressive`].
+///
+/// # Errors
+///
+/// The errors of [`render_progressive`].
+#[deprecated(since = "0.2.0", note = "use `render_progressive`")]
+pub fn render_growing(
+    scene: &Scene,
+    options: &Options,
+    watch: &mut dyn FnMut(&mut Progressive) -> Result<std::ops::ControlFlow<()>, Error>,
+) -> Result<Picture, Error> {
+    render_progressive(scene, options, watch)
+}

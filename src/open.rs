@@ -37,11 +37,11 @@ pub(crate) fn faster_on_cpu(_: &Packed) -> Option<String> {
 }
 
 #[cfg(feature = "gpu")]
-pub(crate) fn choice_of(device: &Device) -> gpu::Choice {
+pub(crate) fn choice_of(device: &Device) -> gpu::AdapterChoice {
     match device {
-        Device::Named(name) => gpu::Choice::Named(name.clone()),
-        Device::Auto => gpu::Choice::Auto,
-        Device::Gpu | Device::Cpu => gpu::Choice::Gpu,
+        Device::Named(name) => gpu::AdapterChoice::Named(name.clone()),
+        Device::Auto => gpu::AdapterChoice::Auto,
+        Device::Gpu | Device::Cpu => gpu::AdapterChoice::Gpu,
     }
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn adapter<'a>(
     wanted: &dyn Fn(&str, bool) -> bool,
 ) -> Result<Ready<'a>, Error> {
     let choice = choice_of(device);
-    let wanted = |info: &gpu::Info| wanted(&info.name, info.is_software());
+    let wanted = |info: &gpu::GpuInfo| wanted(&info.name, info.is_software());
     let opened = gpu::choose_among(&choice, &wanted).map_err(|error| match device {
         Device::Auto => RenderError::NoDevice(error.to_string()),
         _ => error,

@@ -12,8 +12,8 @@ use crate::picture::Picture;
 use crate::renderer::{FaultHandler, Recovery, Renderer};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
-use wgray_render::film::{Film, Form};
-use wgray_render::job::{self, Bands, Cut, Flow, NoCheckpoint, Order};
+use wgray_render::film::{Film, FilmLayout};
+use wgray_render::job::{self, Bands, Flow, NoCheckpoint, Order, WorkSplit};
 use wgray_render::records::{FirstHit, Packed};
 use wgray_scene::Scene;
 
@@ -34,15 +34,15 @@ use wgray_scene::Scene;
 /// The options do not fit the scene, the device does not exist, or its driver reports an error.
 pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let packed = options.pack(scene);
-    let mut prepared = Prepared::new(scene, &packed, options)?;
+    let mut prepared = RenderSetup::new(scene, &packed, options)?;
     let region = prepared.layout.region;
-    let mut film = empty(region, packed.form())?;
-    let (cut, most) = (Cut::of(packed.form()), prepared.renderer.largest_film());
+    let mut film = empty(region, packed.film_layout())?;
+    let (split, most) = (WorkSplit::of(packed.film_layout()), prepared.renderer.largest_film());
     let mut no_checkpoint = NoCheckpoint;
     let mut bands = Bands::new(
         region,
         packed.sampling.pixel_samples,
-        &cut,
+        &split,
         Order::Rows,
         most,
         &mut no_checkpoint,
@@ -67,32 +67,32 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
 /// # Errors
 ///
 /// The errors of [`render`] and of `watch`, and [`RenderError::Cancelled`] if `watch` returns [`ControlFlow::Break`].
-pub fn render_growing(
+pub fn render_progressive(
     scene: &Scene,
     options: &Options,
-    watch: &mut dyn FnMut(&mut Growing) -> Result<ControlFlow<()>, Error>,
+    watch: &mut dyn FnMut(&mut Progressive) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Picture, Error> {
     let packed = options.pack(scene);
-    let mut prepared = Prepared::new(scene, &packed, options)?;
-    let Prepared { renderer, hits, layout } = &mut prepared;
-    let (cut, order) = (Cut::of(packed.form()), Order::Pixels);
+    let mut prepared = RenderSetup::new(scene, &packed, options)?;
+    let RenderSetup { renderer, hits, layout } = &mut prepared;
+    let (split, order) = (WorkSplit::of(packed.film_layout()), Order::Pixels);
     let most = renderer.largest_film();
     let mut no_checkpoint = NoCheckpoint;
     let mut bands = Bands::new(
         layout.region,
         packed.sampling.pixel_samples,
-        &cut,
+        &split,
         order,
         most,
         &mut no_checkpoint,
     );
     let progress = renderer.progress();
-    let mut whole = empty(layout.region, packed.form())?;
+    let mut whole = empty(layout.region, packed.film_layout())?;
     let mut failed = None;
     let mut render_next = || {
         renderer.work(|backend, device| {
             let mut look = |backend: &mut dyn Backend, band: Region, share: f64| {
-                let mut growing = Growing {
+                let mut progress = Progressive {
                     share,
                     backend,
                     device,
@@ -101,7 +101,7 @@ pub fn render_growing(
                     hits,
                     layout,
                 };
-                match watch(&mut growing) {
+                match watch(&mut progress) {
                     Ok(flow) => Ok(flow.is_continue().into()),
                     // Device failures while the image is copied are handled like all others.
                     Err(Error::Render(error @ (RenderError::Lost { .. } | RenderError::OutOfMemory { .. }))) => {
@@ -134,7 +134,7 @@ pub fn render_growing(
 }
 
 /// An image that is being rendered.
-pub struct Growing<'a> {
+pub struct Progressive<'a> {
     share: f64,
     backend: &'a mut dyn Backend,
     device: &'a DeviceInfo,
@@ -144,7 +144,7 @@ pub struct Growing<'a> {
     layout: &'a Layout,
 }
 
-impl Growing<'_> {
+impl Progressive<'_> {
     /// Returns the fraction of the work that is done, 0 to 1.
     pub fn share(&self) -> f64 {
         self.share
@@ -166,14 +166,14 @@ impl Growing<'_> {
     }
 }
 
-struct Prepared<'a> {
+struct RenderSetup<'a> {
     renderer: Renderer<'a>,
     hits: Vec<FirstHit>,
     layout: Layout,
 }
 
-impl<'a> Prepared<'a> {
-    fn new(scene: &Scene, packed: &'a Packed, options: &Options) -> Result<Prepared<'a>, Error> {
+impl<'a> RenderSetup<'a> {
+    fn new(scene: &Scene, packed: &'a Packed, options: &Options) -> Result<RenderSetup<'a>, Error> {
         let region = options.region(scene).map_err(Error::Option)?;
         let on_fault = FaultHandler {
             tell: Box::new(|why, remedy| match remedy {
@@ -202,7 +202,7 @@ impl<'a> Prepared<'a> {
             max_samples: packed.sampling.pixel_samples,
             view: scene.view,
         };
-        Ok(Prepared { renderer, hits, layout })
+        Ok(RenderSetup { renderer, hits, layout })
     }
 
     fn picture(self, film: Film) -> Picture {
@@ -215,7 +215,7 @@ impl<'a> Prepared<'a> {
     }
 }
 
-fn empty(region: Region, form: Form) -> Result<Film, RenderError> {
+fn empty(region: Region, form: FilmLayout) -> Result<Film, RenderError> {
     job::there_is_memory(region.pixels().saturating_mul(form.bytes() as u64))?;
     Ok(Film::of(region, form))
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use web_time::Instant;
-use wgray_image::contain::catch_panic;
+use wgray_image::panic_guard::catch_panic;
 use wgray_render::backend::Backend;
 use wgray_render::records::Packed;
 

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::sync::OnceLock;
 
-use wgray_render::gpu::{Choice, Device, choose};
+use wgray_render::gpu::{AdapterChoice, Device, choose};
 
 /// Part of the name, driver or type of the adapter to test if several are available.
 const ADAPTER: &str = "WGRAY_TEST_ADAPTER";
@@ -21,7 +21,7 @@ fn open() -> Option<Device> {
         tell("adapter: none, as WGRAY_TEST_WITHOUT_GPU=1 asks; GPU and CPU are not compared");
         return None;
     }
-    let choice = std::env::var(ADAPTER).map_or(Choice::Auto, Choice::Named);
+    let choice = std::env::var(ADAPTER).map_or(AdapterChoice::Auto, AdapterChoice::Named);
     match choose(&choice) {
         Ok(device) => {
             let info = &device.info;
@@ -47,7 +47,7 @@ pub fn bit_exact(device: &Device) -> bool {
 
 /// A deviation of one driver whose cause is known.
 #[derive(Clone, Copy, Debug)]
-pub struct Known {
+pub struct KnownDifference {
     /// Part of the adapter's name or driver.
     pub adapter: &'static str,
     /// The check: the name of a shared function, `denormal numbers` for all functions, `picture` or `first hits`.
@@ -57,7 +57,7 @@ pub struct Known {
     pub share: f64,
 }
 
-pub const KNOWN: &[Known] = &[
+pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
     swiftshader("denormal numbers", "zero taken for denormal numbers", 0.0096),
     swiftshader("grid_sample", ROUNDED_TWICE, 0.0014),
     swiftshader("rotated_grid_sample", ROUNDED_TWICE, 0.0014),
@@ -69,8 +69,8 @@ pub const KNOWN: &[Known] = &[
 /// Conversion of an integer to a float in two steps, each of which rounds. Scene indices are below 2^31.
 pub const ROUNDED_TWICE: &str = "unsigned integers from 2^31 on, which are rounded twice";
 
-const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> Known {
-    Known {
+const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> KnownDifference {
+    KnownDifference {
         adapter: "SwiftShader",
         what,
         reason,
@@ -79,7 +79,7 @@ const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> Kn
 }
 
 /// Returns the deviation listed for a check on this device.
-pub fn allowed<'a>(known: &'a [Known], name: &str, driver: &str, what: &str) -> Option<&'a Known> {
+pub fn allowed<'a>(known: &'a [KnownDifference], name: &str, driver: &str, what: &str) -> Option<&'a KnownDifference> {
     known
         .iter()
         .find(|k| k.what == what && (name.contains(k.adapter) || driver.contains(k.adapter)))
@@ -87,7 +87,7 @@ pub fn allowed<'a>(known: &'a [Known], name: &str, driver: &str, what: &str) -> 
 
 /// Checks the fraction of differing results against the table. Without an entry, no result may differ. An entry whose
 /// deviation no longer occurs is an error.
-pub fn judge(known: Option<&Known>, what: &str, share: f64) -> Result<(), String> {
+pub fn judge(known: Option<&KnownDifference>, what: &str, share: f64) -> Result<(), String> {
     match known {
         None if share == 0.0 => Ok(()),
         None => Err(format!("{what}: {:.4} % of the results differ", share * 100.0)),
@@ -104,8 +104,8 @@ pub fn judge(known: Option<&Known>, what: &str, share: f64) -> Result<(), String
 }
 
 #[test]
-fn known_differences_that_no_longer_apply_or_have_grown_fail() {
-    let known = [Known {
+fn outdated_or_exceeded_known_differences_fail() {
+    let known = [KnownDifference {
         adapter: "Some GPU",
         what: "dot",
         reason: "division by an approximation",

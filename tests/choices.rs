@@ -59,13 +59,13 @@ fn a_picture_grows_on_the_device_to_the_rendered_one() {
     let options = on(Device::Named(device.info.name.clone()));
     let rendered = wgray::render(&scene, &options).unwrap();
     let mut seen = Vec::new();
-    let grown = wgray::render_growing(&scene, &options, &mut |growing| {
-        seen.push(growing.picture()?);
+    let grown = wgray::render_progressive(&scene, &options, &mut |progress| {
+        seen.push(progress.picture()?);
         Ok(ControlFlow::Continue(()))
     });
     assert!(grown.unwrap() == rendered);
     assert!(seen.len() > 1 && seen[0] != rendered && seen.last() == Some(&rendered));
-    let cancelled = wgray::render_growing(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));
+    let cancelled = wgray::render_progressive(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));
     assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
 }
 
@@ -81,8 +81,8 @@ fn a_sample_too_long_for_the_driver_is_rendered_by_the_cpu() {
     });
     let options = on(Device::Named(device.info.name.clone()));
     let cpu = wgray::render(&scene, &on(Device::Cpu)).unwrap();
-    let watched = wgray::render_growing(&scene, &options, &mut |growing| {
-        growing.picture().map(|_| ControlFlow::Continue(()))
+    let watched = wgray::render_progressive(&scene, &options, &mut |progress| {
+        progress.picture().map(|_| ControlFlow::Continue(()))
     });
     for picture in [wgray::render(&scene, &options).unwrap(), watched.unwrap()] {
         let name = &picture.device().name;

@@ -63,7 +63,7 @@ fn film_of(backend: &mut dyn Backend) -> (Region, Vec<u32>) {
 fn whole(backend: &mut dyn Backend) -> Film {
     let all = backend.samples_of_all().min(SAMPLES);
     backend.begin(picture()).expect("a film");
-    backend.render(picture(), 0..all).expect("first samples");
+    backend.render(picture(), 0..all).expect("pilot samples");
     backend.render(picture(), all..SAMPLES).expect("further samples");
     backend.film().expect("a film")
 }
@@ -80,16 +80,16 @@ fn hold(what: bool, why: &str) -> Result<(), String> {
 }
 
 const SENTENCES: &[Sentence] = &[
-    ("there is no film at first", |_, make| {
+    ("a new backend has no film", |_, make| {
         let mut b = make();
         hold(
             matches!(b.film(), Err(RenderError::NoFilm)),
-            "a film is read before one is begun",
+            "a film can be read before one is begun",
         )?;
         let rendered = b.render(picture(), 0..1);
         hold(
             matches!(rendered, Err(RenderError::NoFilm)),
-            "samples are taken without a film",
+            "samples are accepted without a film",
         )
     }),
     ("a film starts empty", |_, make| {
@@ -100,7 +100,7 @@ const SENTENCES: &[Sentence] = &[
         hold(film.region == region(2, 3, 7, 9), "another region")?;
         hold(
             film.lists().flatten().all(|sum| *sum == glam::Vec4::ZERO),
-            "sums of an earlier film",
+            "the sums of the previous film remain",
         )
     }),
     ("a film has the scene's form", |packed, make| {
@@ -110,26 +110,26 @@ const SENTENCES: &[Sentence] = &[
             let film = b.film().map_err(|e| e.to_string())?;
             let lengths = |film: &Film| film.lists().map(Vec::len).collect::<Vec<_>>();
             hold(
-                lengths(&film) == lengths(&Film::of(of, packed.form())),
-                "lists of another length",
+                lengths(&film) == lengths(&Film::of(of, packed.film_layout())),
+                "lists have the wrong length",
             )?;
             hold(
-                film.has_layers() == packed.form().layers,
-                "layers that were not asked for",
+                film.has_layers() == packed.film_layout().layers,
+                "layers are missing or unrequested",
             )?;
         }
         Ok(())
     }),
-    ("with layers and without, all else has the same bits", |packed, make| {
+    ("layers do not change the other values", |packed, make| {
         let film = whole(&mut *make());
         let mut plain = packed.clone();
         plain.specialization.layers = 0;
         let other = whole(&mut Cpu::new(&plain));
         let same =
             |a: &[glam::Vec4], b: &[glam::Vec4]| bytemuck::cast_slice::<_, u32>(a) == bytemuck::cast_slice::<_, u32>(b);
-        hold(same(&film.sums, &other.sums), "other sums")?;
-        hold(same(&film.moments, &other.moments), "other moments")?;
-        hold(same(&film.looks, &other.looks), "other looks")
+        hold(same(&film.sums, &other.sums), "the sums differ")?;
+        hold(same(&film.moments, &other.moments), "the moments differ")?;
+        hold(same(&film.pilot_sums, &other.pilot_sums), "the pilot sums differ")
     }),
     ("reading a film changes nothing", |_, make| {
         let mut b = make();
@@ -141,12 +141,9 @@ const SENTENCES: &[Sentence] = &[
         let mut other = make();
         other.begin(picture()).map_err(|e| e.to_string())?;
         other.render(picture(), 0..8).map_err(|e| e.to_string())?;
-        hold(
-            film_of(&mut *b) == film_of(&mut *other),
-            "what comes after a copy differs",
-        )
+        hold(film_of(&mut *b) == film_of(&mut *other), "samples after a copy differ")
     }),
-    ("a film is gone on from, by any backend", |packed, make| {
+    ("any backend resumes a film", |packed, make| {
         let mut b = make();
         let expected = bits(&whole(&mut *b));
         let all = b.samples_of_all().min(SAMPLES);
@@ -160,16 +157,16 @@ const SENTENCES: &[Sentence] = &[
             let film = start.film().map_err(|e| e.to_string())?;
             let mut b = make();
             b.resume(film.clone()).map_err(|e| e.to_string())?;
-            hold(film_of(&mut *b) == bits(&film), "a resumed film is another")?;
+            hold(film_of(&mut *b) == bits(&film), "resuming changes the film")?;
             b.render(picture(), middle..all.max(middle))
                 .map_err(|e| e.to_string())?;
             b.render(picture(), middle.max(all)..SAMPLES)
                 .map_err(|e| e.to_string())?;
-            hold(film_of(&mut *b) == expected, "a film that was gone on from differs")?;
+            hold(film_of(&mut *b) == expected, "a resumed and completed film differs")?;
         }
         Ok(())
     }),
-    ("a film of another form is refused", |packed, make| {
+    ("a film of another form is rejected", |packed, make| {
         let mut b = make();
         let film = whole(&mut *b);
         let before = film_of(&mut *b);
@@ -183,7 +180,7 @@ const SENTENCES: &[Sentence] = &[
                 ..film.clone()
             },
             Film {
-                looks: vec![glam::Vec4::ZERO; 3],
+                pilot_sums: vec![glam::Vec4::ZERO; 3],
                 ..film.clone()
             },
             Film {
@@ -194,7 +191,7 @@ const SENTENCES: &[Sentence] = &[
                 ..film.clone()
             },
             Film {
-                layers: std::array::from_fn(|i| match (i, packed.form().layers) {
+                layers: std::array::from_fn(|i| match (i, packed.film_layout().layers) {
                     (4, true) => Vec::new(),
                     (4, false) => film.sums.clone(),
                     _ => film.layers[i].clone(),
@@ -202,15 +199,15 @@ const SENTENCES: &[Sentence] = &[
                 ..film.clone()
             },
         ] {
-            let told = b.resume(wrong);
+            let result = b.resume(wrong);
             hold(
-                matches!(told, Err(RenderError::FilmMismatch(_))),
-                "a film of another form is taken",
+                matches!(result, Err(RenderError::FilmMismatch(_))),
+                "a film of another form is accepted",
             )?;
         }
-        hold(film_of(&mut *b) == before, "a refusal changes the film")
+        hold(film_of(&mut *b) == before, "a rejection changes the film")
     }),
-    ("every cut of the work gives the same film", |_, make| {
+    ("every split of the work gives the same film", |_, make| {
         let mut b = make();
         let expected = bits(&whole(&mut *b));
         let all = b.samples_of_all().min(SAMPLES);
@@ -229,7 +226,7 @@ const SENTENCES: &[Sentence] = &[
                 }
             }
         }
-        hold(film_of(&mut *b) == expected, "small tiles and ranges give another film")
+        hold(film_of(&mut *b) == expected, "small tiles and ranges change the film")
     }),
     ("empty tiles and ranges change nothing", |_, make| {
         let mut b = make();
@@ -242,44 +239,44 @@ const SENTENCES: &[Sentence] = &[
         ] {
             b.render(tile, samples).map_err(|e| e.to_string())?;
         }
-        hold(film_of(&mut *b) == expected, "nothing has changed the film")?;
+        hold(film_of(&mut *b) == expected, "empty work changes the film")?;
         b.begin(region(5, 5, 5, 5)).map_err(|e| e.to_string())?;
         let film = b.film().map_err(|e| e.to_string())?;
-        hold(film.sums.is_empty(), "a film without pixels has some")
+        hold(film.sums.is_empty(), "an empty film has pixels")
     }),
-    ("what is outside is refused", |_, make| {
+    ("regions outside are rejected", |_, make| {
         let mut b = make();
-        let outside = |told: Result<(), RenderError>| matches!(told, Err(RenderError::Outside { .. }));
-        hold(outside(b.begin(region(0, 0, 21, 12))), "a film beyond the picture")?;
+        let outside = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Outside { .. }));
+        hold(outside(b.begin(region(0, 0, 21, 12))), "a film may exceed the image")?;
         b.begin(region(4, 4, 10, 10)).map_err(|e| e.to_string())?;
         for tile in [region(3, 4, 10, 10), region(4, 4, 11, 10), picture()] {
-            hold(outside(b.render(tile, 0..1)), "a tile beyond the film")?;
+            hold(outside(b.render(tile, 0..1)), "a tile may exceed the film")?;
         }
         let hits = b.first_hits(region(0, 0, 20, 13)).map(|_| ());
-        hold(outside(hits), "first hits beyond the picture")?;
+        hold(outside(hits), "first hits may exceed the image")?;
         let film = b.film().map_err(|e| e.to_string())?;
         hold(
             film.sums.iter().all(|sum| *sum == glam::Vec4::ZERO),
-            "a refusal changes the film",
+            "a rejection changes the film",
         )
     }),
-    ("submitting and waiting are two calls", |_, make| {
+    ("submitted work is pending until polled or waited for", |_, make| {
         let mut b = make();
-        hold(b.poll().map_err(|e| e.to_string())?, "something is pending at first")?;
+        hold(b.poll().map_err(|e| e.to_string())?, "work is pending before a submit")?;
         b.wait().map_err(|e| e.to_string())?;
         b.begin(picture()).map_err(|e| e.to_string())?;
         b.submit(picture(), 0..8).map_err(|e| e.to_string())?;
-        let pending = |told: Result<(), RenderError>| matches!(told, Err(RenderError::Pending));
-        hold(pending(b.submit(picture(), 8..9)), "a second call is taken")?;
-        hold(pending(b.film().map(|_| ())), "a film is read while a call is pending")?;
-        hold(pending(b.begin(picture())), "a film is begun while a call is pending")?;
+        let pending = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Pending));
+        hold(pending(b.submit(picture(), 8..9)), "a second submit is accepted")?;
+        hold(pending(b.film().map(|_| ())), "a film is read while work is pending")?;
+        hold(pending(b.begin(picture())), "a film is begun while work is pending")?;
         hold(
             pending(b.resume(Film::new(picture()))),
-            "a film is gone on from while a call is pending",
+            "a film is resumed while work is pending",
         )?;
         hold(
             pending(b.first_hits(picture()).map(|_| ())),
-            "first hits while a call is pending",
+            "first hits are computed while work is pending",
         )?;
         while !b.poll().map_err(|e| e.to_string())? {
             std::thread::yield_now();
@@ -287,13 +284,10 @@ const SENTENCES: &[Sentence] = &[
         let polled = film_of(&mut *b);
         b.begin(picture()).map_err(|e| e.to_string())?;
         b.render(picture(), 0..8).map_err(|e| e.to_string())?;
-        hold(
-            film_of(&mut *b) == polled,
-            "what was polled for differs from what was waited for",
-        )
+        hold(film_of(&mut *b) == polled, "polling and waiting give different films")
     }),
     (
-        "first samples of all pixels come before further ones",
+        "the pilot samples of all pixels precede further samples",
         |packed, make| {
             if !packed.sampling.adaptive {
                 return Ok(());
@@ -305,7 +299,7 @@ const SENTENCES: &[Sentence] = &[
             let early = b.render(region(0, 0, 20, 1), all..all + 1);
             hold(
                 matches!(early, Err(RenderError::PilotIncomplete { .. })),
-                "further samples are taken too early",
+                "further samples are accepted before the pilot samples are complete",
             )?;
             b.render(region(0, 11, 20, 12), 0..all).map_err(|e| e.to_string())?;
             b.render(region(0, 0, 20, 1), all..all + 1).map_err(|e| e.to_string())?;
@@ -317,19 +311,19 @@ const SENTENCES: &[Sentence] = &[
             b.render(most, all..SAMPLES).map_err(|e| e.to_string())?;
             hold(
                 film_of(&mut *b) == expected,
-                "a range of both for the last tile gives another film",
+                "a range of pilot and further samples for the last tile changes the film",
             )
         },
     ),
-    ("first hits need no film, and leave it as it is", |_, make| {
+    ("first hits need no film and do not change it", |_, make| {
         let mut b = make();
         let hits = b.first_hits(picture()).map_err(|e| e.to_string())?;
-        hold(hits.len() == 240, "another number of first hits")?;
+        hold(hits.len() == 240, "wrong number of first hits")?;
         let before = bits(&whole(&mut *b));
         let part = b.first_hits(region(0, 0, 20, 2)).map_err(|e| e.to_string())?;
         hold(
             bytemuck::cast_slice::<_, u8>(&part) == bytemuck::cast_slice::<_, u8>(&hits[..40]),
-            "a part differs",
+            "the first hits of a part differ",
         )?;
         hold(film_of(&mut *b) == before, "first hits change the film")
     }),
@@ -338,18 +332,18 @@ const SENTENCES: &[Sentence] = &[
 /// Returns the sentences that a backend violates, with the deviations.
 fn broken<'a>(packed: &'a Packed, make: &Make<'a>) -> Vec<String> {
     let found = SENTENCES.iter().filter_map(|(sentence, holds)| {
-        let told = holds(packed, make).err()?;
-        Some(format!("{sentence}: {told}"))
+        let deviation = holds(packed, make).err()?;
+        Some(format!("{sentence}: {deviation}"))
     });
     found.collect()
 }
 
 #[test]
-fn every_backend_keeps_to_the_contract() {
+fn every_backend_fulfills_the_contract() {
     for packed in &subjects() {
         for way in exact_ways() {
             let problems = broken(packed, &|| backend(packed, way));
-            assert_eq!(problems, Vec::<String>::new(), "{way:?}, {:?}", packed.form());
+            assert_eq!(problems, Vec::<String>::new(), "{way:?}, {:?}", packed.film_layout());
         }
     }
 }
@@ -365,30 +359,30 @@ enum How {
     KeepsTheFilm,
     EmptiesTheFilmByReading,
     IgnoresAMissingFilm,
-    ForgetsTheFilmToGoOnFrom,
+    DropsTheResumedFilm,
     AddsASampleTwice,
     ClampsTiles,
-    TakesASecondCall,
+    AcceptsASecondSubmit,
     FirstHitsEndTheFilm,
-    TakesFurtherSamplesEarly,
-    ForgetsLayersToGoOnFrom,
-    LeavesLayersAway,
-    ShowsLayersInTheSums,
+    AcceptsFurtherSamplesEarly,
+    DropsResumedLayers,
+    OmitsLayers,
+    WritesLayersIntoTheSums,
 }
 
 const WRONGS: [How; 12] = [
     How::KeepsTheFilm,
     How::EmptiesTheFilmByReading,
     How::IgnoresAMissingFilm,
-    How::ForgetsTheFilmToGoOnFrom,
+    How::DropsTheResumedFilm,
     How::AddsASampleTwice,
     How::ClampsTiles,
-    How::TakesASecondCall,
+    How::AcceptsASecondSubmit,
     How::FirstHitsEndTheFilm,
-    How::TakesFurtherSamplesEarly,
-    How::ForgetsLayersToGoOnFrom,
-    How::LeavesLayersAway,
-    How::ShowsLayersInTheSums,
+    How::AcceptsFurtherSamplesEarly,
+    How::DropsResumedLayers,
+    How::OmitsLayers,
+    How::WritesLayersIntoTheSums,
 ];
 
 impl Backend for Wrong<'_> {
@@ -401,8 +395,8 @@ impl Backend for Wrong<'_> {
 
     fn resume(&mut self, film: Film) -> Result<(), RenderError> {
         match self.how {
-            How::ForgetsTheFilmToGoOnFrom => self.inner.begin(film.region),
-            How::ForgetsLayersToGoOnFrom => self.inner.resume(Film {
+            How::DropsTheResumedFilm => self.inner.begin(film.region),
+            How::DropsResumedLayers => self.inner.resume(Film {
                 layers: film.layers.map(|layer| vec![glam::Vec4::ZERO; layer.len()]),
                 ..film
             }),
@@ -415,13 +409,13 @@ impl Backend for Wrong<'_> {
         match self.how {
             How::AddsASampleTwice if samples.start > 0 => samples.start -= 1,
             How::ClampsTiles => tile = tile.within(self.inner.film()?.region),
-            How::TakesASecondCall => self.inner.wait()?,
+            How::AcceptsASecondSubmit => self.inner.wait()?,
             _ => {}
         }
         match self.inner.submit(tile, samples) {
             Err(RenderError::NoFilm) if self.how == How::IgnoresAMissingFilm => Ok(()),
-            Err(RenderError::PilotIncomplete { .. }) if self.how == How::TakesFurtherSamplesEarly => Ok(()),
-            told => told,
+            Err(RenderError::PilotIncomplete { .. }) if self.how == How::AcceptsFurtherSamplesEarly => Ok(()),
+            result => result,
         }
     }
 
@@ -436,8 +430,8 @@ impl Backend for Wrong<'_> {
     fn film(&mut self) -> Result<Film, RenderError> {
         let mut film = self.inner.film()?;
         match self.how {
-            How::LeavesLayersAway => film.layers = Film::new(film.region).layers,
-            How::ShowsLayersInTheSums if film.has_layers() => film.sums = film.layers[0].clone(),
+            How::OmitsLayers => film.layers = Film::new(film.region).layers,
+            How::WritesLayersIntoTheSums if film.has_layers() => film.sums = film.layers[0].clone(),
             _ => {}
         }
         if self.how == How::EmptiesTheFilmByReading {
@@ -467,7 +461,7 @@ impl Backend for Wrong<'_> {
 }
 
 #[test]
-fn a_backend_that_breaks_the_contract_is_found() {
+fn a_contract_violation_is_found() {
     let subjects = subjects();
     for how in WRONGS {
         let found = subjects.iter().any(|packed| {

@@ -8,7 +8,7 @@ use wgray_render::bvh::{Aabb, build};
 use wgray_render::cpu::differential::{Derivative, Differential, HitDifferential};
 use wgray_render::cpu::diffuse::Angles;
 use wgray_render::cpu::footprint::Footprint;
-use wgray_render::cpu::light::Segments;
+use wgray_render::cpu::light::LightSegments;
 use wgray_render::cpu::mesh::{HitPrimitive, face_primitive, shear_of};
 use wgray_render::cpu::path::Path;
 use wgray_render::cpu::phong::Lobes;
@@ -20,14 +20,14 @@ use wgray_render::cpu::slab::{ray_interval, slabs};
 use wgray_render::cpu::surface::Surface;
 use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type};
 use wgray_render::records::{
-    BOX_PAD, CYLINDER, Camera, ELLIPSOID, INFINITE_T, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material,
+    BOX_PAD, CYLINDER, Camera, ELLIPSOID, INFINITE_T, Instance, KINDS, Light, LightNode, MIN_SHEEN_ROUGHNESS, Material,
     NO_INDEX, NO_PRIMITIVE, Node, Primitive, SMALLEST_ALPHA, Sphere, Texture,
 };
 
 use crate::kernel::{Function, scalars};
+use crate::probe_words::ProbeWords;
 use crate::random::Random;
 use crate::sources::type_name;
-use crate::words::Words;
 
 /// Values at which floating-point arithmetic changes behavior.
 const EDGES: &[f32] = &[
@@ -174,7 +174,7 @@ impl Face {
                 .iter()
                 .map(|corner| corner.abs().max_element())
                 .fold(0.0, f64::max) as f32,
-            condition: random.magnitude(0.0, 2.0) as f32,
+            condition_number: random.magnitude(0.0, 2.0) as f32,
             side: random.pick(&[1.0, -1.0]),
             ..bytemuck::Zeroable::zeroed()
         };
@@ -225,7 +225,7 @@ impl Face {
             tangents_1,
             tangents_2,
             anchor: i.anchor,
-            condition: i.condition,
+            condition_number: i.condition_number,
         }
     }
 
@@ -407,9 +407,9 @@ impl Situation {
                 .write(words);
             }
             "Surface" => self.surface(random).write(words),
-            "Segments" => {
+            "LightSegments" => {
                 let towards = (self.target - self.start).as_vec3();
-                Segments {
+                LightSegments {
                     towards,
                     u: self.light.u,
                     v: self.light.v,
@@ -425,7 +425,7 @@ impl Situation {
             "Texture" => texture(random).write(words),
             "i32" => words.push((random.pick(&[random.below(20), random.below(40_000)]) as i32 - 20) as u32),
             "Sphere" => self.sphere(random).write(words),
-            "Cone" => light_frustum(&self.light, self.start.as_vec3()).write(words),
+            "ShadowFrustum" => light_frustum(&self.light, self.start.as_vec3()).write(words),
             "Material" => material(random).write(words),
             "PrincipledLobes" => mixture(random).write(words),
             "Angles" => Angles {
@@ -622,7 +622,7 @@ impl Situation {
             "t_max" => random.pick(&[self.light.t_max, 1.0 - 1e-5, 1e10, 1.0]),
             "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" | "on" => random.unit() as f32,
             "alpha" => alpha(random).x,
-            "roughness" => random.between(f64::from(LEAST_SHEEN), 1.0) as f32,
+            "roughness" => random.between(f64::from(MIN_SHEEN_ROUGHNESS), 1.0) as f32,
             "eta" | "anisotropy" => random.magnitude(-1.0, 1.0) as f32,
             "epsilon" => random.pick(&[2e-6, 1e-4, 0.0]),
             _ => {

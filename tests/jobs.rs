@@ -10,8 +10,10 @@ use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 use wgray_render::film::Film;
-use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, Opening};
-use wgray_render::job::{Bands, CheckpointStore, Cut, Flow, Identity, NoCheckpoint, Order, Piece, StoredPiece, Tile};
+use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, CheckpointOptions};
+use wgray_render::job::{
+    Bands, CheckpointStore, FilmPiece, Flow, Identity, NoCheckpoint, Order, StoredPiece, Tile, WorkSplit,
+};
 use wgray_render::records::Packed;
 
 use crate::contract::{bits, subjects};
@@ -21,14 +23,14 @@ use crate::scenes;
 /// A checkpoint store in memory, written at every opportunity.
 #[derive(Default)]
 struct Shelf {
-    pieces: BTreeMap<u32, Piece>,
+    pieces: BTreeMap<u32, FilmPiece>,
     /// Loses the progress of the current pass in an unfinished piece (negative control).
     forgetful: bool,
 }
 
 impl CheckpointStore for Shelf {
     fn pieces(&self) -> Vec<StoredPiece> {
-        let kept = |(y, piece): (&u32, &Piece)| StoredPiece {
+        let kept = |(y, piece): (&u32, &FilmPiece)| StoredPiece {
             number: *y as usize,
             region: piece.region,
             film: piece.film.region,
@@ -37,11 +39,11 @@ impl CheckpointStore for Shelf {
         self.pieces.iter().map(kept).collect()
     }
 
-    fn load(&mut self, number: usize) -> Result<Piece, RenderError> {
+    fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError> {
         Ok(self.pieces[&(number as u32)].clone())
     }
 
-    fn keep(&mut self, piece: &Piece) {
+    fn keep(&mut self, piece: &FilmPiece) {
         let Region { y0, y1, .. } = piece.region;
         self.pieces
             .retain(|_, other| other.region.y1 <= y0 || other.region.y0 >= y1);
@@ -68,7 +70,7 @@ fn some_calls(
     packed: &Packed,
     backend: &mut dyn Backend,
     store: &mut dyn CheckpointStore,
-    cut: &Cut,
+    cut: &WorkSplit,
     at_once: bool,
     calls: usize,
 ) -> Option<Film> {
@@ -82,7 +84,7 @@ fn some_calls(
         store,
     );
     if at_once {
-        bands = bands.as_a_whole(packed.form()).expect("memory");
+        bands = bands.as_a_whole(packed.film_layout()).expect("memory");
     }
     let mut made = 0;
     let mut watch = |_: &mut dyn Backend, _: Region, share: f64| {
@@ -90,7 +92,7 @@ fn some_calls(
         made += 1;
         Ok(Flow::from(made < calls))
     };
-    let mut film = Film::of(region, packed.form());
+    let mut film = Film::of(region, packed.film_layout());
     loop {
         match bands.render_next(backend, &mut watch, &mut || {}) {
             Ok(Some(band)) => {
@@ -109,7 +111,13 @@ fn some_calls(
 }
 
 /// Returns the film of a job that is interrupted every `calls` dispatches, or `None` if it never completes.
-fn in_pieces(packed: &Packed, store: &mut dyn CheckpointStore, cut: &Cut, at_once: bool, calls: usize) -> Option<Film> {
+fn in_pieces(
+    packed: &Packed,
+    store: &mut dyn CheckpointStore,
+    cut: &WorkSplit,
+    at_once: bool,
+    calls: usize,
+) -> Option<Film> {
     (0..1000).find_map(|round| {
         // Each round uses another backend.
         let mut backend: Box<dyn Backend> = match round % 3 {
@@ -121,31 +129,31 @@ fn in_pieces(packed: &Packed, store: &mut dyn CheckpointStore, cut: &Cut, at_onc
     })
 }
 
-fn cuts() -> [Cut; 3] {
-    let cut = Cut::default();
+fn cuts() -> [WorkSplit; 3] {
+    let cut = WorkSplit::default();
     [
         cut,
-        Cut {
+        WorkSplit {
             band_pixels: 70,
-            samples_per_call: Some(7),
-            rows_per_call: Some(2),
+            samples_per_dispatch: Some(7),
+            rows_per_dispatch: Some(2),
         },
-        Cut {
+        WorkSplit {
             band_pixels: 100,
-            samples_per_call: Some(1),
+            samples_per_dispatch: Some(1),
             ..cut
         },
     ]
 }
 
 #[test]
-fn work_that_is_broken_off_and_gone_on_with_makes_the_same_film() {
+fn interrupted_and_resumed_work_gives_the_same_film() {
     for packed in subjects() {
         let expected = bits(&pictures::film(
             &mut Cpu::new(&packed),
             &packed,
             whole(&packed),
-            &Cut::default(),
+            &WorkSplit::default(),
         ));
         for (cut, calls) in cuts().into_iter().zip([1, 23, 57]) {
             for at_once in [false, true] {
@@ -154,7 +162,7 @@ fn work_that_is_broken_off_and_gone_on_with_makes_the_same_film() {
                 assert!(
                     bits(&film) == expected,
                     "{cut:?}, all at once: {at_once}, {:?}",
-                    packed.form()
+                    packed.film_layout()
                 );
             }
         }
@@ -163,13 +171,13 @@ fn work_that_is_broken_off_and_gone_on_with_makes_the_same_film() {
 
 /// Negative control: a store that loses the progress of a piece gives another film.
 #[test]
-fn a_keeper_that_forgets_is_found() {
+fn a_store_that_loses_progress_is_found() {
     let [packed, ..] = subjects();
     let expected = bits(&pictures::film(
         &mut Cpu::new(&packed),
         &packed,
         whole(&packed),
-        &Cut::default(),
+        &WorkSplit::default(),
     ));
     let mut shelf = Shelf {
         forgetful: true,
@@ -181,12 +189,12 @@ fn a_keeper_that_forgets_is_found() {
 }
 
 #[test]
-fn when_the_time_is_up_every_pixel_has_a_sample() {
+fn at_the_time_limit_every_pixel_has_a_sample() {
     for packed in subjects() {
-        let cut = Cut {
+        let cut = WorkSplit {
             band_pixels: 70,
-            samples_per_call: Some(1),
-            rows_per_call: Some(1),
+            samples_per_dispatch: Some(1),
+            rows_per_dispatch: Some(1),
         };
         let (mut cpu, mut shelf) = (Cpu::new(&packed), Shelf::default());
         let region = whole(&packed);
@@ -199,7 +207,7 @@ fn when_the_time_is_up_every_pixel_has_a_sample() {
             most,
             &mut shelf,
         );
-        let mut bands = bands.as_a_whole(packed.form()).expect("memory");
+        let mut bands = bands.as_a_whole(packed.film_layout()).expect("memory");
         let mut watch = |_: &mut dyn Backend, _: Region, _: f64| Ok(Flow::TimeIsUp);
         let mut pixels = 0;
         while let Some(band) = bands.render_next(&mut cpu, &mut watch, &mut || {}).expect("bands") {
@@ -223,7 +231,7 @@ fn of_samples(packed: &Packed, samples: u32) -> Film {
 
 fn last_pass(bands: &mut Bands) -> Film {
     let mut films = Vec::new();
-    let mut output = |band: wgray_render::job::Finished| {
+    let mut output = |band: wgray_render::job::FinishedBand| {
         films.push(band.film);
         Ok(())
     };
@@ -241,7 +249,7 @@ fn last_pass(bands: &mut Bands) -> Film {
 
 /// Each pass ends with the film of its samples. An interrupted pass leaves the film of the previous one.
 #[test]
-fn the_last_pass_is_a_whole_image_of_its_samples() {
+fn the_last_pass_is_a_complete_image() {
     for packed in subjects() {
         assert!(
             bits(&of_samples(&packed, 3)) != bits(&of_samples(&packed, 4)),
@@ -261,7 +269,7 @@ fn the_last_pass_is_a_whole_image_of_its_samples() {
                     most,
                     &mut no_checkpoint,
                 );
-                let mut bands = bands.in_passes(packed.form()).expect("memory");
+                let mut bands = bands.in_passes(packed.film_layout()).expect("memory");
                 let (mut calls, mut passes, mut interrupted) = (0, vec![0], 0);
                 let mut watch = |_: &mut dyn Backend, _: Region, _: f64| {
                     calls += 1;
@@ -306,36 +314,36 @@ fn open(
     packed: &Packed,
     identity: &Identity,
 ) -> Result<(Checkpoint<'static>, Vec<String>), CheckpointError> {
-    let (sender, told) = std::sync::mpsc::channel();
+    let (sender, warnings) = std::sync::mpsc::channel();
     let mut rounds = 0;
-    let opening = Opening {
+    let opening = CheckpointOptions {
         path: path.to_owned(),
         resume: true,
         interval: Duration::ZERO,
         // A child process inherits the file, and with it the lock, for a moment.
         wait: Box::new(move || {
             rounds += 1;
-            assert!(rounds < 200, "somebody else writes it");
+            assert!(rounds < 200, "another process writes it");
             true
         }),
         tell: Box::new(move |what| sender.send(what.to_owned()).expect("a listener")),
     };
-    let checkpoint = Checkpoint::open(opening, identity.clone(), packed.form())?;
-    Ok((checkpoint, told.try_iter().collect()))
+    let checkpoint = Checkpoint::open(opening, identity.clone(), packed.film_layout())?;
+    Ok((checkpoint, warnings.try_iter().collect()))
 }
 
 fn folder_with_checkpoint(packed: &Packed, identity: &Identity) -> (tempfile::TempDir, PathBuf, Film) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("c");
-    let (mut checkpoint, told) = open(&path, packed, identity).expect("a checkpoint");
-    assert!(told.is_empty(), "{told:?}");
+    let (mut checkpoint, warnings) = open(&path, packed, identity).expect("a checkpoint");
+    assert!(warnings.is_empty(), "{warnings:?}");
     let [_, cut, _] = cuts();
     let film = some_calls(packed, &mut Cpu::new(packed), &mut checkpoint, &cut, false, usize::MAX);
     (folder, path, film.expect("a film"))
 }
 
 #[test]
-fn of_a_damaged_file_all_before_the_damage_is_used() {
+fn pieces_before_the_damage_are_used() {
     let (packed, identity) = cornell();
     let (_folder, path, film) = folder_with_checkpoint(&packed, &identity);
     let good = std::fs::read(&path).expect("the file");
@@ -363,15 +371,18 @@ fn of_a_damaged_file_all_before_the_damage_is_used() {
                         "byte {at}: {error}"
                     );
                 }
-                Ok((mut checkpoint, told)) => {
-                    assert!(at >= header, "a damaged header was believed: byte {at}");
+                Ok((mut checkpoint, warnings)) => {
+                    assert!(at >= header, "a damaged header was accepted: byte {at}");
                     // A truncation between two pieces is not damage.
-                    assert!(told.len() == 1 || (cut_short && told.is_empty()), "byte {at}: {told:?}");
+                    assert!(
+                        warnings.len() == 1 || (cut_short && warnings.is_empty()),
+                        "byte {at}: {warnings:?}"
+                    );
                     let left = checkpoint.pieces();
                     assert_ne!(left, whole_file);
                     // On a slow machine, an older unfinished piece of the same rows may replace a damaged one.
                     for piece in left.into_iter().filter(|piece| whole_file.contains(piece)) {
-                        let Piece {
+                        let FilmPiece {
                             region, film: found, ..
                         } = checkpoint.load(piece.number).expect("a piece");
                         assert_eq!(bits(&film.clone().part(region)), bits(&found.part(region)));
@@ -393,7 +404,7 @@ fn of_a_damaged_file_all_before_the_damage_is_used() {
 }
 
 #[test]
-fn what_is_no_longer_needed_does_not_pile_up() {
+fn replaced_pieces_do_not_accumulate() {
     let mut scene = scenes::scene("cornell.toml");
     (scene.image.width, scene.image.height) = (1024, 512);
     scene.render.pixel_samples.count = 64;
@@ -402,13 +413,13 @@ fn what_is_no_longer_needed_does_not_pile_up() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("c");
     let (mut checkpoint, _) = open(&path, &packed, &identity).expect("a checkpoint");
-    let film = Film::of(whole(&packed), packed.form());
-    let bytes = film.region.pixels() * packed.form().bytes() as u64;
+    let film = Film::of(whole(&packed), packed.film_layout());
+    let bytes = film.region.pixels() * packed.film_layout().bytes() as u64;
     let mut largest = 0;
     for round in 1..40 {
-        let piece = Piece {
+        let piece = FilmPiece {
             region: film.region,
-            reached: wgray_render::job::Reached {
+            reached: wgray_render::job::SampleProgress {
                 pass: round - 1..round,
                 next: [0, 0],
             },
@@ -420,11 +431,11 @@ fn what_is_no_longer_needed_does_not_pile_up() {
         let [kept] = checkpoint.pieces().try_into().expect("one piece");
         assert_eq!(checkpoint.load(kept.number).expect("a piece"), piece);
     }
-    assert!(largest > 3 * bytes, "nothing was ever left in the file: {largest}");
+    assert!(largest > 3 * bytes, "no replaced piece was ever in the file: {largest}");
     assert!(largest < 3 * bytes + (64 << 20) + 4096, "{largest}");
     drop(checkpoint);
-    let (checkpoint, told) = open(&path, &packed, &identity).expect("a checkpoint");
-    assert_eq!((checkpoint.pieces().len(), told), (1, Vec::new()));
+    let (checkpoint, warnings) = open(&path, &packed, &identity).expect("a checkpoint");
+    assert_eq!((checkpoint.pieces().len(), warnings), (1, Vec::new()));
 }
 
 type Change<'a, T> = (&'a str, &'a dyn Fn(&mut T));
@@ -439,7 +450,7 @@ fn another_job_has_another_identity() {
         Identity::of(&packed, whole(&packed), false)
     };
     let this = of(&|_| ());
-    assert_eq!(this, of(&|_| ()), "of the same scene the same");
+    assert_eq!(this, of(&|_| ()), "the identities of one scene differ");
     let changes: [Change<wgray::Description>; 6] = [
         ("its size is", &|scene| scene.image.width += 1),
         ("its number of samples is", &|scene| {
@@ -451,8 +462,8 @@ fn another_job_has_another_identity() {
         ("its scene or an option", &|scene| scene.lights.truncate(0)),
     ];
     for (what, change) in changes {
-        let told = this.difference(&of(change)).unwrap_or_default();
-        assert!(told.starts_with(what), "{what}: {told}");
+        let difference = this.difference(&of(change)).unwrap_or_default();
+        assert!(difference.starts_with(what), "{what}: {difference}");
     }
     let changes: [Change<Identity>; 6] = [
         ("its version", &|job| job.version.push('1')),
@@ -465,8 +476,8 @@ fn another_job_has_another_identity() {
     for (what, change) in changes {
         let mut other = this.clone();
         change(&mut other);
-        let told = this.difference(&other).unwrap_or_default();
-        assert!(told.starts_with(what), "{what}: {told}");
+        let difference = this.difference(&other).unwrap_or_default();
+        assert!(difference.starts_with(what), "{what}: {difference}");
     }
     // Layers do not change the scene hash.
     let [_, _, layered, _] = subjects();

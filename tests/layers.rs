@@ -4,9 +4,9 @@ use glam::{Vec3, Vec4};
 use wgray::scene::ViewSettings;
 use wgray::{Aov, Channel, Description, Device, Options, Picture};
 use wgray_image::Region;
-use wgray_render::film::{Film, Form, Layer};
+use wgray_render::film::{Film, FilmLayout, Layer};
 use wgray_render::gpu::{Gpu, Options as GpuOptions};
-use wgray_render::job::Cut;
+use wgray_render::job::WorkSplit;
 use wgray_render::records::Packed;
 
 use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, whole};
@@ -29,7 +29,7 @@ color = [0.5, 0.4, 0.3]
 [materials.mirror]
 type = "mirror"
 tint = [0.9, 0.8, 0.7]
-[materials.lamp]
+[materials.light]
 type = "diffuse"
 color = [0.1, 0.1, 0.1]
 emission = [0.4, 0.8, 0.2]
@@ -52,7 +52,7 @@ center = [0.9, 0, 1]
 radius = 0.8
 [[shapes]]
 type = "sphere"
-material = "lamp"
+material = "light"
 center = [0, -1, 0.4]
 radius = 0.3
 [[shapes]]
@@ -102,11 +102,11 @@ fn other_layers(a: &Film, b: &Film) -> usize {
 }
 
 #[test]
-fn layers_are_the_same_on_both_backends_and_for_every_cut() {
-    let cut = |band_pixels, samples_per_call, rows_per_call| Cut {
+fn layers_do_not_depend_on_backend_or_work_split() {
+    let cut = |band_pixels, samples_per_dispatch, rows_per_dispatch| WorkSplit {
         band_pixels,
-        samples_per_call,
-        rows_per_call,
+        samples_per_dispatch,
+        rows_per_dispatch,
     };
     for (name, packed) in subjects() {
         let expected = reference(&packed);
@@ -123,7 +123,7 @@ fn layers_are_the_same_on_both_backends_and_for_every_cut() {
             }
             for (x0, y0, x1, y1) in [(0, 0, 1, 1), (3, 2, 20, 11), (23, 15, 24, 16)] {
                 let part = Region { x0, y0, x1, y1 };
-                let found = film(&mut *backend, &packed, part, &Cut::default());
+                let found = film(&mut *backend, &packed, part, &WorkSplit::default());
                 assert_eq!(differing(&found, &crop(&expected, part)), 0, "{name}, {way:?}, {part}");
             }
         }
@@ -137,11 +137,11 @@ fn layers_are_the_same_on_both_backends_and_for_every_cut() {
 }
 
 #[test]
-fn the_picture_is_the_same_with_layers_and_without() {
+fn layers_do_not_change_the_image() {
     for (name, packed) in subjects() {
         let plain = packed.clone().without_layers();
         let expected = reference(&plain);
-        assert_eq!(plain.form().layers, expected.has_layers(), "{name}");
+        assert_eq!(plain.film_layout().layers, expected.has_layers(), "{name}");
         for way in exact_ways() {
             let found = render(&packed, way);
             let found = Film {
@@ -152,14 +152,11 @@ fn the_picture_is_the_same_with_layers_and_without() {
         }
     }
     let [plain, alpha] = [SCENE, &with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
-    assert!(
-        differing(&plain, &alpha) > 0,
-        "the background of a picture with alpha is gone"
-    );
+    assert!(differing(&plain, &alpha) > 0, "alpha does not hide the background");
 }
 
 #[test]
-fn emission_direct_and_indirect_light_are_the_picture() {
+fn emission_direct_and_indirect_light_sum_to_the_image() {
     let mut clamped = subjects();
     clamped.push(("clamped", parse(&with("clamp = 0.05")).with_layers()));
     for (name, packed) in clamped {
@@ -181,7 +178,7 @@ fn emission_direct_and_indirect_light_are_the_picture() {
 }
 
 #[test]
-fn light_is_sorted_by_how_often_it_was_reflected() {
+fn light_layers_are_by_path_length() {
     let sums = |depth: u32| {
         let film = reference(&parse(&with(&format!("max_depth = {depth}"))).with_layers());
         [Layer::Emission, Layer::Direct, Layer::Indirect].map(|layer| {
@@ -240,7 +237,7 @@ fn on_all(packed: &Packed) -> Film {
 }
 
 #[test]
-fn layers_of_a_flat_thing_are_its_own() {
+fn layers_of_a_flat_shape() {
     for behind in [false, true] {
         let film = on_all(&parse(&facing((3, 1), [0.0, 0.0], "", behind)).with_layers());
         for (pixel, there) in [(0, 0.0), (1, 1.0), (2, 0.0)] {
@@ -255,7 +252,7 @@ fn layers_of_a_flat_thing_are_its_own() {
 }
 
 #[test]
-fn normals_are_those_of_the_first_hits_where_surfaces_are_flat() {
+fn mean_normals_of_flat_surfaces_equal_the_first_hits() {
     let packed = parse(SCENE).with_layers();
     let (film, hits) = (reference(&packed), first_hits(&packed, Way::Cpu));
     let (mut flat, mut bent) = (0, 0);
@@ -268,15 +265,15 @@ fn normals_are_those_of_the_first_hits_where_surfaces_are_flat() {
             _ => {}
         }
     }
-    assert!(flat > 20, "{flat} pixels of the ground have its normal");
+    assert!(flat > 20, "only {flat} pixels of the ground have its normal");
     assert!(
         bent > 20,
-        "the mean is not made as long as a normal: {bent} pixels of the sphere"
+        "mean normals are normalized: only {bent} pixels of the sphere are shorter"
     );
 }
 
 #[test]
-fn normal_maps_are_in_the_mean_of_the_normals() {
+fn mean_normals_include_normal_maps() {
     let folder = tempfile::tempdir().unwrap();
     let tilted = Vec3::new(0.6, 0.0, 0.8);
     crate::textures::write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| {
@@ -293,12 +290,12 @@ fn normal_maps_are_in_the_mean_of_the_normals() {
     assert_eq!(
         hits[1].shading_normal,
         Vec3::NEG_Y,
-        "that of the first hit is without the map"
+        "the normal of the first hit includes the normal map"
     );
 }
 
 #[test]
-fn albedo_is_what_mirrors_show() {
+fn albedo_is_seen_in_mirrors() {
     let text = facing((1, 1), [0.0, -0.5], "", false)
         .replace("max_depth = 0", "max_depth = 2")
         .replace(
@@ -329,7 +326,7 @@ tangent = [1, 0, 0]
 }
 
 #[test]
-fn alpha_is_the_share_of_the_samples_that_meet_anything() {
+fn alpha_is_the_fraction_of_samples_that_hit() {
     for (place, shares) in [
         ([0.0, 0.0], [0.0, 1.0, 0.0]),
         ([0.5, 0.0], [0.0, 0.5, 0.5]),
@@ -337,11 +334,11 @@ fn alpha_is_the_share_of_the_samples_that_meet_anything() {
         ([9.0, 0.0], [0.0; 3]),
     ] {
         let packed = parse(&facing((3, 1), place, "alpha = true", false));
-        let form = Form {
+        let form = FilmLayout {
             adaptive: false,
             layers: true,
         };
-        assert_eq!(packed.form(), form, "alpha asks for layers");
+        assert_eq!(packed.film_layout(), form, "alpha asks for layers");
         let film = on_all(&packed);
         for (i, share) in shares.into_iter().enumerate() {
             assert_eq!(film.alpha(i), share, "{place:?}, pixel {i}");
@@ -360,7 +357,7 @@ fn alpha_is_the_share_of_the_samples_that_meet_anything() {
 }
 
 #[test]
-fn filters_of_either_sign_take_alpha_out_of_its_range() {
+fn negative_filter_lobes_exceed_the_range_of_alpha() {
     let filter = "filter = { type = \"mitchell\" }\nalpha = true";
     let text = facing((7, 1), [-1.0, 0.0], filter, false).replace("\"grid\", count = 16", "\"sobol\", count = 1024");
     let film = reference(&parse(&text));
@@ -376,7 +373,7 @@ fn filters_of_either_sign_take_alpha_out_of_its_range() {
 }
 
 #[test]
-fn a_png_has_colours_by_themselves_and_an_exr_weighted_ones() {
+fn png_alpha_is_straight_and_exr_alpha_premultiplied() {
     let straight = |color, alpha| ViewSettings::default().rgba8(color, alpha);
     assert_eq!(straight([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
     assert_eq!(straight([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
@@ -437,7 +434,7 @@ fn the_library_has_layers_and_alpha() {
 }
 
 #[test]
-fn layers_of_paths_are_refused_under_another_integrator() {
+fn path_layers_are_rejected_under_another_integrator() {
     let text = SCENE
         .replace("\"path\"", "\"phong\"")
         .replace("\"diffuse\"", "\"phong\"");
@@ -455,7 +452,7 @@ fn layers_of_paths_are_refused_under_another_integrator() {
             aovs: vec![aov],
             ..Options::default()
         };
-        let told = wgray::render(&scene, &options).err().map(|error| error.to_string());
+        let message = wgray::render(&scene, &options).err().map(|error| error.to_string());
         let name = aov.name();
         let expected = match aov {
             Aov::Albedo | Aov::Direct | Aov::Indirect | Aov::Emission => {
@@ -464,14 +461,14 @@ fn layers_of_paths_are_refused_under_another_integrator() {
             Aov::SampleCount | Aov::Variance => Some(format!("aov.{name}: needs adaptive sampling")),
             _ => None,
         };
-        assert_eq!(told, expected, "{name}");
+        assert_eq!(message, expected, "{name}");
     }
     let packed = wgray_render::pack::pack(&scene);
     assert_eq!(packed.clone().with_layers(), packed, "no other film");
 }
 
 #[test]
-fn a_film_of_another_form_takes_another_kernel() {
+fn film_layouts_have_their_own_kernels() {
     let plain = parse(SCENE);
     let layered = plain.clone().with_layers();
     assert!(!plain.same_but_camera(&layered));
@@ -493,7 +490,7 @@ fn a_film_of_another_form_takes_another_kernel() {
     assert!(!gpu.update(&other).unwrap(), "the kernel writes layers");
     let other = other.with_layers();
     assert!(gpu.update(&other).unwrap());
-    let found = film(&mut gpu, &other, whole(&other), &Cut::default());
+    let found = film(&mut gpu, &other, whole(&other), &WorkSplit::default());
     assert!(found.has_layers());
     if adapter::bit_exact(device) {
         assert_eq!(differing(&found, &reference(&other)), 0);

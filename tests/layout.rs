@@ -4,8 +4,8 @@ use wgray_render::gpu::compose::{KERNELS, Source, built_in};
 use wgray_render::gpu::naga::proc::Layouter;
 use wgray_render::gpu::naga::{Expression, Literal, Module, TypeInner};
 use wgray_render::records::{
-    Camera, Counts, DispatchParams, Emitter, Environment, FirstHit, Instance, Item, Light, LightNode, Lookup, Material,
-    Node, Primitive, Record, Specialization, Sphere, Texture,
+    BvhItem, Camera, Counts, DispatchParams, Emitter, Environment, FirstHit, Instance, Light, LightNode, Lookup,
+    Material, Node, Primitive, Record, Specialization, Sphere, Texture,
 };
 
 use wgray::scene::Integrator;
@@ -24,7 +24,7 @@ fn layout_problems(module: &Module, (name, bytes): (&str, u32)) -> Vec<String> {
         return vec![format!("{name} is not in WGSL")];
     };
     let TypeInner::Struct { members, span } = &ty.inner else {
-        return vec![format!("{name} is no record")];
+        return vec![format!("{name} is not a struct")];
     };
     let mut layouter = Layouter::default();
     layouter.update(module.to_ctx()).expect("layouts");
@@ -60,20 +60,20 @@ fn records_have_the_same_layout() {
         size::<LightNode>(),
         size::<Counts>(),
         size::<Node>(),
-        size::<Item>(),
+        size::<BvhItem>(),
         size::<Instance>(),
         size::<FirstHit>(),
         size::<DispatchParams>(),
     ];
     let declared = wgray_render::records::declarations().matches("struct ").count();
-    assert_eq!(sizes.len(), declared, "records that are not compared");
+    assert_eq!(sizes.len(), declared, "some records are not compared");
     for record in sizes {
         assert_eq!(layout_problems(&module, record), Vec::<String>::new());
     }
 }
 
 #[test]
-fn a_record_with_a_hole_is_found() {
+fn a_record_with_padding_is_found() {
     for text in [
         "struct Odd { a: f32, b: vec3f, c: f32 }",
         "struct Odd { a: vec3f, b: u32, c: vec2u }",
@@ -87,7 +87,7 @@ fn a_record_with_a_hole_is_found() {
 }
 
 #[test]
-fn constants_have_their_values() {
+fn constants_match() {
     let module = parse(&shared_source());
     let value = |name: &str| {
         let (_, constant) = module
@@ -135,7 +135,7 @@ fn overrides_are_the_fields_of_the_specialization() {
 }
 
 #[test]
-fn every_shader_file_is_in_the_program() {
+fn every_shader_file_is_built_in() {
     let mut found = Vec::new();
     for folder in ["", "integrators/", "kernels/"] {
         for entry in std::fs::read_dir(sources::path("shaders").join(folder)).expect("the shaders") {

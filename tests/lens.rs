@@ -27,13 +27,13 @@ fn spot(distance: f64, lens: &str, samples: u32) -> Packed {
         [render]
         integrator = 'path'
         pixel_samples = {{ count = {samples} }}
-        [materials.lamp]
+        [materials.light]
         type = 'diffuse'
         color = [0, 0, 0]
         emission = [1, 1, 1]
         [[shapes]]
         type = 'disk'
-        material = 'lamp'
+        material = 'light'
         center = [0, {distance}, 0]
         radius = {radius}
         normal = [0, -1, 0]
@@ -83,7 +83,7 @@ fn wrong(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
 }
 
 #[test]
-fn a_spot_out_of_focus_is_its_circle_of_confusion() {
+fn a_disk_out_of_focus_is_its_circle_of_confusion() {
     // An aperture of radius r focused at f blurs a point at z to a circle of radius r |1 / f - 1 / z| at distance 1.
     let lens = "aperture = 0.4\nfocus_distance = 4";
     for way in both() {
@@ -94,14 +94,14 @@ fn a_spot_out_of_focus_is_its_circle_of_confusion() {
             let (worst, lost) = wrong(&picture, radius);
             assert!(worst < 0.03, "{way:?} {distance}: {worst}");
             assert!(lost < 0.02, "{way:?} {distance}: {lost}");
-            assert!(wrong(&picture, 1.1 * radius).0 > 0.1, "another circle is told apart");
-            assert!(wrong(&picture, 0.9 * radius).0 > 0.1, "another circle is told apart");
+            assert!(wrong(&picture, 1.1 * radius).0 > 0.1, "a larger circle passes");
+            assert!(wrong(&picture, 0.9 * radius).0 > 0.1, "a smaller circle passes");
         }
     }
 }
 
 #[test]
-fn the_width_may_be_told_by_the_f_number() {
+fn the_aperture_may_be_given_as_f_number() {
     // The default focus distance is that of `look_at`.
     let by = |lens: &str| spot(12.0, lens, 1).camera;
     assert_eq!(
@@ -115,7 +115,7 @@ fn the_width_may_be_told_by_the_f_number() {
 }
 
 #[test]
-fn what_is_in_the_focus_plane_is_sharp() {
+fn the_focus_plane_is_sharp() {
     let lens = "aperture = 0.4\nfocus_distance = 5";
     for way in both() {
         let with = means(&render(&spot(5.0, lens, 256), way));
@@ -129,7 +129,7 @@ fn what_is_in_the_focus_plane_is_sharp() {
 }
 
 #[test]
-fn blades_make_a_polygon_with_a_corner_at_the_top_of_what_is_far() {
+fn blades_give_a_polygon_with_a_corner_at_the_top() {
     let lens = "aperture = 0.4\nfocus_distance = 4\nblades = 3\nblade_rotation = ";
     let lit = |packed: &Packed, (x, y): (f64, f64), way| {
         let picture = means(&render(packed, way));
@@ -161,7 +161,7 @@ fn blades_make_a_polygon_with_a_corner_at_the_top_of_what_is_far() {
 }
 
 #[test]
-fn openings_are_covered_evenly() {
+fn apertures_are_sampled_uniformly() {
     for blades in [0, 3, 4, 5, 6, 7, 16] {
         let corners = f64::from(blades);
         let turn = std::f64::consts::TAU / corners;
@@ -195,7 +195,7 @@ fn openings_are_covered_evenly() {
 }
 
 #[test]
-fn samples_of_the_lens_are_spread_over_it_and_not_tied_to_the_pixel() {
+fn lens_samples_are_stratified_and_independent_of_pixel_samples() {
     // Each quarter of the lens gets 4 of 16 samples. Over 64 pixels, each pair of pixel and lens quarters gets 64.
     let packed = spot(12.0, "aperture = 2\nfocus_distance = 1", 16);
     let mut counts = [[0_u32; 4]; 4];
@@ -225,7 +225,7 @@ fn samples_of_the_lens_are_spread_over_it_and_not_tied_to_the_pixel() {
 }
 
 #[test]
-fn every_ray_meets_the_focus_plane_where_the_middle_one_does() {
+fn lens_rays_converge_in_the_focus_plane() {
     let packed = spot(12.0, "aperture = 0.4\nfocus_distance = 4", 1);
     for at in [Vec2::new(1.0, 60.0), Vec2::new(40.5, 3.25)] {
         let middle = camera_ray(&packed.camera, at).direction;
@@ -240,7 +240,7 @@ fn every_ray_meets_the_focus_plane_where_the_middle_one_does() {
 }
 
 #[test]
-fn the_ends_of_its_ranges_give_pictures_and_the_same_ones() {
+fn limits_of_the_ranges_render_equally() {
     let pinhole = spot(12.0, "", 16);
     for aperture in ["0", "1e-300", "1e-9", "1", "1e9"] {
         for focus in ["1e-9", "1e-3", "1e9"] {
@@ -260,8 +260,8 @@ fn the_ends_of_its_ranges_give_pictures_and_the_same_ones() {
 }
 
 #[test]
-fn bad_lenses_are_told() {
-    for (lens, told) in [
+fn invalid_lenses_are_rejected() {
+    for (lens, message) in [
         ("aperture = -0.1", "camera.aperture: -0.1 must be from 0 to 1e9"),
         ("aperture = nan", "camera.aperture: nan must be from 0 to 1e9"),
         ("aperture = 2e9", "camera.aperture: 2e9 must be from 0 to 1e9"),
@@ -300,12 +300,12 @@ fn bad_lenses_are_told() {
             "image = {{ width = 4, height = 4 }}\n[camera]\nposition = [0, 0, 0]\nlook_at = [0, 1, 0]\n{fov}{lens}\n"
         );
         let error = Scene::parse(&text, "s.toml").expect_err(lens).to_string();
-        assert!(error.contains(told), "{lens}: {error}");
+        assert!(error.contains(message), "{lens}: {error}");
     }
 }
 
 #[test]
-fn a_path_moves_the_focus_and_the_opening() {
+fn a_path_animates_focus_and_aperture() {
     let text = "image = { width = 4, height = 4 }
         [camera]
         position = [0, 0, 0]
@@ -319,16 +319,16 @@ fn a_path_moves_the_focus_and_the_opening() {
     assert_eq!(
         (still.radius, still.focus),
         (0.05, 2.0),
-        "as it stands it has its own opening"
+        "a still image uses the lens of the camera"
     );
     assert_eq!(
         scene.camera_at(1.0).unwrap().lens,
         None,
-        "and on its way that of the keys"
+        "a frame of the path uses the lens of its keys"
     );
     let lens = scene.camera_at(2.5).unwrap().lens.unwrap();
     assert_eq!((lens.radius, lens.focus), (0.25, 3.5));
-    for (key, told) in [
+    for (key, message) in [
         (
             "aperture = -1",
             "camera.path.keys[0].aperture: -1 must be from 0 to 1e9",
@@ -344,12 +344,12 @@ fn a_path_moves_the_focus_and_the_opening() {
     ] {
         let text = text.replace("focus_distance = 2 }", &format!("{key} }}"));
         let error = Scene::parse(&text, "s.toml").expect_err(key).to_string();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(message), "{error}");
     }
 }
 
 #[test]
-fn the_lens_scene_shows_one() {
+fn the_lens_scene_has_a_lens() {
     let scene = scenes::scene("lens.toml");
     let packed = scenes::packed(&scene);
     assert_eq!(packed.specialization.lens, 1);

@@ -81,7 +81,7 @@ fn on_cpu() -> Options {
 }
 
 fn scene() -> Scene {
-    described().validate().expect("a sound scene")
+    described().validate().expect("a valid scene")
 }
 
 fn floats(picture: &Picture, name: &str) -> Vec<f32> {
@@ -92,7 +92,7 @@ fn floats(picture: &Picture, name: &str) -> Vec<f32> {
 }
 
 #[test]
-fn a_scene_made_in_code_is_that_of_the_file_that_says_the_same() {
+fn a_scene_made_in_code_equals_that_of_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, FILE).unwrap();
@@ -109,19 +109,19 @@ fn a_scene_made_in_code_is_that_of_the_file_that_says_the_same() {
         .windows(2)
         .filter(|pair| pair[0] != pair[1])
         .count();
-    assert!(different > 100, "{different}: there is something to see");
+    assert!(different > 100, "only {different} pairs of neighboring pixels differ");
 }
 
 #[test]
-fn a_bad_scene_is_told_with_place_value_and_rule() {
+fn invalid_scenes_are_reported_with_key_value_and_rule() {
     let ball = SphereDescription::new("red", [0.0, 0.0, 0.5], -1.0);
-    let told = |description: Description| Error::from(description.validate().unwrap_err()).to_string();
-    let message = told(described().with_shape(ball));
-    assert!(message.starts_with("shapes[2].radius: -1 must be finite"), "{message}");
-    let message = told(described().with_shape(SphereDescription::new("blue", [0.0; 3], 1.0)));
+    let message = |description: Description| Error::from(description.validate().unwrap_err()).to_string();
+    let error = message(described().with_shape(ball));
+    assert!(error.starts_with("shapes[2].radius: -1 must be finite"), "{error}");
+    let error = message(described().with_shape(SphereDescription::new("blue", [0.0; 3], 1.0)));
     assert!(
-        message.starts_with("shapes[2].material: there is no material \"blue\""),
-        "{message}"
+        error.starts_with("shapes[2].material: there is no material \"blue\""),
+        "{error}"
     );
     let missing = Scene::load("no such file.toml").unwrap_err().to_string();
     assert!(missing.starts_with("no such file.toml: cannot be read: "), "{missing}");
@@ -134,7 +134,7 @@ fn a_bad_scene_is_told_with_place_value_and_rule() {
 }
 
 #[test]
-fn options_that_do_not_fit_are_told() {
+fn invalid_options_are_rejected() {
     let crop = |x0, y0, x1, y1| Options {
         crop: Some(Region { x0, y0, x1, y1 }),
         ..on_cpu()
@@ -143,7 +143,7 @@ fn options_that_do_not_fit_are_told() {
         aovs: vec![Aov::Depth, Aov::SampleCount],
         ..on_cpu()
     };
-    for (options, told) in [
+    for (options, expected) in [
         (
             crop(0, 0, 25, 16),
             "crop: 0,0,25,16 must lie within the image of 24 x 16 pixels",
@@ -153,13 +153,13 @@ fn options_that_do_not_fit_are_told() {
         (aov, "aov.sample_count: needs adaptive sampling"),
     ] {
         let error = wgray::render(&scene(), &options).unwrap_err();
-        assert_eq!(error.to_string(), told);
+        assert_eq!(error.to_string(), expected);
         assert!(matches!(error, Error::Option(_)), "{error:?}");
     }
 }
 
 #[test]
-fn a_crop_has_the_pixels_and_layers_of_the_whole() {
+fn a_crop_equals_that_part_of_the_image() {
     let region = Region {
         x0: 5,
         y0: 3,
@@ -190,7 +190,7 @@ fn a_crop_has_the_pixels_and_layers_of_the_whole() {
 }
 
 #[test]
-fn a_picture_is_saved_as_its_name_says() {
+fn the_extension_selects_the_format() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let options = Options {
@@ -240,7 +240,7 @@ fn a_picture_is_saved_as_its_name_says() {
 }
 
 #[test]
-fn a_growing_picture_ends_as_the_rendered_one_and_can_be_cancelled() {
+fn a_progressive_image_equals_the_rendered_one_and_can_be_cancelled() {
     let mut adaptive = described();
     adaptive.render.adaptive = Some(AdaptiveDescription {
         error: 0.01,
@@ -264,8 +264,8 @@ fn a_growing_picture_ends_as_the_rendered_one_and_can_be_cancelled() {
         };
         let rendered = wgray::render(&scene, &options).unwrap();
         let mut seen: Vec<(f64, Picture)> = Vec::new();
-        let grown = wgray::render_growing(&scene, &options, &mut |growing| {
-            seen.push((growing.share(), growing.picture()?));
+        let grown = wgray::render_progressive(&scene, &options, &mut |progress| {
+            seen.push((progress.share(), progress.picture()?));
             Ok(ControlFlow::Continue(()))
         });
         assert!(grown.unwrap() == rendered);
@@ -273,11 +273,11 @@ fn a_growing_picture_ends_as_the_rendered_one_and_can_be_cancelled() {
         assert!(seen.is_sorted_by(|a, b| a.0 <= b.0));
         let (share, last) = seen.pop().unwrap();
         assert!((share - 1.0).abs() < 1e-9 && last == rendered, "{share}");
-        assert!(seen[0].1 != rendered, "the first picture is not the last");
+        assert!(seen[0].1 != rendered, "the first image equals the last");
 
-        let cancelled = wgray::render_growing(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));
+        let cancelled = wgray::render_progressive(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));
         assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
-        let failed = wgray::render_growing(&scene, &options, &mut |_| {
+        let failed = wgray::render_progressive(&scene, &options, &mut |_| {
             Err(Error::Render(RenderError::Output(std::io::Error::other("no screen"))))
         });
         assert_eq!(failed.unwrap_err().to_string(), "no screen");
@@ -285,7 +285,7 @@ fn a_growing_picture_ends_as_the_rendered_one_and_can_be_cancelled() {
 }
 
 #[test]
-fn an_image_in_memory_is_that_of_a_file() {
+fn an_image_in_memory_equals_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let colors: Vec<[u8; 3]> = (0..12).map(|i| [i * 20, 255 - i * 9, 40]).collect();
     let bytes: Vec<u8> = colors.concat();
@@ -303,7 +303,7 @@ fn an_image_in_memory_is_that_of_a_file() {
     let made = with(4, 3, Texels::Bytes(Encoding::Srgb, colors.clone())).unwrap();
     assert_eq!(read.textures, made.textures);
     assert_eq!((read.files.len(), made.files.len()), (1, 0));
-    let told = |width, height, texels| with(width, height, texels).unwrap_err().to_string();
+    let error = |width, height, texels| with(width, height, texels).unwrap_err().to_string();
     for (width, height, texels, rule) in [
         (
             4,
@@ -320,7 +320,7 @@ fn an_image_in_memory_is_that_of_a_file() {
         ),
         (20_000, 1, Texels::Floats(Vec::new()), "must have at most 16384 texels"),
     ] {
-        let message = told(width, height, texels);
+        let message = error(width, height, texels);
         assert!(
             message.starts_with("textures.a.file: \"a.png\"") && message.contains(rule),
             "{message}"
@@ -342,7 +342,7 @@ fn names_of_devices_are_choices() {
 
 #[cfg(not(feature = "gpu"))]
 #[test]
-fn without_the_feature_gpu_there_is_the_cpu_alone() {
+fn without_the_feature_gpu_only_the_cpu_exists() {
     let scene = scene();
     let picture = wgray::render(&scene, &Options::default()).unwrap();
     assert_eq!(picture.device().name, "cpu");
@@ -377,18 +377,18 @@ fn the_program_without_the_feature_gpu_renders_on_the_cpu() {
     assert_eq!(run(&["render", "s.toml", "-o", "s.exr", "-q"]), silent);
     let picture = wgray::render(&scene(), &on_cpu()).unwrap();
     assert_eq!(read_exr(&folder.path().join("s.exr")).unwrap(), picture.pixels());
-    let (code, _, told) = run(&["render", "s.toml", "-o", "gpu.exr", "--device", "gpu"]);
-    assert_eq!(code, Some(4), "{told}");
-    assert!(told.contains("built without the feature \"gpu\""), "{told}");
+    let (code, _, stderr) = run(&["render", "s.toml", "-o", "gpu.exr", "--device", "gpu"]);
+    assert_eq!(code, Some(4), "{stderr}");
+    assert!(stderr.contains("built without the feature \"gpu\""), "{stderr}");
     assert!(!folder.path().join("gpu.exr").exists());
-    let (code, listed, told) = run(&["devices"]);
-    assert_eq!((code, told.as_str()), (Some(0), ""));
+    let (code, listed, stderr) = run(&["devices"]);
+    assert_eq!((code, stderr.as_str()), (Some(0), ""));
     assert!(
         listed.contains("auto selects: cpu") && listed.contains("feature \"gpu\""),
         "{listed}"
     );
-    let (code, good, told) = run(&["check", "s.toml"]);
-    assert_eq!((code, told.as_str()), (Some(0), ""));
+    let (code, good, stderr) = run(&["check", "s.toml"]);
+    assert_eq!((code, stderr.as_str()), (Some(0), ""));
     assert!(good.starts_with("s.toml: ok: 24 x 16 pixels"), "{good}");
     assert_eq!(run(&["dev", "s.toml"]).0, Some(2));
 }

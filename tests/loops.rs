@@ -5,7 +5,7 @@ use wgray::error::RenderError;
 use wgray::scene::{AdaptiveDescription, Description, Pattern, PlaneDescription, ShapeDescription, SphereDescription};
 use wgray_render::film::Film;
 use wgray_render::gpu::compose::Shaders;
-use wgray_render::job::{self, Cut};
+use wgray_render::job::{self, WorkSplit};
 use wgray_render::records::Packed;
 
 use crate::pictures::{Way, backend_with, differing, exact_ways, reference, render, whole};
@@ -66,7 +66,7 @@ fn attempt(packed: &Packed, way: Way, shaders: &Shaders) -> Result<Film, RenderE
         &mut *backend,
         whole(packed),
         packed.sampling.pixel_samples,
-        &Cut::default(),
+        &WorkSplit::default(),
         &mut |_| true,
         &mut take,
     )?;
@@ -115,7 +115,7 @@ fn without_check(shaders: &Shaders) -> Shaders {
 }
 
 #[test]
-fn long_pictures_are_whole() {
+fn long_renders_are_complete() {
     let mut adaptive = small("cornell.toml", (5, 4), 64, 64);
     adaptive.render.pixel_samples.pattern = Some(Pattern::Sobol);
     adaptive.render.adaptive = Some(AdaptiveDescription {
@@ -150,7 +150,7 @@ fn long_pictures_are_whole() {
 }
 
 #[test]
-fn a_sample_that_is_too_long_is_an_error_or_right() {
+fn too_long_samples_are_errors_or_correct() {
     if adapter::device().is_none() {
         return;
     }
@@ -163,10 +163,13 @@ fn a_sample_that_is_too_long_is_an_error_or_right() {
         let packed = scenes::packed(&description);
         match attempt(&packed, way, sources::shaders()) {
             Ok(film) => {
-                assert!(!cuts, "{name}, {way:?}: it is too long for this driver");
+                assert!(!cuts, "{name}, {way:?}: the driver truncates a loop");
                 assert_eq!(differing(&film, &reference(&packed)), 0, "{name}, {way:?}");
             }
-            Err(RenderError::LoopTruncated { .. }) => assert!(cuts, "{name}, {way:?}: nothing cuts it short"),
+            Err(RenderError::LoopTruncated { .. }) => assert!(
+                cuts,
+                "{name}, {way:?}: truncation reported by a driver that does not truncate"
+            ),
             Err(error) => panic!("{name}, {way:?}: {error}"),
         }
     }
@@ -174,7 +177,7 @@ fn a_sample_that_is_too_long_is_an_error_or_right() {
     let mut backend = backend_with(&packed, Way::Buffers, sources::shaders());
     match job::first_hits(&mut *backend, whole(&packed)) {
         Ok(hits) => {
-            assert!(!cuts, "first hits of so many planes are too long for this driver");
+            assert!(!cuts, "the driver truncates the loop over the planes of the first hits");
             let cpu = crate::pictures::first_hits(&packed, Way::Cpu);
             assert_eq!(
                 bytemuck::cast_slice::<_, u8>(&hits),
@@ -186,7 +189,7 @@ fn a_sample_that_is_too_long_is_an_error_or_right() {
 }
 
 #[test]
-fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
+fn long_loops_of_edited_shaders_are_errors_or_correct() {
     if adapter::device().is_none() {
         return;
     }
@@ -196,10 +199,12 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
     for (rounds, too_long) in [(4, false), (60_000, false), (66_000, true), (1_000_000, true)] {
         match attempt(&packed, Way::Buffers, &looping(rounds)) {
             Ok(film) => {
-                assert!(!(cuts && too_long), "{rounds} rounds were not noticed");
-                assert!(has_rounds(&film, &plain, rounds), "{rounds} rounds: a wrong picture");
+                assert!(!(cuts && too_long), "{rounds} rounds: truncation not detected");
+                assert!(has_rounds(&film, &plain, rounds), "{rounds} rounds: wrong image");
             }
-            Err(RenderError::LoopTruncated { .. }) => assert!(cuts && too_long, "{rounds} rounds are not too many"),
+            Err(RenderError::LoopTruncated { .. }) => {
+                assert!(cuts && too_long, "{rounds} rounds: truncation reported without need")
+            }
             Err(error) => panic!("{rounds} rounds: {error}"),
         }
     }
@@ -219,7 +224,7 @@ fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
 
 /// Negative control: without the check, a driver that truncates loops gives a wrong image.
 #[test]
-fn without_the_check_wrong_pictures_would_be_made() {
+fn without_the_check_truncated_images_are_wrong() {
     if adapter::device().is_none() || !driver_cuts_loops() {
         return;
     }

@@ -75,10 +75,10 @@ impl Nearly {
 
     pub fn judge(&self) -> Result<(), String> {
         if self.no_numbers > 0 {
-            return Err(format!("{} pixels are no numbers", self.no_numbers));
+            return Err(format!("{} pixels are NaN or infinite", self.no_numbers));
         }
         if self.edges as f64 > self.budget {
-            return Err(format!("{} pixels differ, of {:.0} that may", self.edges, self.budget));
+            return Err(format!("{} pixels differ; the limit is {:.0}", self.edges, self.budget));
         }
         if !(self.drift() <= MEAN) {
             return Err(format!("the mean differs by {:.1e}", self.drift()));
@@ -97,7 +97,7 @@ impl fmt::Display for Nearly {
         let (edges, budget, drift) = (self.edges, self.budget, self.drift());
         write!(
             f,
-            "{edges} pixels are not near, of {budget:.0} that may; the mean differs by {drift:.1e}"
+            "{edges} pixels are outliers, the limit is {budget:.0}; the mean differs by {drift:.1e}"
         )
     }
 }

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 use wgray::Scene;
 use wgray_image::Region;
 use wgray_render::cpu::panorama::{panorama_differential, panorama_ray};
-use wgray_render::job::Cut;
+use wgray_render::job::WorkSplit;
 use wgray_render::records::{NO_INDEX, Packed};
 
 use crate::pictures::{backend, both, crop, differing, film, first_hits, means, render};
@@ -20,7 +20,7 @@ fn spheres(directions: &[DVec3], radius: f64) -> Packed {
         .map(|d| {
             let c = DVec3::new(1.0, 2.0, 3.0) + *d * 10.0;
             format!(
-                "[[shapes]]\ntype = 'sphere'\nmaterial = 'lamp'\ncenter = [{}, {}, {}]\nradius = {radius}\n",
+                "[[shapes]]\ntype = 'sphere'\nmaterial = 'light'\ncenter = [{}, {}, {}]\nradius = {radius}\n",
                 c.x, c.y, c.z
             )
         })
@@ -31,7 +31,7 @@ fn spheres(directions: &[DVec3], radius: f64) -> Packed {
         [render]
         integrator = 'path'
         pixel_samples = {{ count = 64 }}
-        [materials.lamp]
+        [materials.light]
         type = 'diffuse'
         color = [0, 0, 0]
         emission = [1, 1, 1]
@@ -46,7 +46,7 @@ fn direction(east: f64, north: f64) -> DVec3 {
 }
 
 #[test]
-fn directions_are_where_they_should_be() {
+fn directions_match_the_mapping() {
     let packed = spheres(&[], 1.0);
     let (w, h) = (WIDTH as f32, HEIGHT as f32);
     for (at, expected) in [
@@ -70,7 +70,7 @@ fn directions_are_where_they_should_be() {
 }
 
 #[test]
-fn a_sphere_is_seen_where_it_is_and_fills_its_solid_angle() {
+fn spheres_appear_at_their_direction_with_their_solid_angle() {
     // Center, seam, general position, pole, near the pole.
     for (east, north) in [(0.0, 0.0), (180.0, 0.0), (77.0, -31.0), (0.0, 90.0), (33.0, -86.0)] {
         let to = direction(east, north);
@@ -110,7 +110,7 @@ fn a_sphere_is_seen_where_it_is_and_fills_its_solid_angle() {
 }
 
 #[test]
-fn differentials_are_those_of_neighbouring_rays() {
+fn differentials_match_adjacent_rays() {
     let packed = spheres(&[], 1.0);
     let exact = |x: f64, y: f64| {
         direction(
@@ -146,17 +146,17 @@ fn a_crop_has_the_pixels_of_the_whole() {
         y1: 17,
     };
     for way in both() {
-        let found = film(&mut *backend(&packed, way), &packed, part, &Cut::default());
+        let found = film(&mut *backend(&packed, way), &packed, part, &WorkSplit::default());
         assert_eq!(differing(&found, &crop(&whole, part)), 0, "{way:?}");
     }
 }
 
 #[test]
-fn what_a_panorama_has_not_is_told() {
+fn inapplicable_camera_keys_are_rejected() {
     let camera =
         "image = { width = 4, height = 2 }\n[camera]\ntype = 'panorama'\nposition = [0, 0, 0]\nlook_at = [0, 1, 0]\n";
     Scene::parse(camera, "s.toml").unwrap();
-    for (added, told) in [
+    for (added, message) in [
         ("fov = 40", "camera.fov: unknown key"),
         ("aperture = 1", "camera.aperture: unknown key"),
         (
@@ -175,7 +175,7 @@ fn what_a_panorama_has_not_is_told() {
         let error = Scene::parse(&format!("{camera}{added}\n"), "s.toml")
             .expect_err(added)
             .to_string();
-        assert!(error.contains(told), "{added}: {error}");
+        assert!(error.contains(message), "{added}: {error}");
     }
     let moving =
         format!("{camera}path.keys = [{{ frame = 1, position = [0, 0, 1] }}, {{ frame = 3, position = [0, 0, 3] }}]\n");

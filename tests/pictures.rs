@@ -7,7 +7,7 @@ use wgray_render::cpu::Cpu;
 use wgray_render::film::Film;
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::{Gpu, Options, Rounding};
-use wgray_render::job::Cut;
+use wgray_render::job::WorkSplit;
 use wgray_render::records::{FirstHit, Packed};
 
 use crate::{adapter, sources};
@@ -70,7 +70,7 @@ pub fn whole(packed: &Packed) -> Region {
 }
 
 /// Renders a region and joins its bands.
-pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cut) -> Film {
+pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &WorkSplit) -> Film {
     let mut all = Film {
         sums: Vec::new(),
         ..Film::new(region)
@@ -99,7 +99,7 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cu
 }
 
 pub fn render(packed: &Packed, way: Way) -> Film {
-    film(&mut *backend(packed, way), packed, whole(packed), &Cut::default())
+    film(&mut *backend(packed, way), packed, whole(packed), &WorkSplit::default())
 }
 
 pub fn render_with(packed: &Packed, way: Way, shaders: &Shaders) -> Film {
@@ -107,7 +107,7 @@ pub fn render_with(packed: &Packed, way: Way, shaders: &Shaders) -> Film {
         &mut *backend_with(packed, way, shaders),
         packed,
         whole(packed),
-        &Cut::default(),
+        &WorkSplit::default(),
     )
 }
 

@@ -6,8 +6,8 @@ use wgray_render::cpu::adaptive::{
     squared_deviation, variance_of_mean,
 };
 use wgray_render::cpu::bvh_node::{
-    children_hit, children_in_interval, far_side, four_in_fan, four_passed, in_order, larger, leaf_items, octant_of,
-    passed_bits, smaller, step_length, steps,
+    children_hit, children_in_interval, far_side, four_hit, four_in_interval, hit_bits, in_order, larger, leaf_items,
+    octant_of, smaller, step_length, steps,
 };
 use wgray_render::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
 use wgray_render::cpu::cylinder::{
@@ -38,24 +38,24 @@ use wgray_render::cpu::ggx::{
     ggx_albedo, ggx_albedo_along, ggx_albedo_fit, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample,
 };
 use wgray_render::cpu::lens::{circle_point, lens_ray, lens_sample, polygon_sample};
-use wgray_render::cpu::light::{Segments, segment, segments_to_light, segments_to_local, spot_falloff};
+use wgray_render::cpu::light::{LightSegments, segment, segments_to_light, segments_to_local, spot_falloff};
 use wgray_render::cpu::light_sample::{
     CylinderPart, CylinderPoint, cylinder_height_ratio, cylinder_part, cylinder_sample, cylinder_share, ellipsoid_area,
     ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, whole_below,
 };
 use wgray_render::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
 use wgray_render::cpu::lobe::{
-    LobeSample, direction_turn, facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, is_polished,
-    lobe_frame, plain_alpha, streak_place, vector_from_lobe, vector_to_lobe,
+    LobeSample, aniso_table_position, direction_turn, facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight,
+    half_vector, is_polished, lobe_frame, plain_alpha, vector_from_lobe, vector_to_lobe,
 };
 use wgray_render::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, max4, min, normalize, positive_zero, power, power_whole, sine,
 };
 use wgray_render::cpu::mesh::{
-    Crossing, HitPrimitive, Shear, color_between, face_bulge, face_first_hit, face_footprint, face_frame,
-    face_hit_differential, face_lets_pass, face_normal, face_normal_derivative, face_primitive, face_surface,
-    face_tangents, face_uv, face_uv_derivative, highest, lift, lowest, mesh_pad, normal_from_mesh, permuted,
-    point_to_mesh, shear_of, sheared, standalone_hit_primitive, triangle_crossing, turned_to, vector_from_mesh,
+    Crossing, HitPrimitive, Shear, color_between, face_direction_allowed, face_first_hit, face_footprint, face_frame,
+    face_hit_differential, face_normal, face_normal_derivative, face_primitive, face_surface, face_tangents,
+    face_terminator_offset, face_uv, face_uv_derivative, flipped_to, highest, lift, lowest, mesh_pad, normal_from_mesh,
+    permuted, point_to_mesh, shear_of, sheared, standalone_hit_primitive, triangle_crossing, vector_from_mesh,
     vector_to_mesh,
 };
 use wgray_render::cpu::metal::{conductor_fresnel, metal_eval, metal_factor, metal_fresnel, metal_pdf, metal_sample};
@@ -75,18 +75,18 @@ use wgray_render::cpu::primitive::{
     primitive_normal, primitive_uv, solid_gradient, solid_gradient_derivative, solid_levels, uv_derivative,
 };
 use wgray_render::cpu::principled::{
-    PrincipledLobes, bounded_color, coat_eval, facets_eval, glass_chance, glass_eval, glass_fresnel, glass_pdf,
-    half_between, is_flat, luminance, mirrored_pdf, passes_straight, principled_eval, principled_mixture,
-    principled_pdf, principled_sample, refracting_density, refracting_half, schlick, sheen_albedo, sheen_chance,
-    sheen_lobe, to_frame_around,
+    PrincipledLobes, bounded_color, coat_eval, facets_eval, glass_eval, glass_fresnel, glass_pdf, glass_probability,
+    half_between, is_flat, luminance, mirrored_pdf, principled_eval, principled_mixture, principled_pdf,
+    principled_sample, refracting_density, refracting_half, schlick, sheen_albedo, sheen_lobe, sheen_probability,
+    to_frame_around, transmits_straight,
 };
 use wgray_render::cpu::procedural::{
     along_edge, around_footprint, far_product, nearest_step, phase, procedural_share, sine_ratio, wave_integral,
     wave_integral_2, wave_mean, wave_value, widened_edge,
 };
 use wgray_render::cpu::ray::{
-    Hit, Ray, by_itself, closer, crosses_plane, nearer_hit, no_hit, plane_distance, point_to_local, scaled_crossing,
-    vector_to_local, vector_to_world,
+    Hit, Ray, closer, crosses_plane, nearer_hit, no_hit, plane_distance, point_to_local, scaled_crossing,
+    standalone_prim, vector_to_local, vector_to_world,
 };
 use wgray_render::cpu::rectangle::{intersect_rectangle, rectangle_occludes};
 use wgray_render::cpu::rng::{hash4, unit_float};
@@ -100,7 +100,7 @@ use wgray_render::cpu::sequence::{
     halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_bits, sobol_reversed, sobol_sample,
 };
 use wgray_render::cpu::shadow::{
-    Cone, SampleBlock, block_sample, light_frustum, may_block, occludes_segment, occlusion_mask,
+    SampleBlock, ShadowFrustum, block_sample, light_frustum, may_block, occludes_segment, occlusion_mask,
 };
 use wgray_render::cpu::slab::{
     RayInterval, Slabs, box_interval, interval_hits, inverse_of, ray_interval, ray_interval_box, slabs,
@@ -110,7 +110,7 @@ use wgray_render::cpu::surface::{Surface, first_hit, largest, surface_at, with_c
 use wgray_render::cpu::texel::{
     gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index,
 };
-use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, turned_up};
+use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, to_upper_side};
 use wgray_render::cpu::triangle::{intersect_triangle, triangle_occludes};
 use wgray_render::cpu::warp::{
     cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around,
@@ -124,9 +124,9 @@ use wgray_render::records::{
 use crate::adapter::{self, ROUNDED_TWICE, allowed, judge};
 use crate::inputs::inputs;
 use crate::kernel::{Function, functions, scalars};
+use crate::probe_words::{Argument, ProbeWords};
 use crate::random::Random;
 use crate::sources::{parse, shared_source};
-use crate::words::{Argument, Words};
 
 /// Variable that names the only function to compare.
 const FUNCTION: &str = "WGRAY_TEST_FUNCTION";
@@ -148,7 +148,7 @@ macro_rules! probes {
             name: stringify!($name),
             arguments: &[$(stringify!($argument)),*],
             run: |words, out| {
-                $(let $argument = <<$ty as Argument>::Owned as Words>::read(words);)*
+                $(let $argument = <<$ty as Argument>::Owned as ProbeWords>::read(words);)*
                 let result: $result = $name($(<$ty as Argument>::of(&$argument)),*);
                 result.write(out);
             },
@@ -248,15 +248,15 @@ probes! {
     is_centered(kind: u32) -> bool;
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
     first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
-    segments_to_light(light: &Light, p: Vec3) -> Segments;
+    segments_to_light(light: &Light, p: Vec3) -> LightSegments;
     spot_falloff(light: &Light, to: Vec3) -> f32;
     max4(a: Vec4, b: Vec4) -> Vec4;
     mean_above(m: Vec4, r: Vec4) -> Vec4;
     light_importances(node: &LightNode, p: Vec3, n: Vec3) -> Vec4;
     light_shares(importances: Vec4) -> Vec4;
     light_child(shares: Vec4, random: f32) -> u32;
-    segments_to_local(q: &Primitive, to: Segments) -> Segments;
-    segment(to: Segments, at: Vec2) -> Vec3;
+    segments_to_local(q: &Primitive, to: LightSegments) -> LightSegments;
+    segment(to: LightSegments, at: Vec2) -> Vec3;
     occlusion_mask(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, light: &Light, block: SampleBlock) -> u32;
     block_sample(block: SampleBlock, i: u32) -> Vec2;
     occludes_segment(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, to: Vec3, t_max: f32) -> bool;
@@ -265,13 +265,13 @@ probes! {
     solid_gradient(kind: u32, local: Vec3) -> Vec3;
     solid_gradient_derivative(kind: u32, local: Vec3, d: Vec3) -> Vec3;
     primitive_height(q: &Primitive, from_anchor: Vec3) -> f32;
-    light_frustum(light: &Light, p: Vec3) -> Cone;
-    may_block(sphere: &Sphere, cone: &Cone) -> bool;
+    light_frustum(light: &Light, p: Vec3) -> ShadowFrustum;
+    may_block(sphere: &Sphere, cone: &ShadowFrustum) -> bool;
     phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
     is_lit(surface: &Surface, to: Vec3) -> bool;
-    unlit_mask(prim: &HitPrimitive, surface: &Surface, to: Segments, block: SampleBlock) -> u32;
-    phong_block(surface: &Surface, material: &Material, to: Segments, block: SampleBlock, occluded: u32, exponent_bits: u32,
+    unlit_mask(prim: &HitPrimitive, surface: &Surface, to: LightSegments, block: SampleBlock) -> u32;
+    phong_block(surface: &Surface, material: &Material, to: LightSegments, block: SampleBlock, occluded: u32, exponent_bits: u32,
                 sum: Lobes) -> Lobes;
     camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
     camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative;
@@ -323,11 +323,11 @@ probes! {
     ) -> PrincipledLobes;
     bounded_color(color: Vec3) -> Vec3;
     glass_fresnel(m: &PrincipledLobes, cosine: f32) -> Vec3;
-    glass_chance(m: &PrincipledLobes, cosine: f32) -> f32;
+    glass_probability(m: &PrincipledLobes, cosine: f32) -> f32;
     luminance(color: Vec3) -> f32;
-    sheen_chance(m: &PrincipledLobes) -> f32;
+    sheen_probability(m: &PrincipledLobes) -> f32;
     schlick(f0: Vec3, f90: Vec3, cosine: f32) -> Vec3;
-    passes_straight(m: &PrincipledLobes) -> bool;
+    transmits_straight(m: &PrincipledLobes) -> bool;
     is_flat(alpha: Vec2) -> bool;
     facets_eval(alpha: Vec2, wo: Vec3, wi: Vec3, half: Vec3) -> f32;
     half_between(wo: Vec3, wi: Vec3) -> Vec3;
@@ -363,7 +363,7 @@ probes! {
     facet_eval(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
     facet_pdf(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
     facet_weight(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
-    streak_place(alpha: Vec2, w: Vec3) -> Vec2;
+    aniso_table_position(alpha: Vec2, w: Vec3) -> Vec2;
     facet_loss(alpha: Vec2, wo: Vec3) -> f32;
     conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32;
     metal_fresnel(material: &Material, cosine: f32) -> Vec3;
@@ -377,7 +377,7 @@ probes! {
     rough_dielectric_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32;
     rough_dielectric_sample(material: &Material, wo: Vec3, u: Vec2, random: f32) -> LobeSample;
     thin_reflectance(ior: f32, cosine: f32) -> f32;
-    turned_up(wi: Vec3) -> Vec3;
+    to_upper_side(wi: Vec3) -> Vec3;
     thin_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3;
     thin_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32;
     thin_sample(material: &Material, wo: Vec3, u: Vec2, random: f32) -> LobeSample;
@@ -424,7 +424,7 @@ probes! {
     vector_to_world(q: &Primitive, v: Vec3) -> Vec3;
     local_tangents(q: &Primitive, local: Vec3) -> Tangents;
     mapped_normal(surface: Surface, t: &Texture, n: Vec3) -> Vec3;
-    by_itself(place: UVec2) -> u32;
+    standalone_prim(place: UVec2) -> u32;
     nearer_hit(a: Hit, b: Hit) -> Hit;
     with_positive_zeros(v: Vec3) -> Vec3;
     slabs(origin: Vec3, direction: Vec3, pad: f32) -> Slabs;
@@ -437,11 +437,11 @@ probes! {
     step_length(node: &Node, axis: u32) -> f32;
     larger(a: Vec4, b: Vec4) -> Vec4;
     smaller(a: Vec4, b: Vec4) -> Vec4;
-    passed_bits(near: Vec4, far: Vec4, limit: f32) -> u32;
+    hit_bits(near: Vec4, far: Vec4, limit: f32) -> u32;
     children_hit(node: &Node, s: Slabs, limit: f32) -> u32;
-    four_passed(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -> u32;
+    four_hit(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -> u32;
     children_in_interval(node: &Node, f: RayInterval, limit: f32) -> u32;
-    four_in_fan(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: f32) -> u32;
+    four_in_interval(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: f32) -> u32;
     far_side(low: Vec4, high: Vec4, far_low: f32, far_high: f32) -> Vec4;
     in_order(bits: u32, octant: u32) -> u32;
     octant_of(direction: Vec3) -> u32;
@@ -459,13 +459,13 @@ probes! {
     mesh_pad(i: &Instance, origin: Vec3) -> f32;
     standalone_hit_primitive(q: &Primitive) -> HitPrimitive;
     face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, material: u32) -> Primitive;
-    face_lets_pass(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool;
-    turned_to(v: Vec3, side: Vec3) -> Vec3;
+    face_direction_allowed(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool;
+    flipped_to(v: Vec3, side: Vec3) -> Vec3;
     face_surface(face: &HitPrimitive, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface;
     face_uv(face: &HitPrimitive, b: Vec2) -> Vec2;
     color_between(c0: Vec4, c1: Vec4, c2: Vec4, b: Vec2) -> Vec4;
     face_normal(face: &HitPrimitive, b: Vec2) -> Vec3;
-    face_bulge(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3;
+    face_terminator_offset(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3;
     lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3;
     face_tangents(face: &HitPrimitive) -> Tangents;
     face_frame(face: &HitPrimitive, b: Vec2) -> Tangents;
@@ -580,11 +580,11 @@ fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let (gpu, cpu) = (function.run(device, &words), twin(name).results(&words, kinds.len()));
     let info = &device.info;
     let call_words = |call: usize| &words[call * function.words_in()..(call + 1) * function.words_in()];
-    let denormals_differ = allowed(adapter::KNOWN, &info.name, &info.driver, DENORMALS).is_some();
+    let denormals_differ = allowed(adapter::KNOWN_DIFFERENCES, &info.name, &info.driver, DENORMALS).is_some();
     let (left_out, differ): (Vec<usize>, Vec<usize>) = differing(&kinds, &gpu, &cpu)
         .into_iter()
         .partition(|call| denormals_differ && twin(name).meets_denormals(call_words(*call), kinds.len()));
-    let known = allowed(adapter::KNOWN, &info.name, &info.driver, name);
+    let known = allowed(adapter::KNOWN_DIFFERENCES, &info.name, &info.driver, name);
     let arguments = function.arguments().into_iter();
     let kinds_in: Vec<ScalarKind> = arguments.flat_map(|(_, ty)| scalars(function.module, ty)).collect();
     let is_large = |(word, kind): (&u32, &ScalarKind)| *kind == ScalarKind::Uint && *word >= 1 << 31;
@@ -638,7 +638,7 @@ fn every_shared_function_has_a_probe() {
     {
         assert!(
             names.iter().any(|n| n == name),
-            "{name} is probed, but no shared file has it"
+            "{name} has a probe but is in no shared file"
         );
     }
 }
@@ -664,20 +664,25 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
         }
     }
     if only.is_none() {
-        let known = allowed(adapter::KNOWN, &device.info.name, &device.info.driver, DENORMALS);
+        let known = allowed(
+            adapter::KNOWN_DIFFERENCES,
+            &device.info.name,
+            &device.info.driver,
+            DENORMALS,
+        );
         let share = left_out as f64 / (probed.len() * CALLS) as f64;
         problems.extend(judge(known, DENORMALS, share).err());
     }
     assert!(problems.is_empty(), "{}", problems.join("\n"));
     println!(
-        "{} functions, {CALLS} calls each: the same bits, but for {left_out} calls with denormal numbers",
+        "{} functions, {CALLS} calls each: the same bits; {left_out} calls with denormal numbers left out",
         probed.len()
     );
 }
 
 /// The inputs reach both results of each predicate, and hits and misses of each intersection.
 #[test]
-fn inputs_take_both_ways_of_every_decision() {
+fn inputs_cover_both_outcomes_of_predicates() {
     let source = shared_source();
     let module = parse(&source);
     for (file, function) in functions(&module, &source) {
@@ -714,14 +719,14 @@ fn inputs_take_both_ways_of_every_decision() {
         let nan = share(&|word| f32::from_bits(word).is_nan());
         assert!(
             kinds[0] != ScalarKind::Float || nan < 0.5,
-            "{file}: {name} is no number for {nan} of the inputs"
+            "{file}: {name} is NaN for {nan} of the inputs"
         );
     }
 }
 
 /// One ulp in a constant is detected.
 #[test]
-fn a_function_that_differs_by_one_ulp_is_found() {
+fn a_difference_of_one_ulp_is_found() {
     let Some(device) = adapter::device() else { return };
     for (name, from, to) in [
         ("log2", "2.8853900817779268", "2.8853903"),
@@ -736,10 +741,7 @@ fn a_function_that_differs_by_one_ulp_is_found() {
         ("max", "select(b, a, a > b)", "select(a, b, a < b)"),  // NaN
     ] {
         let mut source = shared_source();
-        assert!(
-            source.text.contains(from),
-            "{name}: '{from}' is not there to be changed"
-        );
+        assert!(source.text.contains(from), "{name}: '{from}' not found");
         let text = source.text.replacen(from, to, 1);
         source = wgray_render::gpu::compose::Source::default();
         source.append("changed", &text);
@@ -752,13 +754,13 @@ fn a_function_that_differs_by_one_ulp_is_found() {
         let words = inputs(&function, CALLS, 1);
         let changed = function.run_in(device, &source, &words);
         let differ = differing(&kinds, &changed, &twin(name).results(&words, kinds.len()));
-        assert!(!differ.is_empty(), "{name} with '{to}' in place of '{from}'");
+        assert!(!differ.is_empty(), "{name}: '{to}' instead of '{from}' is not detected");
     }
 }
 
 /// `max(NaN, 0)` is 0: NaN does not spread to the result.
 #[test]
-fn nan_does_not_spread_where_it_must_not() {
+fn nan_does_not_propagate() {
     assert_eq!(max(f32::NAN, 0.0), 0.0);
     assert_eq!(min(f32::NAN, 1.0), 1.0);
     assert_eq!(power(f32::NAN, 2.0), 0.0);
@@ -789,7 +791,7 @@ fn nan_does_not_spread_where_it_must_not() {
 /// Denormals are detected exactly where a twin has them.
 #[test]
 #[cfg(target_arch = "x86_64")]
-fn denormal_numbers_are_noticed_where_a_twin_meets_them() {
+fn denormal_numbers_in_twins_are_detected() {
     let least = f32::MIN_POSITIVE;
     for (a, b, meets) in [
         ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0], false),

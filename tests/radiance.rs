@@ -75,7 +75,7 @@ fn a_point_light_over_a_plane() {
         let error = largest_error(&film, |x, y| point_light(x, y, 6));
         assert!(error < 2e-6, "{error}");
         let without_cosine = largest_error(&film, |x, y| point_light(x, y, 5));
-        assert!(without_cosine > 0.01, "the wrong formula is told from the right one");
+        assert!(without_cosine > 0.01, "the wrong formula passes");
     }
 }
 
@@ -87,13 +87,13 @@ fn ambient_light_alone() {
         assert!(film.means().all(|color| color == expected));
         assert!(
             !film.means().all(|color| color == wrong),
-            "without the material's factor"
+            "the material's factor has no effect"
         );
     }
 }
 
 #[test]
-fn nothing_but_background() {
+fn only_background() {
     let scene = parse(&format!("{DOWN}{LIGHT}"));
     for film in films(&scene) {
         assert!(film.means().all(|color| color == [0.5, 0.25, 0.125]));
@@ -101,7 +101,7 @@ fn nothing_but_background() {
 }
 
 #[test]
-fn a_light_from_below_reaches_no_ground_above() {
+fn the_ground_occludes_light_from_below() {
     let below = LIGHT.replace("1.5]", "-1.5]");
     let [lit, unlit] = [LIGHT, &below].map(|light| films(&parse(&format!("{DOWN}{GROUND}{light}"))));
     for (lit, unlit) in lit.iter().zip(&unlit) {
@@ -116,7 +116,7 @@ fn a_light_from_below_reaches_no_ground_above() {
 /// A sphere of radius 0.5 at height 1 under a directional light from above casts a disk of radius 0.5. The camera is
 /// below the sphere, which would cover it; its image plane, where rays start, is at 0.25.
 #[test]
-fn a_sphere_in_parallel_light_casts_a_disc() {
+fn a_sphere_under_directional_light_casts_a_disk() {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [0.2, 0.1, 1]\nradius = 0.5\n";
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
@@ -130,7 +130,7 @@ fn a_sphere_in_parallel_light_casts_a_disc() {
     for film in films(&parse(&format!("{scene}{GROUND}{sphere}{light}"))) {
         let error = largest_error(&film, disc(0.5));
         assert!(error < 1e-6, "{error}");
-        assert!(largest_error(&film, disc(0.6)) > 0.5, "a larger disc is told from it");
+        assert!(largest_error(&film, disc(0.6)) > 0.5, "a larger disk passes");
     }
 }
 
@@ -166,7 +166,7 @@ const LIT: (bool, bool) = (false, true);
 
 /// Primitives of any two kinds occlude.
 #[test]
-fn light_behind_two_primitives_is_hidden() {
+fn two_primitives_occlude() {
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
     let kinds = covers([1.0, 1.5, 2.0, 3.0]);
     for (i, first) in kinds.iter().enumerate() {
@@ -180,7 +180,7 @@ fn light_behind_two_primitives_is_hidden() {
 
 /// Occluded just before the light, not behind it.
 #[test]
-fn a_light_is_hidden_by_what_is_before_it_alone() {
+fn shapes_behind_a_light_do_not_occlude_it() {
     for (before, behind) in covers([1.45; 4]).iter().zip(&covers([1.55; 4])) {
         assert_eq!(dark_or_lit(LIGHT, before), DARK, "{before}");
         assert_eq!(dark_or_lit(LIGHT, behind), LIT, "{behind}");

@@ -8,10 +8,10 @@ use wgray::scene::{Description, Integrator, Pattern};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::film::Film;
-use wgray_render::job::Cut;
+use wgray_render::job::WorkSplit;
 use wgray_render::records::{FirstHit, Packed};
 
-use crate::adapter::{self, KNOWN, allowed, bit_exact, judge};
+use crate::adapter::{self, KNOWN_DIFFERENCES, allowed, bit_exact, judge};
 use crate::nearly::{EDGES, Nearly};
 use crate::pictures::{
     Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, render_with, whole,
@@ -21,20 +21,20 @@ use crate::{patterns, scenes, sources};
 /// Returns an error if a GPU image exceeds the guaranteed tolerance.
 pub fn compare(way: Way, packed: &Packed, gpu: &Film, cpu: &Film) -> Result<(), String> {
     assert_eq!((gpu.region, gpu.sums.len()), (cpu.region, cpu.sums.len()));
-    let device = adapter::device().expect("the device that rendered the picture");
+    let device = adapter::device().expect("the device that rendered the image");
     if !bit_exact(device) {
         return Nearly::of(packed, gpu, cpu).judge();
     }
     if way == Way::Plain {
         return Nearly::by_plain_wgsl(gpu, cpu).judge();
     }
-    let known = allowed(KNOWN, &device.info.name, &device.info.driver, "picture");
+    let known = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "picture");
     judge(known, "picture", differing(gpu, cpu) as f64 / cpu.sums.len() as f64)
 }
 
 /// Compares first hits; on devices other than software Vulkan only integers, away from edges.
 pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
-    let device = adapter::device().expect("the device that rendered the picture");
+    let device = adapter::device().expect("the device that rendered the image");
     assert_eq!(gpu.len(), cpu.len());
     let same: fn(&FirstHit, &FirstHit) -> bool = if bit_exact(device) {
         |a, b| bytemuck::bytes_of(a) == bytemuck::bytes_of(b)
@@ -43,7 +43,7 @@ pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
     };
     let share = gpu.iter().zip(cpu).filter(|(a, b)| !same(a, b)).count() as f64 / gpu.len() as f64;
     if bit_exact(device) {
-        let known = allowed(KNOWN, &device.info.name, &device.info.driver, "first hits");
+        let known = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "first hits");
         return judge(known, "first hits", share);
     }
     if share > EDGES {
@@ -102,7 +102,7 @@ fn pictures_of_all_scenes_are_the_same() {
     let varied = variations()
         .into_iter()
         .map(|scene| (scene, [Way::Baked, Way::Buffers].as_slice()));
-    let (mut pixels, mut pictures, mut plain) = (0, 0, Nearly::default());
+    let (mut pixels, mut images, mut plain) = (0, 0, Nearly::default());
     for ((name, packed), ways) in small.chain(varied) {
         let cpu = reference(&packed);
         for &way in ways {
@@ -112,15 +112,15 @@ fn pictures_of_all_scenes_are_the_same() {
             if way == Way::Plain {
                 plain.add(Nearly::by_plain_wgsl(&gpu, &cpu));
             } else {
-                (pixels, pictures) = (pixels + cpu.sums.len(), pictures + 1);
+                (pixels, images) = (pixels + cpu.sums.len(), images + 1);
             }
         }
     }
-    println!("{pictures} pictures of {pixels} pixels are as promised; all scenes by plain WGSL: {plain}");
+    println!("{images} images, {pixels} pixels: within the guarantees; all scenes with plain WGSL: {plain}");
 }
 
 #[test]
-fn first_hits_of_all_scenes_are_the_same() {
+fn first_hits_of_all_scenes_agree() {
     if adapter::device().is_none() {
         return;
     }
@@ -135,7 +135,7 @@ fn first_hits_of_all_scenes_are_the_same() {
 
 /// One ulp of a number, or one bit of a pixel, is detected.
 #[test]
-fn a_picture_that_differs_is_found() {
+fn a_different_image_is_found() {
     let Some(device) = adapter::device() else { return };
     let (_, packed) = small_scenes()
         .into_iter()
@@ -168,28 +168,28 @@ fn a_picture_that_differs_is_found() {
     other.sums[77].y = f32::from_bits(other.sums[77].y.to_bits() + 1);
     assert!(
         !bit_exact(device) || compare(Way::Baked, &packed, &other, &cpu).is_err(),
-        "one bit"
+        "one bit passes"
     );
     let mut other = cpu.clone();
     other.sums.rotate_right(1);
-    assert!(nearly(&other).is_err(), "a shifted pixel");
+    assert!(nearly(&other).is_err(), "a shifted pixel passes");
     let mut other = cpu.clone();
     other
         .sums
         .iter_mut()
         .for_each(|sum| *sum *= Vec4::new(1.00002, 1.00002, 1.00002, 1.0));
-    assert!(nearly(&other).is_err(), "a brighter picture");
+    assert!(nearly(&other).is_err(), "a brighter image passes");
     let mut other = cpu.clone();
     other.sums[5].x = f32::NAN;
-    assert!(nearly(&other).is_err(), "no number");
+    assert!(nearly(&other).is_err(), "NaN passes");
     let hits = first_hits(&packed, Way::Cpu);
     let mut other = hits.clone();
     other.iter_mut().take(20).for_each(|hit| hit.shape ^= 1);
-    assert!(compare_hits(&other, &hits).is_err(), "another shape");
+    assert!(compare_hits(&other, &hits).is_err(), "another shape index passes");
 }
 
 #[test]
-fn a_larger_picture_is_the_same() {
+fn a_larger_image_agrees() {
     if adapter::device().is_none() {
         return;
     }
@@ -201,7 +201,7 @@ fn a_larger_picture_is_the_same() {
     for way in [Way::Baked, Way::Plain] {
         let gpu = render(&packed, way);
         println!(
-            "cornell.toml, 401 x 397, {way:?}: {} of {} pixels differ by a bit at least; {}",
+            "cornell.toml, 401 x 397, {way:?}: {} of {} pixels differ; {}",
             differing(&gpu, &cpu),
             cpu.sums.len(),
             Nearly::by_plain_wgsl(&gpu, &cpu)
@@ -228,17 +228,17 @@ fn tile(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {
 }
 
 #[test]
-fn pictures_do_not_depend_on_how_the_work_is_cut() {
+fn images_do_not_depend_on_the_work_split() {
     let description = scenes::scene("lights.toml");
     for pattern in [Pattern::Grid, Pattern::Random] {
         let packed = scenes::packed(&with(&description, (45, 37), 3, pattern, (9, 4)));
         let expected = reference(&packed);
         for way in exact_ways() {
             let mut backend = backend(&packed, way);
-            let cut = |band_pixels, samples_per_call, rows_per_call| Cut {
+            let cut = |band_pixels, samples_per_dispatch, rows_per_dispatch| WorkSplit {
                 band_pixels,
-                samples_per_call,
-                rows_per_call,
+                samples_per_dispatch,
+                rows_per_dispatch,
             };
             for cut in [
                 cut(45 * 10, Some(1), Some(3)),
@@ -305,7 +305,7 @@ fn a_crop_is_a_part_of_the_whole() {
             tile(0, 40, 67, 41),
             tile(11, 5, 30, 37),
         ] {
-            let found = film(&mut *backend, &packed, part, &Cut::default());
+            let found = film(&mut *backend, &packed, part, &WorkSplit::default());
             assert_eq!(differing(&found, &crop(&expected, part)), 0, "{way:?}, {part:?}");
         }
     }
@@ -315,12 +315,12 @@ fn a_crop_is_a_part_of_the_whole() {
     };
     assert!(
         differing(&moved, &crop(&expected, moved.region)) > 0,
-        "the crop beside is another picture"
+        "the adjacent crop is equal"
     );
 }
 
 #[test]
-fn pictures_do_not_depend_on_the_number_of_threads() {
+fn images_do_not_depend_on_the_number_of_threads() {
     let description = scenes::scene("cornell.toml");
     let packed = scenes::packed(&with(&description, (70, 31), 3, Pattern::Random, (3, 4)));
     let expected = reference(&packed);

@@ -32,7 +32,7 @@ fn fits(scene: &Table) -> bool {
 }
 
 /// Validates by the program.
-fn told(scene: &Table, folder: &Path) -> Result<(), String> {
+fn load(scene: &Table, folder: &Path) -> Result<(), String> {
     let text = toml::to_string(scene).expect("TOML");
     let description = Description::parse(&text, "s.toml").map_err(|error| error.to_string())?;
     let checked = description.validate_with(&Assets::beside(folder));
@@ -505,8 +505,8 @@ fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
 
 /// Returns the disagreement of schema and program, if any.
 fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
-    match (fits(scene), told(scene, folder)) {
-        (false, Ok(())) => Some(format!("the schema alone refuses {scene}")),
+    match (fits(scene), load(scene, folder)) {
+        (false, Ok(())) => Some(format!("only the schema rejects {scene}")),
         // To JSON, 1.0 is an integer.
         (true, Err(message))
             if message.contains(".0 must be ")
@@ -519,10 +519,10 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
         // The schema does not require the static keys of a camera with a path.
         (true, Err(message)) if message.contains(": camera.") && message.ends_with(" is missing") => {
             let has_path = scene["camera"].get("path").is_some();
-            (!has_path).then(|| format!("the schema takes a camera without: {message}"))
+            (!has_path).then(|| format!("the schema accepts a camera without: {message}"))
         }
         (true, Err(message)) if !OF_SEVERAL.iter().any(|part| message.contains(part)) => {
-            Some(format!("the schema takes what the program refuses: {message}"))
+            Some(format!("only the program rejects: {message}"))
         }
         _ => None,
     }
@@ -546,18 +546,18 @@ fn compare(scene: &Table, folder: &Path, step: usize) -> usize {
 }
 
 #[test]
-fn changed_values_are_refused_by_both() {
+fn changed_values_are_rejected_by_both() {
     let folder = any_scene::folder();
     let scenes = EVERY.map(|text| text.parse::<Table>().unwrap());
     // Leaves several changes for each value.
     let count: usize = scenes.iter().map(|scene| compare(scene, folder, 3)).sum();
     assert!(count > 3000, "{count}");
-    let whole = scenes.iter().filter(|scene| told(scene, folder).is_ok() && fits(scene));
-    assert_eq!(whole.count(), 3, "what is changed is good");
+    let whole = scenes.iter().filter(|scene| load(scene, folder).is_ok() && fits(scene));
+    assert_eq!(whole.count(), 3, "some unchanged scenes are invalid");
 }
 
 #[test]
-fn nothing_and_too_much_are_refused_by_both() {
+fn missing_and_unknown_keys_are_rejected_by_both() {
     let folder = any_scene::folder();
     let key = |name: &str| Step::Key(name.to_owned());
     let path = [key("camera"), key("path")];
@@ -606,12 +606,12 @@ fn nothing_and_too_much_are_refused_by_both() {
         let place = at(&mut scene, table).as_table_mut().unwrap();
         place.insert(name.to_owned(), value);
         let scene = scene.as_table().unwrap();
-        assert!(!fits(scene) && told(scene, folder).is_err(), "{table:?}.{name}");
+        assert!(!fits(scene) && load(scene, folder).is_err(), "{table:?}.{name}");
     }
 }
 
 #[test]
-fn random_scenes_fit_and_their_changes_are_refused_by_both() {
+fn random_scenes_are_valid_and_their_changes_rejected_by_both() {
     let (folder, strategy) = (any_scene::folder(), any_scene::description());
     let mut runner = TestRunner::deterministic();
     for i in 0..60 {
@@ -625,7 +625,7 @@ fn random_scenes_fit_and_their_changes_are_refused_by_both() {
 }
 
 #[test]
-fn the_projects_scenes_fit() {
+fn the_projects_scenes_are_valid() {
     let mut count = 0;
     for entry in std::fs::read_dir(project("scenes")).unwrap() {
         let path = entry.unwrap().path();
@@ -780,13 +780,16 @@ fn each_key(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
 }
 
 #[test]
-fn every_key_is_described_and_every_number_has_its_ends() {
+fn every_key_has_a_description_and_every_number_a_range() {
     let mut count = 0;
     each_key(schema(), "", &mut |path, property| {
-        let told = property["description"].as_str().unwrap_or_default();
-        assert!(told.len() > 5 && told.ends_with('.'), "{path}: {told:?}");
+        let description = property["description"].as_str().unwrap_or_default();
+        assert!(
+            description.len() > 5 && description.ends_with('.'),
+            "{path}: {description:?}"
+        );
         for bad in ["[`", "Description", "  ", "..", "\n"] {
-            assert!(!told.contains(bad), "{path}: {told:?}");
+            assert!(!description.contains(bad), "{path}: {description:?}");
         }
         let is_number = ["number", "integer"].iter().any(|name| property["type"] == **name);
         let ends = ["minimum", "exclusiveMinimum", "anyOf"];
@@ -802,8 +805,8 @@ fn every_key_is_described_and_every_number_has_its_ends() {
             plain = items;
         }
         assert!(
-            plain.get("minimum").is_none() || told.contains(" to "),
-            "{path}: {told:?}"
+            plain.get("minimum").is_none() || description.contains(" to "),
+            "{path}: {description:?}"
         );
         assert!(
             property.get("title").is_none() && property.get("format").is_none(),
@@ -815,7 +818,7 @@ fn every_key_is_described_and_every_number_has_its_ends() {
 }
 
 #[test]
-fn every_key_is_changed_by_the_test_above() {
+fn the_tests_cover_every_key() {
     let mut seen: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     let mut see = |name: String, table: &Value| {
         seen.entry(name)
@@ -832,16 +835,17 @@ fn every_key_is_changed_by_the_test_above() {
     for scene in EVERY {
         let scene: Table = scene.parse().unwrap();
         for (key, value) in &scene {
-            match (key.trim_end_matches('s'), value) {
+            let kind = key.trim_end_matches('s');
+            match (key.as_str(), value) {
                 ("camera", camera) => see(format!("camera-{}", tag(camera)), camera),
-                (kind @ ("texture" | "material"), Value::Table(all)) => {
+                ("textures" | "materials", Value::Table(all)) => {
                     all.values().for_each(|one| see(format!("{kind}-{}", tag(one)), one));
                 }
-                (kind @ ("light" | "shape"), Value::Array(all)) => {
+                ("lights" | "shapes", Value::Array(all)) => {
                     all.iter().for_each(|one| see(format!("{kind}-{}", tag(one)), one));
                 }
-                ("meshe", Value::Table(all)) => all.values().for_each(|one| see("meshes".to_owned(), one)),
-                ("instance", Value::Array(all)) => all.iter().for_each(|one| see("instances".to_owned(), one)),
+                ("meshes", Value::Table(all)) => all.values().for_each(|one| see(key.clone(), one)),
+                ("instances", Value::Array(all)) => all.iter().for_each(|one| see(key.clone(), one)),
                 (_, section) => see(key.clone(), section),
             }
         }

@@ -30,7 +30,7 @@ pub fn edited_shaders(file: &str, from: &str, to: &str) -> Shaders {
 
 /// Replaces the first occurrence.
 pub fn edited(text: &str, from: &str, to: &str) -> String {
-    assert!(text.contains(from), "'{from}' is not there to be changed");
+    assert!(text.contains(from), "'{from}' not found");
     text.replacen(from, to, 1)
 }
 
@@ -60,8 +60,12 @@ pub fn parse(source: &Source) -> Module {
 }
 
 pub fn file_of(source: &Source, span: naga::Span) -> String {
-    let range = span.to_range().expect("naga knows where everything was written");
-    source.locate(range.start).expect("inside of the text").0.to_string()
+    let range = span.to_range().expect("naga has a span for every item");
+    source
+        .locate(range.start)
+        .expect("the span is inside of the text")
+        .0
+        .to_string()
 }
 
 /// A name and a WGSL type: `vec3<f32>`, `Primitive`.
@@ -260,7 +264,7 @@ fn every_kernel_is_tested() {
         if file.starts_with("kernels/") {
             assert!(
                 KERNELS.iter().any(|kernel| kernel.file() == file),
-                "{file} is no kernel"
+                "{file} is not a kernel"
             );
         }
     }

@@ -89,8 +89,8 @@ fn chi_square(counts: &[u32]) -> f64 {
 fn flaw(positions: &[Vec2]) -> Option<String> {
     const CELLS: usize = 16;
     let cell = |x: f32| ((x * CELLS as f32) as usize).min(CELLS - 1);
-    type Place = fn(Vec2) -> f32;
-    let projections: [(&str, Place); 4] = [
+    type TestFolder = fn(Vec2) -> f32;
+    let projections: [(&str, TestFolder); 4] = [
         ("x", |p| p.x),
         ("y", |p| p.y),
         ("x + y modulo 1", |p| (p.x + p.y).fract()),

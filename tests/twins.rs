@@ -23,7 +23,7 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
     ("film.wgsl", "the CPU's film has a list for each layer"),
     (
         "integrators/whole.wgsl",
-        "the CPU takes a sample whole, in pixel.rs: nothing runs in step there",
+        "the CPU renders whole samples in pixel.rs, without lockstep",
     ),
     (
         "bvh.wgsl",
@@ -31,12 +31,9 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
     ),
     (
         "buffers.wgsl",
-        "how a kernel reads the scene; baked kernels have the same functions with constants",
+        "scene access of kernels; baked kernels have the same functions with constants",
     ),
-    (
-        "meshes.wgsl",
-        "how a kernel reads meshes; the CPU does it in geometry.rs",
-    ),
+    ("meshes.wgsl", "mesh access of kernels; the CPU's is in geometry.rs"),
 ];
 
 /// Rust files that are not twins.
@@ -139,7 +136,7 @@ fn twin_of(file: &str) -> syn::File {
 }
 
 #[test]
-fn functions_and_records_are_the_same() {
+fn functions_and_records_match() {
     let shared = shared_source();
     let kernels = Integrator::ALL.map(|integrator| sources::shaders().compose(&RENDER, integrator, None));
     let mut problems = Vec::new();
@@ -162,11 +159,11 @@ fn functions_and_records_are_the_same() {
 }
 
 #[test]
-fn a_twin_that_drifted_is_found() {
+fn a_changed_twin_is_found() {
     let shared = shared_source();
     let changed = |file: &str, from: &str, to: &str| {
         let text = std::fs::read_to_string(sources::path(&format!("crates/render/src/cpu/{file}"))).expect("a twin");
-        assert!(text.contains(from), "{file}: '{from}' is not there to be changed");
+        assert!(text.contains(from), "{file}: '{from}' not found");
         syn::parse_file(&text.replacen(from, to, 1)).expect("still Rust")
     };
     for (what, file, from, to) in [
@@ -202,7 +199,7 @@ fn a_twin_that_drifted_is_found() {
 }
 
 #[test]
-fn an_argument_updated_in_place_stands_for_a_result() {
+fn an_argument_updated_in_place_is_a_result() {
     let functions = |text: &str| rust_functions(&syn::parse_file(text).expect("Rust"));
     let by_value = functions("fn advance(state: PathState, pixel: UVec2) -> PathState { state }");
     assert_eq!(
@@ -214,7 +211,7 @@ fn an_argument_updated_in_place_stands_for_a_result() {
 }
 
 #[test]
-fn every_twin_is_some_files() {
+fn every_rust_file_has_a_shader() {
     for entry in std::fs::read_dir(sources::path("crates/render/src/cpu")).expect("the twins") {
         let name = entry
             .expect("an entry")
@@ -225,7 +222,7 @@ fn every_twin_is_some_files() {
         let twin = built_in().any(|(file, _)| file == wgsl);
         assert!(
             twin || NO_TWIN.contains(&name.as_str()),
-            "crates/render/src/cpu/{name} is no file's twin"
+            "crates/render/src/cpu/{name} is not the twin of a file"
         );
     }
 }
@@ -322,7 +319,7 @@ fn spirv(source: &Source, kernel: &Kernel, packed: &Packed, rounding: Rounding) 
 }
 
 #[test]
-fn kernels_hold_no_operation_that_devices_may_compute_differently() {
+fn kernels_have_only_exact_operations() {
     let mut operations = 0;
     for (name, packed) in scenes::all() {
         for kernel in KERNELS {
@@ -346,11 +343,11 @@ fn kernels_hold_no_operation_that_devices_may_compute_differently() {
             }
         }
     }
-    assert!(operations > 1000, "the scan saw next to nothing");
+    assert!(operations > 1000, "the scan found too few instructions");
 }
 
 #[test]
-fn an_operation_that_devices_may_compute_differently_is_found() {
+fn an_inexact_operation_is_found() {
     let (_, packed) = scenes::all().remove(0);
     let source = sources::shaders().compose(&RENDER, Integrator::Phong, None);
     let from = "    var sum = environment.ambient * material.ambient;\n";

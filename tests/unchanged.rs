@@ -72,7 +72,7 @@ fn line(name: &str, packed: &Packed) -> String {
 }
 
 #[test]
-fn pictures_have_the_bits_that_they_had() {
+fn images_have_the_recorded_checksums() {
     let scenes = small_scenes().into_iter().chain(variations()).chain(special_scenes());
     let found: String = scenes.map(|(name, packed)| line(&name, &packed)).collect();
     let path = sources::path(KEPT);
@@ -81,19 +81,15 @@ fn pictures_have_the_bits_that_they_had() {
     }
     let kept = fs::read_to_string(&path).expect("the file of checksums");
     let films: BTreeSet<&str> = kept.lines().filter_map(|line| line.split(' ').next()).collect();
-    assert_eq!(
-        films.len(),
-        kept.lines().count(),
-        "a checksum that does not tell two scenes apart"
-    );
+    assert_eq!(films.len(), kept.lines().count(), "two scenes have one checksum");
     let changed: Vec<&str> = found.lines().filter(|line| !kept.lines().any(|k| k == *line)).collect();
     assert!(
         changed.is_empty(),
-        "pictures that are not those of {KEPT} (film, first hits, scene): {changed:#?}"
+        "images that differ from {KEPT} (film, first hits, scene): {changed:#?}"
     );
     assert_eq!(
         found.lines().count(),
         kept.lines().count(),
-        "{KEPT} has scenes that are gone"
+        "{KEPT} has scenes that no longer exist"
     );
 }

@@ -3,10 +3,11 @@
 
     target/peers/cycles/bin/python cycles_scenes.py SCENE.toml [--size N] [--spp N] [--warm N] [--seed N] [-o FILE] [--each FOLDER]
 
-Takes scenes of rectangles, triangles, ellipsoids and meshes of diffuse materials under rectangle lights and a plain sky, with a
-perspective camera; Cycles has ellipsoids as fine meshes. A light is a mesh that shines on its front. Cycles counts bounces after
-the first surface, so it has one less than `max_depth`. Nothing clamps, denoises, adapts or guides; a pixel's filter is its
-box. Cycles keeps its scene between pictures. `load_s`, `first_s` and `warm_s` are those of mitsuba_scenes.py.
+Supports rectangles, triangles, ellipsoids and meshes with diffuse materials, rectangle lights, a constant environment
+and a perspective camera. Ellipsoids become fine meshes, lights meshes that emit on their front. Cycles counts bounces
+after the first surface, so it gets one less than `max_depth`. Clamping, denoising, adaptive sampling and path guiding
+are off; the pixel filter is a box. Cycles keeps its scene between images. `load_s`, `first_s` and `warm_s` are as in
+mitsuba_scenes.py.
 """
 import argparse
 import json
@@ -38,10 +39,10 @@ def shader(name, color=None, radiance=None):
         links.new(diffuse.outputs[0], out.inputs[0])
         return made
     made.cycles.emission_sampling = "FRONT"
-    shine, mix, side = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeNewGeometry")
-    shine.inputs["Color"].default_value = (*radiance, 1)
+    emission, mix, side = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeNewGeometry")
+    emission.inputs["Color"].default_value = (*radiance, 1)
     links.new(side.outputs["Backfacing"], mix.inputs[0])
-    links.new(shine.outputs[0], mix.inputs[1])
+    links.new(emission.outputs[0], mix.inputs[1])
     links.new(diffuse.outputs[0], mix.inputs[2])
     links.new(mix.outputs[0], out.inputs[0])
     return made
@@ -88,7 +89,7 @@ def load(path, scene, size, spp):
 
     def painted(material):
         if material.kind != "diffuse" or not isinstance(material.color, list) or any(material.emission or []):
-            raise ValueError(f"{path}: the materials for Cycles are diffuse, plain and dark")
+            raise ValueError(f"{path}: Cycles supports only diffuse materials of constant colour without emission")
         if id(material) not in materials:
             materials[id(material)] = shader("paint", material.color)
         return materials[id(material)]
@@ -104,17 +105,17 @@ def load(path, scene, size, spp):
         elif isinstance(s, scenes.Mesh):
             add_mesh(name, s, material)
         else:
-            raise ValueError(f"{path}: no such shape for Cycles")
+            raise ValueError(f"{path}: Cycles supports only rectangles, triangles, ellipsoids and meshes")
     for i, l in enumerate(scene.lights):
         if not isinstance(l, scenes.Quad):
-            raise ValueError(f"{path}: the lights for Cycles are rectangles")
+            raise ValueError(f"{path}: Cycles supports only rectangle lights")
         add_quad(f"light{i}", l, shader("light", radiance=l.color))
     world = bpy.data.worlds.new("sky")
     world.use_nodes = True
     world.node_tree.nodes["Background"].inputs["Color"].default_value = (*(scene.environment or [0, 0, 0]), 1)
     out.world = world
     if scene.fov is None:
-        raise ValueError(f"{path}: the camera for Cycles is perspective")
+        raise ValueError(f"{path}: Cycles supports only perspective cameras")
     camera = bpy.data.cameras.new("camera")
     camera.sensor_fit, camera.angle = "VERTICAL", math.radians(scene.fov)
     camera.clip_start = 1e-3
@@ -151,10 +152,10 @@ def main():
     parser.add_argument("--size", type=int)
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--warm", type=int, default=3)
-    parser.add_argument("--seed", type=int, default=0, help="of the first picture; each more has the next one")
-    parser.add_argument("--threads", type=int, help="all if absent")
-    parser.add_argument("-o", "--output", help="the last picture")
-    parser.add_argument("--each", metavar="FOLDER", help="write every warm picture there, named by its seed")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first image; each further image uses the next one")
+    parser.add_argument("--threads", type=int, help="default: all")
+    parser.add_argument("-o", "--output", help="file of the last image")
+    parser.add_argument("--each", metavar="FOLDER", help="write each warm image to this folder, named by its seed")
     args = parser.parse_args()
 
     scene = scenes.load(args.scene, "path")
@@ -165,8 +166,8 @@ def main():
     if args.threads:
         out.render.threads_mode, out.render.threads = "FIXED", args.threads
     times, folder = [], tempfile.mkdtemp()
-    # Blender's log goes to standard output; the line of JSON alone is to be there
-    said, silent = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    # Blender logs to standard output, which must contain only the line of JSON.
+    stdout, silent = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)
     for n in range(1 + args.warm):
         out.cycles.seed = args.seed + n
@@ -178,7 +179,7 @@ def main():
         bpy.ops.render.render(write_still=True)
         times.append(time.perf_counter() - start)
     sys.stdout.flush()
-    os.dup2(said, 1)
+    os.dup2(stdout, 1)
     print(json.dumps({"renderer": f"Cycles {bpy.app.version_string}, CPU", "width": size[0], "height": size[1], "pixel_samples": args.spp,
                       "load_s": load_s, "first_s": times[0], "warm_s": statistics.median(times[1:]) if args.warm else None}))
 

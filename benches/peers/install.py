@@ -1,7 +1,7 @@
-"""Installs the peers into a folder of their own and says how to start them.
+"""Installs the other renderers into a folder of their own; `Peers` returns their commands and environments.
 
-PyPI's mitsuba, numpy, OpenEXR and scipy go into a virtual environment, bpy (Blender, for Cycles) into another when it is first
-wanted, Debian's povray and libllvm19 are unpacked beside them; nothing on the system changes.
+PyPI's mitsuba, numpy, OpenEXR and scipy go into a virtual environment, bpy (Blender, for Cycles) into another one on
+its first use, Debian's povray and libllvm19 are unpacked beside them. The system is not changed.
 """
 import os
 import pathlib
@@ -26,7 +26,7 @@ class Peers:
         self.libraries = self.debian / "usr" / "lib" / (sysconfig.get_config_var("MULTIARCH") or "x86_64-linux-gnu")
 
     def environment(self, name, packages):
-        """The Python of a virtual environment with these packages."""
+        """Returns the Python of a virtual environment with these packages; installs them if necessary."""
         folder = self.folder / name
         python, stamp = folder / "bin" / "python", folder / "installed"
         if not stamp.exists() or stamp.read_text().split() != packages:
@@ -42,17 +42,17 @@ class Peers:
     def install(self):
         self.environment("venv", PYPI)
         subprocess.run([HERE / "debs", self.debian, "bookworm", *DEBIAN], check=True)
-        for what in (self.povray()[0], self.llvm()):
-            if not what or not pathlib.Path(what).exists():
-                sys.exit(f"{what} is missing after the installation")
+        for file in (self.povray()[0], self.llvm()):
+            if not file or not pathlib.Path(file).exists():
+                sys.exit(f"{file} is missing after the installation")
 
     def mesa_backports(self):
-        """The environment that selects the lavapipe of Debian's backports."""
+        """The environment variables that select the lavapipe of Debian's backports."""
         line = subprocess.run([HERE / "mesa-backports", self.folder / "mesa-25"], check=True, stdout=subprocess.PIPE, text=True)
         return dict(pair.split("=", 1) for pair in line.stdout.split())
 
     def povray(self):
-        """POV-Ray's command and environment: unpacked here, or the system's where `debs` found it installed."""
+        """POV-Ray's command and environment: the unpacked one, or the system's if `debs` found it installed."""
         unpacked = self.debian / "usr" / "bin" / "povray"
         if not unpacked.exists():
             return shutil.which("povray"), {}
@@ -60,7 +60,7 @@ class Peers:
         return str(unpacked), {"LD_LIBRARY_PATH": ":".join(paths)}
 
     def llvm(self):
-        """LLVM 19 for Mitsuba: with 14 and 15 its code generation fails on machines with AVX-512."""
+        """The path of LLVM 19 for Mitsuba, whose code generation fails with LLVM 14 and 15 on machines with AVX-512."""
         system = pathlib.Path("/usr/lib") / self.libraries.name / "libLLVM.so.19.1"
         return next((str(p) for p in (self.libraries / "libLLVM.so.19.1", system) if p.exists()), None)
 

@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
-"""One lamp and a thousand of the same total power in a room: time, error, and the time at the error of one lamp, by kind of lamp and
-device, as a Markdown table.
+"""Compares one light with a thousand of the same total power in a room; prints a Markdown table.
 
-    target/peers/venv/bin/python benches/peers/lamps.py --wgray target/release/wgray
+The columns are the time, the error, and the time at the error of one light, per kind of light and device.
 
-The error is that of `path_error.py`: the root of the mean over the pixels of the relative variance, from pictures with other seeds.
-The time is the least of the renders' own (`--stats`: the work alone, without compiling). A lamp is a rectangle that shines downwards, a
-sphere or a point, and hidden from the camera, as what it would see of a small lamp is noise of another kind; a thousand are spread through the room, one to each cell of a grid of 10 x 10 x 10.
+Run it as `target/peers/venv/bin/python benches/peers/lamps.py --wgray target/release/wgray`.
+
+The error is that of `path_error.py`: the root of the mean over the pixels of the relative variance, from images with
+different seeds. The time is the shortest render time reported by `--stats`, without compilation. A light is a rectangle
+that faces down, an emissive sphere or a point light. It is invisible to the camera, because the noise of a small
+visible light would dominate the error. A thousand lights are spread through the room, one per cell of a grid of 10 x 10
+x 10.
 """
 import argparse
 import json
@@ -33,7 +36,7 @@ pixel_samples = {{ count = {spp} }}
 white = {{ type = "diffuse", color = [0.7, 0.7, 0.7] }}
 red = {{ type = "diffuse", color = [0.7, 0.2, 0.2] }}
 blue = {{ type = "diffuse", color = [0.2, 0.3, 0.7] }}
-lamp = {{ type = "diffuse", color = [0, 0, 0], emission = [{radiance}, {radiance}, {radiance}], visible = false }}
+light = {{ type = "diffuse", color = [0, 0, 0], emission = [{radiance}, {radiance}, {radiance}], visible = false }}
 dark = {{ type = "diffuse", color = [0.7, 0.7, 0.7], visible = false }}
 """
 
@@ -52,7 +55,7 @@ AREA = 0.25
 
 
 def places(count):
-    """The middle under the ceiling, or one point of each cell of a grid."""
+    """The centre below the ceiling, or a random point in each cell of a grid."""
     if count == 1:
         return [(0, 0, 2.7)]
     side = round(count ** (1 / 3))
@@ -62,8 +65,8 @@ def places(count):
                   for cell, low, high in zip(place, (-1.9, -3.9, 0.3), (1.9, 3.9, 2.9))) for place in cells]
 
 
-def lamp(kind, count, place):
-    """One of so many lamps, as text."""
+def light(kind, count, place):
+    """The TOML text of one of `count` lights."""
     at = f"[{', '.join(f'{x:.4f}' for x in place)}]"
     area = AREA / count
     if kind == "rectangle":
@@ -71,48 +74,48 @@ def lamp(kind, count, place):
         return (f'[[lights]]\ntype = "rectangle"\ncenter = {at}\nsize = [{side}, {side}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n'
                 f"color = [{RADIANCE}, {RADIANCE}, {RADIANCE}]\nvisible = false\n")
     if kind == "sphere":
-        return f'[[shapes]]\ntype = "sphere"\nmaterial = "lamp"\ncenter = {at}\nradius = {(area / 4 / np.pi) ** 0.5}\n'
+        return f'[[shapes]]\ntype = "sphere"\nmaterial = "light"\ncenter = {at}\nradius = {(area / 4 / np.pi) ** 0.5}\n'
     power = RADIANCE * area / 4
     return f'[[lights]]\ntype = "point"\nposition = {at}\ncolor = [{power}, {power}, {power}]\n'
 
 
 def dark(kind, place):
-    """What is as large as one of a thousand lamps and does not shine; a point has no size."""
+    """A non-emissive sphere of the size of one of a thousand lights; nothing for point lights."""
     if kind == "point":
         return ""
-    return lamp("sphere", 1000, place).replace('"lamp"', '"dark"')
+    return light("sphere", 1000, place).replace('"light"', '"dark"')
 
 
 def scene(kind, count, arguments):
     walls = "".join(f'[[shapes]]\ntype = "rectangle"\nmaterial = "{material}"\ncenter = {center}\nsize = {size}\nnormal = {normal}\n'
                     f"tangent = {tangent}\n" for material, center, size, normal, tangent in WALLS)
     start = ROOM.format(size=arguments.size, depth=arguments.depth, spp=arguments.spp, radiance=RADIANCE)
-    things = "".join(dark(kind, place) for place in places(1000)) if arguments.dark and count == 1 else ""
-    return start + walls + things + "".join(lamp(kind, count, place) for place in places(count))
+    spheres = "".join(dark(kind, place) for place in places(1000)) if arguments.dark and count == 1 else ""
+    return start + walls + spheres + "".join(light(kind, count, place) for place in places(count))
 
 
 def render(folder, text, seed, device, arguments):
-    """The picture and the seconds of its work."""
-    (folder / "lamps.toml").write_text(text)
-    command = [arguments.wgray, "render", str(folder / "lamps.toml"), "-o", str(folder / "lamps.exr"), "--seed", str(seed),
+    """Returns the image and the statistics of its render."""
+    (folder / "room.toml").write_text(text)
+    command = [arguments.wgray, "render", str(folder / "room.toml"), "-o", str(folder / "room.exr"), "--seed", str(seed),
                "--device", device, "--stats", str(folder / "stats.json"), "--quiet"]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    channels = OpenEXR.File(str(folder / "lamps.exr"), separate_channels=True).channels()
-    picture = np.stack([channels[c].pixels for c in "RGB"], -1).astype(float)
-    return picture, json.loads((folder / "stats.json").read_text())
+    channels = OpenEXR.File(str(folder / "room.exr"), separate_channels=True).channels()
+    image = np.stack([channels[c].pixels for c in "RGB"], -1).astype(float)
+    return image, json.loads((folder / "stats.json").read_text())
 
 
 def measure(folder, text, device, arguments):
-    """The least time, the relative error and the mean of a scene's pictures."""
-    pictures, seconds = [], []
+    """Returns the shortest time, the relative error and the mean of the images of a scene."""
+    images, seconds = [], []
     for seed in range(1, 1 + arguments.pictures):
-        picture, stats = render(folder, text, seed, device, arguments)
-        pictures.append(picture)
+        image, stats = render(folder, text, seed, device, arguments)
+        images.append(image)
         seconds.append(stats["render_s"])
-    pictures = np.array(pictures)
-    variance = pictures.var(0, ddof=1).sum(-1)
-    relative = variance / ((pictures.mean(0) ** 2).sum(-1) + 1e-4)
-    return min(seconds), float(np.sqrt(relative.mean())), float(pictures.mean())
+    images = np.array(images)
+    variance = images.var(0, ddof=1).sum(-1)
+    relative = variance / ((images.mean(0) ** 2).sum(-1) + 1e-4)
+    return min(seconds), float(np.sqrt(relative.mean())), float(images.mean())
 
 
 def main():
@@ -121,13 +124,14 @@ def main():
     parser.add_argument("--kinds", nargs="*", default=["rectangle", "sphere", "point"])
     parser.add_argument("--counts", nargs="*", type=int, default=[1, 1000])
     parser.add_argument("--devices", nargs="*", default=["cpu", "lavapipe"])
-    parser.add_argument("--dark", action="store_true", help="beside one lamp a thousand things of the size of lamps that do not shine")
+    parser.add_argument("--dark", action="store_true",
+                        help="add a thousand non-emissive spheres to the room with one light")
     parser.add_argument("--pictures", type=int, default=4)
     parser.add_argument("--size", type=int, default=128)
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--depth", type=int, default=4)
     arguments = parser.parse_args()
-    print("| lamps | device | count | mean | seconds | error | seconds at the error of the first | ratio |")
+    print("| lights | device | count | mean | seconds | error | seconds at the error of the first | ratio |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as name:
         for kind in arguments.kinds:

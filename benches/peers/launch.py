@@ -1,6 +1,8 @@
-"""Runs a program and writes its seconds, its peak of memory in bytes and its exit status: launch.py LIMIT FILE PROGRAM ARGUMENT...
+"""Runs a program and writes its time in seconds, its peak memory in bytes and its exit status to a file.
 
-Linux counts a process's memory from that of the one which started it, so this one is small: `python3 -I -S launch.py`.
+    python3 -I -S launch.py LIMIT FILE PROGRAM ARGUMENT...
+
+On Linux the peak memory of a process starts from that of its parent, so this parent is a minimal interpreter (-I -S).
 A program that is killed after LIMIT seconds has the status -9.
 """
 import os

@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
-"""How good the choices of the tree over many lamps are: the variance, over the squared mean, of one sample of direct light without shadows
-at places on the walls of a room, in f64, as a Markdown table: the mean over the places, and the median.
+"""Evaluates importance functions of the light tree; prints a Markdown table.
+
+A cell is the relative variance (variance over squared mean) of one sample of the unshadowed direct light at points on
+the walls of a room: the mean over the points, and the median in parentheses. Computed in f64.
 
     target/peers/venv/bin/python benches/peers/light_importance.py
 
-The tree is one of halves of the longest side rather than wgray's; the importance of a child is the first paragraph of "The tree over many
-lights" in docs/path-tracing.md, and what it was before. The exact variance follows from each lamp's light and its probability; no sample is taken.
+The tree splits at the median of the longest side, unlike wgray's. The importance of a child is that of
+docs/path-tracing.md ("The tree over many lights"), compared with the earlier one. The variance is exact: it follows
+from the contribution and the probability of each light, without sampling.
 """
 import argparse
 
@@ -18,7 +21,7 @@ DOWN = np.array([0, 0, -1.0])
 
 
 def walls(chance):
-    """Places on the walls of the room of lamps.py, each as likely as any other, and the normals there."""
+    """Uniformly distributed points on the walls of the room of `lamps.py`, and their normals."""
     size = np.array([4, 8, 3.0])
     areas = np.repeat([size[1] * size[2], size[0] * size[2], size[0] * size[1]], 2)
     wall = chance.choice(6, p=areas / areas.sum(), size=PLACES)
@@ -38,7 +41,7 @@ def split(where, some):
 
 
 def tree(where, some, width):
-    """A lamp's number, or pairs of lamps' numbers and the tree of these."""
+    """The index of a light, or a list of children: pairs of light indices and their subtree."""
     if len(some) == 1:
         return some[0]
     parts = [some]
@@ -52,7 +55,7 @@ def tree(where, some, width):
 
 
 def heights(points, normals, center, flat):
-    """The distance of a sphere's middle, and its height above the planes of lamps and surfaces."""
+    """The distance of a sphere's centre, and its heights above the planes of the light and of the surface."""
     to = center - points
     distance = np.sqrt((to ** 2).sum(-1))
     return distance, -(to @ DOWN) if flat else distance, (to * normals).sum(-1)
@@ -107,7 +110,7 @@ def variance(where, width, importance, points, normals, flat):
     light = cosines / squares * (np.maximum(-(to @ DOWN), 0) / np.sqrt(squares) if flat else 1)
     chances = probabilities(where, width, importance, points, normals, flat)
     if ((light > 1e-12) & (chances == 0)).any():
-        raise SystemExit("a lamp that lights a place is never chosen")
+        raise SystemExit("a light that contributes has probability 0")
     second = np.where(light > 0, light ** 2 / np.maximum(chances, 1e-300), 0).sum(1)
     mean = light.sum(1)
     lit = mean > 1e-3
@@ -123,12 +126,12 @@ def main():
     clumps = [(x, y, 1.5) + 0.05 * chance.standard_normal((100, 3)) for x in (-1, 1) for y in (-3, -1.5, 0, 1.5, 3)]
     places = {"spread over the room": np.array(lamps.places(1000)), "under the ceiling": np.stack(grid, -1).reshape(-1, 3),
               "in ten clumps": np.concatenate(clumps)}
-    print("| a thousand lamps | two children, bounds of cosines | four children | and means of cosines |")
+    print("| a thousand lights | two children, bounds of cosines | four children | and means of cosines |")
     print("| --- | ---: | ---: | ---: |")
     for name, where in places.items():
-        for kind, flat in (("flat ones that shine downwards", True), ("points", False)):
-            ways = [(2, bounded), (4, bounded), (4, means)]
-            cells = [variance(where, width, importance, points, normals, flat) for width, importance in ways]
+        for kind, flat in (("rectangles that face down", True), ("points", False)):
+            variants = [(2, bounded), (4, bounded), (4, means)]
+            cells = [variance(where, width, importance, points, normals, flat) for width, importance in variants]
             print(f"| {kind}, {name} | {' | '.join(cells)} |", flush=True)
 
 

@@ -1,19 +1,21 @@
 #!/usr/bin/env python3
-"""Shows that wgray and Mitsuba see the same scene: the depth and the Phong shading of pixels' centres.
+"""Compares the depth and the Phong shading of wgray at pixel centres with Mitsuba's rays.
 
-    benches/peers/run --install-only        once; scenes of generate.py are there after `run` has timed them
+    benches/peers/run --install-only        once; `run` generates the scenes of generate.py
     target/peers/venv/bin/python benches/peers/mitsuba_check.py [--size N] [--wgray PROGRAM] [--device cpu] SCENE.toml...
 
-Mitsuba's pictures themselves cannot be compared with wgray's: its lights fall off with distance and shine on one side,
-and its samples are random. So Mitsuba traces the rays alone, from pixels' centres to the scene and from there to the centres
-of the light's grid of samples, and Phong's formula is taken in numpy. Compared are, in wgray's picture with one sample a pixel,
+Mitsuba's images cannot be compared directly with wgray's: its lights fall off with distance and are one-sided, and its
+samples are random. Mitsuba therefore only traces the rays, from the pixel centres to the scene and from the hits to the
+centres of the light's sample grid; Phong's formula is evaluated in numpy. The comparison with wgray's image at one
+sample per pixel:
 
-    coverage   which pixels show anything
-    depth      along the ray, within 1e-4 of it, but on silhouettes, where the depth bends by 1 % of the nearest
-    picture    the mean, within 1 %, and the share of pixels within 0.02 in every channel, 97 %, in linear values
+    coverage   the pixels with a hit are the same, except at silhouettes
+    depth      the distance along the ray agrees to a relative 1e-4, except at silhouettes, where the second difference of
+               the depth exceeds 1 % of the smallest depth
+    image      the means agree to 1 %, and 97 % of the pixels to 0.02 in every channel, in linear values
 
-The first scene is compared once more with Mitsuba's camera moved by 0.01, which must fail. Exit status 1 if it does not, or if
-another scene fails. Ellipsoids are compared as Mitsuba's shape `ellipsoids`.
+As a control, the first scene is compared again with Mitsuba's camera moved by 0.01, which must fail. Exit status 1 if
+it does not, or if another scene fails. Ellipsoids are Mitsuba's shape `ellipsoids`.
 """
 import argparse
 import os
@@ -36,7 +38,7 @@ SAMPLES, SIDE = 16, 4
 
 
 def wgray(args, path, size):
-    """Linear RGB and the depth, 0 where nothing is."""
+    """Returns linear RGB and the depth, which is 0 for a miss."""
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, "out.exr")
         subprocess.run([args.wgray, "render", path, "--size", f"{size}x{size}", "--spp", "1", "--light-samples", str(SAMPLES),
@@ -46,7 +48,7 @@ def wgray(args, path, size):
 
 
 def mitsuba(path, size, moved=0):
-    """The same by Mitsuba's rays, and where lights are seen; from a camera that is moved by so much."""
+    """Like `wgray` by Mitsuba's rays, from a camera moved by `moved`; also returns the mask of visible lights."""
     import mitsuba_scenes
     scene = scenes.load(path)
     scene.position = [scene.position[0] + moved, *scene.position[1:]]
@@ -56,7 +58,7 @@ def mitsuba(path, size, moved=0):
     ray, _ = loaded.sensors()[0].sample_ray(0.0, 0.5, film, mi.Point2f(0.5))
     si = loaded.ray_intersect(ray)
     hit = np.array(si.is_valid())
-    # Mitsuba's `t` counts from the near clipping plane, so the distance is taken from the camera.
+    # Mitsuba's `t` is measured from the near clipping plane, so the distance to the camera is computed here.
     origin = np.array(scene.position)
     position = np.array(si.p).T.astype(float)
     depth = np.where(hit, np.linalg.norm(position - origin, axis=-1), 0)
@@ -64,7 +66,7 @@ def mitsuba(path, size, moved=0):
     n = np.array(si.n).T.astype(float)
     n = np.where((np.sum(n * toward, -1) > 0)[:, None], -n, n)
     on_light = np.array(mi.Bool(si.shape.is_emitter())) & hit
-    # materials are told by their diffuse colour
+    # Materials are identified by their diffuse colour.
     materials = list({tuple(s.material.diffuse): s.material for s in scene.shapes}.values())
     albedo = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
     which = np.argmin(abs(albedo[:, None] - np.array([m.diffuse for m in materials])).sum(-1), -1)
@@ -88,7 +90,7 @@ def mitsuba(path, size, moved=0):
 
 
 def silhouettes(depth):
-    """Pixels where the depth is not about linear, a row or a column through them: where another surface begins, or nothing."""
+    """The mask of pixels where the depth is not linear along a row or column: edges of surfaces."""
     a = np.pad(depth, 1, mode="reflect", reflect_type="odd")
     bend = np.maximum(abs(a[2:, 1:-1] - 2 * depth + a[:-2, 1:-1]), abs(a[1:-1, 2:] - 2 * depth + a[1:-1, :-2]))
     return bend > 0.01 * np.where(depth > 0, depth, np.inf).min()

@@ -1,10 +1,10 @@
-"""Rough metal and rough glass as Mitsuba BSDFs that are wgray's models.
+"""wgray's models of rough metal and rough glass as Mitsuba BSDFs.
 
-Mitsuba's `roughconductor` and `roughdielectric` have the same facets, sampled in the same way, and Fresnel's formulas, but facets hide each
-other independently on the way in and out: G = G1(wi) G1(wo) (Walter et al., "Microfacet Models for Refraction through Rough
-Surfaces", EGSR 2007). Here what is reflected has the factor in which high facets are seen from both sides (Heitz, "Understanding the
-Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT 3(2), 2014, equation 99); what is refracted has Walter's. Distribution, sampling,
-Fresnel's formulas and the integrator are Mitsuba's own. `register` is called after the variant is set.
+Mitsuba's `roughconductor` and `roughdielectric` have the same microfacet distribution, sampling and Fresnel formulas,
+but the separable masking-shadowing function G = G1(wi) G1(wo) (Walter et al., "Microfacet Models for Refraction through
+Rough Surfaces", EGSR 2007). These BSDFs use the height-correlated function (Heitz, "Understanding the Masking-Shadowing
+Function in Microfacet-Based BRDFs", JCGT 3(2), 2014, equation 99) for reflection, and the separable one for refraction.
+Distribution, sampling, Fresnel formulas and the integrator are Mitsuba's. Call `register` after setting the variant.
 """
 import drjit as dr
 import mitsuba as mi
@@ -13,11 +13,11 @@ CONDUCTOR, DIELECTRIC = "correlated_conductor", "correlated_dielectric"
 
 
 def register():
-    def facets(props):
+    def distribution(props):
         return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, float(props["alpha_u"]), float(props["alpha_v"]), True)
 
-    def seen(distribution, a, b, m):
-        """The share of facets that are seen from both."""
+    def correlated_g2(distribution, a, b, m):
+        """The height-correlated masking-shadowing function."""
         ga, gb = distribution.smith_g1(a, m), distribution.smith_g1(b, m)
         return dr.select((ga > 0) & (gb > 0), ga * gb / (ga + gb - ga * gb), 0)
 
@@ -32,18 +32,18 @@ def register():
             return type(self).__name__
 
     class Conductor(Rough):
-        """One-sided. Reflects `color`, or what the three indices `eta` and `k` give."""
+        """One-sided. The reflectance is `color`, times that of the three complex indices `eta` + i `k` if given."""
 
         def __init__(self, props):
             mi.BSDF.__init__(self, props)
-            self.facets = facets(props)
+            self.distribution = distribution(props)
             self.color = props.get_texture("color")
             self.index = [mi.Complex2f(float(props[f"eta{i}"]), float(props[f"k{i}"])) for i in range(3)] if "eta0" in props else None
             self.m_components = [mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide]
             self.m_flags = self.m_components[0]
 
         def sample(self, ctx, si, which, at, active=True):
-            m, _ = self.facets.sample(si.wi, at)
+            m, _ = self.distribution.sample(si.wi, at)
             bs = dr.zeros(mi.BSDFSample3f)
             bs.wo, bs.eta = mi.reflect(si.wi, m), 1
             bs.sampled_component, bs.sampled_type = mi.UInt32(0), mi.UInt32(+mi.BSDFFlags.GlossyReflection)
@@ -57,21 +57,21 @@ def register():
             fresnel = self.color.eval(si, active)
             if self.index:
                 fresnel *= mi.Color3f(*(mi.fresnel_conductor(mi.Float(cosine), index) for index in self.index))
-            value = fresnel * (self.facets.eval(m) * seen(self.facets, si.wi, wo, m) / (4 * mi.Frame3f.cos_theta(si.wi)))
-            density = self.facets.pdf(si.wi, m) / (4 * dr.dot(wo, m))
+            value = fresnel * (self.distribution.eval(m) * correlated_g2(self.distribution, si.wi, wo, m) / (4 * mi.Frame3f.cos_theta(si.wi)))
+            density = self.distribution.pdf(si.wi, m) / (4 * dr.dot(wo, m))
             return dr.select(active, value, 0), dr.select(active, density, 0)
 
     class Dielectric(Rough):
         def __init__(self, props):
             mi.BSDF.__init__(self, props)
-            self.facets, self.ior = facets(props), float(props["int_ior"])
+            self.distribution, self.ior = distribution(props), float(props["int_ior"])
             self.color = props.get_texture("color")
             sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
             self.m_components = [mi.BSDFFlags.GlossyReflection | sides, mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.NonSymmetric | sides]
             self.m_flags = self.m_components[0] | self.m_components[1]
 
         def sample(self, ctx, si, which, at, active=True):
-            m, _ = self.facets.sample(dr.mulsign(si.wi, mi.Frame3f.cos_theta(si.wi)), at)
+            m, _ = self.distribution.sample(dr.mulsign(si.wi, mi.Frame3f.cos_theta(si.wi)), at)
             reflected, cosine, eta, inverse = mi.fresnel(dr.dot(si.wi, m), mi.Float(self.ior))
             mirrors = which <= reflected
             bs = dr.zeros(mi.BSDFSample3f)
@@ -92,15 +92,15 @@ def register():
             m = dr.mulsign(m, mi.Frame3f.cos_theta(m))
             to_i, to_o = dr.dot(si.wi, m), dr.dot(wo, m)
             active &= (to_i * i > 0) & (to_o * o > 0)
-            d = self.facets.eval(m)
+            d = self.distribution.eval(m)
             reflected = mi.fresnel(to_i, mi.Float(self.ior))[0]
-            apart = self.facets.smith_g1(si.wi, m) * self.facets.smith_g1(wo, m)
+            separable = self.distribution.smith_g1(si.wi, m) * self.distribution.smith_g1(wo, m)
             bend = (to_i + eta * to_o) ** 2
-            mirrored = reflected * d * seen(self.facets, si.wi, wo, m) / (4 * dr.abs(i))
-            # of radiance, which the square of the index scales
-            refracted = (1 - reflected) * d * apart * dr.abs(to_i * to_o / (i * bend))
+            mirrored = reflected * d * correlated_g2(self.distribution, si.wi, wo, m) / (4 * dr.abs(i))
+            # For radiance, which scales with the square of the relative index.
+            refracted = (1 - reflected) * d * separable * dr.abs(to_i * to_o / (i * bend))
             value = dr.select(mirrors, mi.Color3f(mirrored), self.color.eval(si, active) * refracted)
-            visible = self.facets.pdf(dr.mulsign(si.wi, i), m)
+            visible = self.distribution.pdf(dr.mulsign(si.wi, i), m)
             density = visible * dr.select(mirrors, reflected / (4 * dr.abs(to_o)), (1 - reflected) * eta * eta * dr.abs(to_o) / bend)
             return dr.select(active, value, 0), dr.select(active, density, 0)
 

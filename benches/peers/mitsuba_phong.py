@@ -1,7 +1,7 @@
-"""Phong's reflection as a Mitsuba BSDF, which has none: f = kd / pi + ks (n + 2) / (2 pi) cos^n alpha.
+"""The Phong BRDF as a Mitsuba BSDF: f = kd / pi + ks (n + 2) / (2 pi) cos^n alpha.
 
-alpha is the angle to the mirrored direction. `register` is called after the variant is set, and returns the plugin's name. The
-lobes are chosen by the means of kd and ks. One-sided, so Mitsuba's `twosided` is put around it.
+alpha is the angle to the mirror direction. Call `register` after setting the variant; it returns the plugin's name. A
+lobe is selected with a probability proportional to the mean of kd or ks. One-sided: wrap it in Mitsuba's `twosided`.
 """
 import drjit as dr
 import mitsuba as mi

@@ -1,23 +1,24 @@
 #!/usr/bin/env python3
-"""Renders a wgray scene's geometry with Mitsuba 3 and prints one JSON line with the times.
+"""Renders a wgray scene with Mitsuba 3 and prints one JSON line with the times.
 
     DRJIT_LIBLLVM_PATH=... python mitsuba_scenes.py SCENE.toml [--size N] [--spp N] [--light-samples N] [--warm N] [-o FILE]
 
-Direct light only, LIGHT_SAMPLES shadow rays to every light at every hit (what wgray's Phong integrator does, with cheaper
-shading: diffuse). Mitsuba chooses a light at random for each of its `emitter_samples`, so it gets LIGHT_SAMPLES times
-the number of lights. `load_s` is the time to read the scene's files and to build Embree's trees, `first_s` the first render,
-which compiles, `warm_s` the median of WARM more; --warm 0 with -o is what a user's script does, the whole process.
+Direct light only, with LIGHT_SAMPLES shadow rays per light and hit: the work of wgray's Phong integrator with cheaper,
+diffuse shading. Mitsuba chooses a light at random for each of its `emitter_samples`, so it gets LIGHT_SAMPLES times the
+number of lights. `load_s` is the time to read the scene's files and to build Embree's BVHs, `first_s` that of the first
+render, including compilation, `warm_s` the median of WARM further renders. --warm 0 with -o is the whole process, as in
+a user's script.
 
-With --integrator path it renders a scene of the path tracer: `path`, or `volpath` where glass absorbs, with a depth of one more
-than `max_depth`, as Mitsuba counts what is seen and wgray bounces. Its BSDFs are Mitsuba's own but for Phong's, which it has
-not got and which stands here in Python. `emission` is an area light on the outer side of a closed shape, and two of them back
-to back for a rectangle, a disk and a triangle. Meshes that shine must be closed. --seed 0 is that of the first picture.
+With --integrator path it renders a scene of the path tracer: with `path`, or with `volpath` if glass absorbs. The depth
+is `max_depth` + 1, because Mitsuba also counts the segment from the camera. The BSDFs are Mitsuba's, except Phong's,
+which it lacks (mitsuba_phong.py). `emission` becomes an area light on the outer side of a closed shape, and two of them
+back to back for a rectangle, a disk and a triangle. Emissive meshes must be closed. --seed is that of the first image.
 
-Mitsuba's `sphere` takes no unequal axes and no shear. Where a scene has ellipsoids, --ellipsoids says what stands for them:
-    spheres   a sphere of the same volume; Mitsuba's fastest for few
-    exact     Mitsuba's shape `ellipsoids`, made for splatting: one for all ellipsoids of a material; its fastest for many
+Mitsuba's `sphere` supports neither unequal axes nor shear. --ellipsoids selects the replacement of ellipsoids:
+    spheres   a sphere of the same volume; fastest in Mitsuba for few ellipsoids
+    exact     Mitsuba's shape `ellipsoids`, made for splatting, one per material; fastest in Mitsuba for many ellipsoids
     mesh      a fine mesh with the ellipsoid's normals; spheres stay spheres
-    auto      spheres for up to 1,000 ellipsoids, else exact (default)
+    auto      spheres for up to 1,000 ellipsoids, otherwise exact (default)
 An infinite plane becomes a rectangle of half side 1000. Meshes of one file and material are instances of one shape group.
 """
 import argparse
@@ -37,13 +38,15 @@ import mitsuba_ggx
 import mitsuba_phong
 import scenes
 
-MOST_SPHERES = 1000
-APART = 2e-5  # of the two sides of a rectangle, disk or triangle that shines: at 5e-4 what is near them is visibly brighter
+MAX_SPHERES = 1000
+# Distance of an emissive rectangle, disk or triangle from each of its two sides: at 5e-4 nearby surfaces are visibly
+# brighter.
+SIDE_OFFSET = 2e-5
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0, 0, 0]}}
 
 
 def tint(value):
-    """A colour as Mitsuba's texture; its checkers repeat after two squares, as ours do, but within 0 to 1."""
+    """A colour as a Mitsuba texture. Its checkers repeat after two squares as ours do, but over a uv interval of 1."""
     if isinstance(value, scenes.Checker):
         u, v = value.scale
         return {"type": "checkerboard", "color0": tint(value.even), "color1": tint(value.odd),
@@ -69,13 +72,13 @@ def paint(material, traced, exact):
         elif any(material.alpha):
             plugin |= {"type": "roughconductor", "distribution": "ggx"} | microfacets(*material.alpha)
     elif material.kind == "principled":
-        # The metal alone is the same where it is so smooth that facets hide little and reflect once: GGX, with Schlick's formula. Disney's
-        # diffuse term, its specular part, its glass, clearcoat and sheen are others than glTF's, and as much work.
+        # Only the metal agrees, at roughnesses with little masking and multiple scattering: GGX with Schlick's formula.
+        # Disney's diffuse term, specular lobe, glass, clearcoat and sheen differ from glTF's; their cost is comparable.
         along, across = (float(alpha) for alpha in material.alpha)
-        streaks = {"anisotropic": (1 - across / along) / 0.9} if along > across else {}
+        anisotropy = {"anisotropic": (1 - across / along) / 0.9} if along > across else {}
         plugin = {"type": "principled", "base_color": tint(material.color), "metallic": float(material.metallic),
                   "roughness": (along * across) ** 0.25, "specular": 0.5, "clearcoat": float(material.coat[0]),
-                  "clearcoat_gloss": 1.0 - material.coat[1]} | streaks
+                  "clearcoat_gloss": 1.0 - material.coat[1]} | anisotropy
     elif material.thin:
         return {"type": "thindielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": tint(material.color)}
     else:
@@ -89,7 +92,7 @@ def paint(material, traced, exact):
 
 
 def wide(value):
-    """Three numbers that may be above 1."""
+    """Three numbers that may exceed 1."""
     return {"type": "rgb", "value": value}
 
 
@@ -97,9 +100,12 @@ def microfacets(along, across):
     return {"alpha_u": float(along), "alpha_v": float(across)}
 
 
-def surroundings(T, environment):
-    """A colour, or an image, whose rows of texels Mitsuba has at even angles from pole to pole and wgray in the middles of as many bands: with
-    twice as many rows and one more each of wgray's is there, and what lies between two is their mean in both."""
+def environment_emitter(T, environment):
+    """A constant or an image environment.
+
+    Mitsuba's rows of texels are at equal angles from pole to pole, wgray's at the centres of bands. With 2 n + 1 rows
+    Mitsuba's include wgray's n rows; the rows in between are means, which both interpolate linearly.
+    """
     if not isinstance(environment, scenes.Map):
         return {"type": "constant", "radiance": tint(environment)}
     rows = np.array(mi.Bitmap(environment.file).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
@@ -135,7 +141,7 @@ def sphere(T, s):
 
 
 def round_mesh(T, s, path, rows=256):
-    """A sphere, or for unequal axes a mesh so fine that its facets do not matter, shaded by the ellipsoid's normals."""
+    """A sphere, or for unequal axes a mesh of negligible tessellation error with the ellipsoid's normals."""
     axes = np.array([s.a, s.b, s.c], float)
     if np.allclose(axes @ axes.T, np.eye(3) * np.dot(axes[0], axes[0]), atol=1e-9):
         return sphere(T, s)
@@ -152,24 +158,24 @@ def round_mesh(T, s, path, rows=256):
 
 
 def both_sides(T, s, path):
-    """The two one-sided shapes of a shape without an inside that shines: the second is turned over by exchanging its edges."""
+    """The two one-sided shapes of an open emissive shape; the second is flipped by exchanging its edges."""
     if any(isinstance(c, scenes.Checker) and c.scale[0] != c.scale[1] for c in (s.material.color, s.material.diffuse, s.material.emission)):
-        raise ValueError("a checker on a shape that shines needs one scale for u and v")
+        raise ValueError("a checker on an emissive shape needs equal scales for u and v")
     if isinstance(s, scenes.Triangles):
         a, b, c = np.array(s.vertices, float)
         n = np.cross(b - a, c - a)
-        n *= APART / np.linalg.norm(n)
+        n *= SIDE_OFFSET / np.linalg.norm(n)
         return [triangles([a + n, b + n, c + n], [(0, 1, 2)], path + "-front.ply"),
                 triangles([a - n, c - n, b - n], [(0, 1, 2)], path + "-back.ply")]
     kind = "disk" if isinstance(s, scenes.Disk) else "rectangle"
     n = np.cross(s.u, s.v)
-    n *= APART / np.linalg.norm(n)
+    n *= SIDE_OFFSET / np.linalg.norm(n)
     return [rectangle(T, s.center + n, s.u, s.v, kind), rectangle(T, s.center - n, s.v, s.u, kind)]
 
 
 def ellipsoids(shapes):
-    """One shape for all of them."""
-    # any linear image of the sphere is that of orthogonal half axes: the singular value decomposition's
+    """One shape for all ellipsoids of a material."""
+    # The singular value decomposition gives orthogonal half axes of the same ellipsoid.
     turns, scales, _ = np.linalg.svd(np.array([[s.a, s.b, s.c] for s in shapes], float).transpose(0, 2, 1))
     turns *= np.linalg.det(turns)[:, None, None]
     return {"type": "ellipsoids", "centers": rows([s.center for s in shapes]), "scales": rows(scales),
@@ -184,7 +190,7 @@ def quaternion(turn):
     w = np.sqrt(max(0, 1 + np.trace(turn))) / 2
     if w > 1e-6:
         x, y, z = (turn[2, 1] - turn[1, 2]) / (4 * w), (turn[0, 2] - turn[2, 0]) / (4 * w), (turn[1, 0] - turn[0, 1]) / (4 * w)
-    else:  # half a turn about the axis that stays
+    else:  # half a turn about the eigenvector of 1
         w, (x, y, z) = 0, np.linalg.eigh(turn + turn.T)[1][:, -1]
     return [x, y, z, w]
 
@@ -192,8 +198,8 @@ def quaternion(turn):
 def mesh_file(s):
     kind = os.path.splitext(s.file)[1]
     if kind not in (".ply", ".obj"):
-        raise ValueError(f"{s.file}: the peers' meshes are PLY or OBJ files")
-    # Without a word on normals, wgray's are the file's or flat, Mitsuba's the file's or smooth: our files have none.
+        raise ValueError(f"{s.file}: other renderers support only PLY and OBJ files")
+    # If a file has no normals, as ours, wgray's default is flat, Mitsuba's is smooth.
     return {"type": kind[1:], "filename": s.file, "face_normals": s.normals in (None, "flat")}
 
 
@@ -207,7 +213,7 @@ def sensor(T, scene, width, height, spp):
                       "focus_distance": float(distance)}
     if scene.height_seen is None:
         return row | {"type": "perspective", "fov": scene.fov, "fov_axis": "y", "to_world": place}
-    # Mitsuba's orthographic camera sees from -1 to 1 along x, and along y by the picture's shape
+    # Mitsuba's orthographic camera sees -1 to 1 along x, and along y the same divided by the aspect ratio.
     half = scene.height_seen / 2 * width / height
     return row | {"type": "orthographic", "near_clip": 1e-4, "to_world": place @ T().scale([half, half, 1])}
 
@@ -216,14 +222,14 @@ def lights(T, scene):
     for l in scene.lights:
         if isinstance(l, scenes.Point):
             yield {"type": "point", "position": l.position, "intensity": tint(l.color)}
-        elif isinstance(l, scenes.Spot):
+        elif isinstance(l, scenes.SpotLight):
             other = np.eye(3)[int(np.argmin(np.abs(l.direction)))]
             place = T().look_at(origin=l.position, target=list(np.add(l.position, l.direction)), up=list(other))
             yield {"type": "spot", "to_world": place, "intensity": tint(l.color), "cutoff_angle": l.angle, "beam_width": 0.9999 * l.angle}
         elif isinstance(l, scenes.Sun):
             yield {"type": "directional", "direction": l.direction, "irradiance": tint(l.color)}
         else:
-            # Mitsuba's radiance falls off with distance and the cosine at the light; 20 makes the phong picture about as bright.
+            # Mitsuba's light falls off with distance and the cosine at the light; 20 gives about the same brightness.
             radiance = l.color if scene.integrator == "path" else scenes.scaled(l.color, 20)
             yield rectangle(T, l.center, l.u, l.v) | {"bsdf": BLACK, "emitter": {"type": "area", "radiance": tint(radiance)}}
 
@@ -236,7 +242,7 @@ def integrator(scene, light_samples):
 
 
 def load(scene, size, spp, light_samples, curved="auto", exact=False):
-    """Mitsuba's scene; `curved` is as --ellipsoids has it. `exact`: rough metal and glass as wgray has them (mitsuba_ggx.py)."""
+    """The Mitsuba scene; `curved` is the value of --ellipsoids. `exact`: use wgray's rough BSDFs (mitsuba_ggx.py)."""
     T = mi.ScalarTransform4f
     folder = tempfile.mkdtemp()
     width, height = size or (scene.width, scene.height)
@@ -246,24 +252,24 @@ def load(scene, size, spp, light_samples, curved="auto", exact=False):
         mitsuba_ggx.register()
     parts = {"type": "scene", "integrator": integrator(scene, light_samples), "sensor": sensor(T, scene, width, height, spp)}
     if scene.environment and (isinstance(scene.environment, scenes.Map) or any(scene.environment)):
-        parts["environment"] = surroundings(T, scene.environment)
-    bsdfs = {}  # by the material, so that shapes share them
+        parts["environment"] = environment_emitter(T, scene.environment)
+    bsdfs = {}  # by material, so that shapes share them
 
     def painted(row, material):
         name = bsdfs.setdefault(id(material), f"material{len(bsdfs)}")
         parts.setdefault(name, paint(material, traced, exact))
         row = row | {"bsdf": {"type": "ref", "id": name}}
-        if shines(material):
+        if is_emissive(material):
             row["emitter"] = {"type": "area", "radiance": tint(material.emission)}
         if material.absorption and any(material.absorption):
-            most = max(material.absorption)  # colours of a medium are at most 1, its scale is free; at 0 Mitsuba has no numbers
+            most = max(material.absorption)  # a medium's colours are at most 1, its scale is free; 0 gives NaN
             row["interior"] = {"type": "homogeneous", "albedo": tint([0, 0, 0]), "scale": float(most),
                                "sigma_t": tint([max(a / most, 1e-6) for a in material.absorption])}
         return row
 
     ellipses = [s for s in scene.shapes if isinstance(s, scenes.Ellipsoid)]
     if curved == "auto":
-        curved = "exact" if len(ellipses) > MOST_SPHERES else "spheres"
+        curved = "exact" if len(ellipses) > MAX_SPHERES else "spheres"
     together = collections.defaultdict(list)
     for s in ellipses if curved == "exact" else []:
         together[id(s.material)].append(s)
@@ -275,8 +281,8 @@ def load(scene, size, spp, light_samples, curved="auto", exact=False):
         path = os.path.join(folder, str(i))
         checked = any(isinstance(c, scenes.Checker) for c in vars(s.material).values())
         if checked and not isinstance(s, scenes.Quad):
-            raise ValueError("the peers' checkers are on rectangles alone")
-        if shines(s.material) and (isinstance(s, (scenes.Quad, scenes.Disk)) or isinstance(s, scenes.Triangles) and len(s.faces) == 1):
+            raise ValueError("other renderers support checkers only on rectangles")
+        if is_emissive(s.material) and (isinstance(s, (scenes.Quad, scenes.Disk)) or isinstance(s, scenes.Triangles) and len(s.faces) == 1):
             for side, row in zip(("front", "back"), both_sides(T, s, path)):
                 parts[f"shape{i}{side}"] = painted(row, s.material)
             continue
@@ -291,7 +297,7 @@ def load(scene, size, spp, light_samples, curved="auto", exact=False):
         elif isinstance(s, scenes.Mesh):
             key = (s.file, id(s.material))
             place = T(np.array([*s.to_world, [0, 0, 0, 1]]))
-            if uses[key] == 1 or shines(s.material):  # no instance of Mitsuba's may shine
+            if uses[key] == 1 or is_emissive(s.material):  # Mitsuba has no emissive instances
                 row = mesh_file(s) | {"to_world": place}
             else:
                 if key not in groups:
@@ -310,7 +316,7 @@ def load(scene, size, spp, light_samples, curved="auto", exact=False):
     return mi.load_dict(parts)
 
 
-def shines(material):
+def is_emissive(material):
     return isinstance(material.emission, scenes.Checker) or any(material.emission or [])
 
 
@@ -321,12 +327,12 @@ def main():
     parser.add_argument("--variant", default="llvm_ad_rgb")
     parser.add_argument("--size", type=int)
     parser.add_argument("--spp", type=int, default=16)
-    parser.add_argument("--light-samples", type=int, default=16, help="to every light")
+    parser.add_argument("--light-samples", type=int, default=16, help="per light")
     parser.add_argument("--warm", type=int, default=5)
-    parser.add_argument("--seed", type=int, default=0, help="of the first picture; each more has the next one")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first image; each further image uses the next one")
     parser.add_argument("--ellipsoids", choices=["auto", "spheres", "exact", "mesh"], default="auto")
-    parser.add_argument("-o", "--output", help="the last picture")
-    parser.add_argument("--each", metavar="FOLDER", help="write every warm picture there, named by its seed")
+    parser.add_argument("-o", "--output", help="file of the last image")
+    parser.add_argument("--each", metavar="FOLDER", help="write each warm image to this folder, named by its seed")
     args = parser.parse_args()
 
     mi.set_variant(args.variant)
@@ -339,15 +345,15 @@ def main():
     times = []
     for n in range(1 + args.warm):
         start = time.perf_counter()
-        picture = mi.render(loaded, spp=args.spp, seed=args.seed + n)
-        image = np.array(picture)  # waits for the picture
+        render = mi.render(loaded, spp=args.spp, seed=args.seed + n)
+        image = np.array(render)  # waits for the result
         times.append(time.perf_counter() - start)
         if args.each and n:
-            mi.util.write_bitmap(os.path.join(args.each, f"{args.seed + n}.exr"), picture, write_async=False)
+            mi.util.write_bitmap(os.path.join(args.each, f"{args.seed + n}.exr"), render, write_async=False)
     if not np.isfinite(image).all() or not image.mean() > 0.01 and min(size) > 1:
-        sys.exit("Mitsuba's picture is black or not finite")
+        sys.exit("Mitsuba's image is black or not finite")
     if args.output:
-        mi.util.write_bitmap(args.output, picture, write_async=False)
+        mi.util.write_bitmap(args.output, render, write_async=False)
     total = args.light_samples * len(scene.lights)
     print(json.dumps({"renderer": f"Mitsuba {mi.__version__} {args.variant}", "width": size[0], "height": size[1],
                       "pixel_samples": args.spp, "light_samples": total, "load_s": load_s, "first_s": times[0],

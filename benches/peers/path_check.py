@@ -1,25 +1,26 @@
 #!/usr/bin/env python3
-"""Shows that wgray's path tracer and Mitsuba's compute the same pictures: that each pixel's mean is the same.
+"""Tests that wgray's path tracer and Mitsuba's have the same expected value in each pixel.
 
     benches/peers/run --install-only                                    once
     target/peers/venv/bin/python benches/peers/path_check.py            all scenes, on the CPU
-    ... path_check.py --device lavapipe --scenes diffuse,glass --save target/peers/pictures
-    ... path_check.py --wgray none                                      Mitsuba against itself, with other seeds
-    ... path_check.py --wrong 1.02                                      wgray's pictures times 1.02: every scene must fail
+    ... path_check.py --device lavapipe --scenes diffuse,glass --save target/peers/images
+    ... path_check.py --wgray none                                      Mitsuba against itself, with different seeds
+    ... path_check.py --wrong 1.02                                      wgray's images times 1.02: every scene must fail
 
-The scenes are those of path_scenes.py and scenes/cornell-path.toml. Each is rendered BATCHES times by both, with a seed each
-time, so that mean and variance of every pixel are known. Welch's t-test compares the means at three levels: pixels, blocks of
-8 x 8 pixels and the whole picture, each channel by itself. p-values are corrected for the number of tests of a level (Šidák),
-and the bound of 1 % for the number of levels and scenes, so that a run without faults fails once in a hundred seeds. The
-standard error is taken to be at least 1e-5 of the mean, for the rounding where both are without noise, and 1e-4 where a map
-is seen. Rough metal and glass are mitsuba_ggx.py's. A scene also fails
+The scenes are those of path_scenes.py and scenes/cornell-path.toml. Both renderers render each BATCHES times with
+different seeds, to estimate mean and variance of every pixel. Welch's t-test compares the means at three levels:
+pixels, blocks of 8 x 8 pixels and the whole image, per channel. p-values are corrected for the number of tests of a
+level (Šidák), and the bound of 1 % for the number of levels and scenes, so that a run without faults fails for one of a
+hundred seeds. The standard error is at least 1e-5 of the mean, for rounding errors where both renderers are free of
+noise, and 1e-4 where an environment map is visible. Rough metal and glass are those of mitsuba_ggx.py. A scene also
+fails
 
-    with more than twice as many pixels rejected at 1 % as chance gives
-    if its whole picture, multiplied by --control (1.02), would pass: then the test saw nothing; black pictures fail so too
-    for the course's files: if a block is off by more than 2 %, or the whole by more than 0.5 %
+    if more than twice as many pixels are rejected at 1 % as expected by chance
+    if the whole image, multiplied by --control (1.02), would pass: the test is too insensitive; black images fail this
+    for the course scenes: if a block differs by more than 2 %, or the whole image by more than 0.5 %
 
-Exit status 1 if any scene fails. --save writes for each scene a picture of ours, Mitsuba's, and red and blue where ours
-is brighter or darker (10 standard errors are full colour).
+Exit status 1 if any scene fails. --save writes an image per scene: wgray's, Mitsuba's, and their difference, red where
+wgray is brighter, blue where it is darker (full colour at 10 standard errors).
 """
 import argparse
 import dataclasses
@@ -44,14 +45,15 @@ import path_scenes
 import scenes
 
 LEVEL, BLOCK, ROUNDING = 0.01, 8, 1e-5
-MORE_ROUNDING = 1e-4  # where a map is seen: between its texels Mitsuba is off by as much
-# Mitsuba chooses among lights without regard to their power: with few samples its means are so skewed that t-tests reject more
+MORE_ROUNDING = 1e-4  # for visible environment maps: the error of Mitsuba's interpolation between texels
+# Mitsuba selects lights uniformly, regardless of their power. With few samples the distribution of the means is so
+# skewed that t-tests reject too often.
 MORE_SAMPLES = {"many-lights": 8}
 
 
 @dataclasses.dataclass
 class Means:
-    """The means of a picture's parts over the batches, and their squared standard errors."""
+    """The means over the batches of each part of an image, and their squared standard errors."""
     mean: np.ndarray
     square: np.ndarray
     count: int
@@ -68,7 +70,7 @@ def blocks(batches):
 
 
 def welch(ours, theirs, rounding=ROUNDING):
-    """t and the two-sided p-value of each part."""
+    """Returns t and the two-sided p-value of each part."""
     floor = (rounding * (abs(ours.mean) + abs(theirs.mean)) / 2) ** 2 + 1e-18
     a, b = ours.square, theirs.square
     free = (a + b) ** 2 / np.maximum(a ** 2 / (ours.count - 1) + b ** 2 / (theirs.count - 1), 1e-300)
@@ -78,12 +80,12 @@ def welch(ours, theirs, rounding=ROUNDING):
 
 
 def sidak(p):
-    """The lowest p-value, corrected for the number of tests."""
+    """Returns the lowest p-value, corrected for the number of tests."""
     return float(-np.expm1(p.size * np.log1p(-min(p.min(), 1 - 1e-16))))
 
 
 def wgray(args, path, seeds, size, spp):
-    pictures = []
+    images = []
     environment = os.environ | ({"RAYON_NUM_THREADS": str(args.threads)} if args.threads else {})
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, "out.exr")
@@ -93,10 +95,11 @@ def wgray(args, path, seeds, size, spp):
             done = subprocess.run(command, env=environment, capture_output=True, text=True)
             if done.returncode:
                 raise RuntimeError(f"wgray ended with {done.returncode}: {done.stderr.strip()[-1000:]}")
-            channels = OpenEXR.File(out, separate_channels=True).channels()  # Mitsuba's reader stops for ever where it has one thread
-            pictures.append(np.stack([channels[c].pixels for c in "RGB"], -1).astype(float))
+            # Not Mitsuba's reader, which hangs with one thread.
+            channels = OpenEXR.File(out, separate_channels=True).channels()
+            images.append(np.stack([channels[c].pixels for c in "RGB"], -1).astype(float))
             os.remove(out)
-    return np.array(pictures)
+    return np.array(images)
 
 
 def mitsuba(args, path, seeds, size, spp):
@@ -106,16 +109,16 @@ def mitsuba(args, path, seeds, size, spp):
 
 
 def save(folder, name, ours, theirs, t):
-    """Three pictures side by side, two of them as they would be displayed."""
+    """Writes three images side by side: both renders, gamma-encoded, and the difference."""
     folder.mkdir(parents=True, exist_ok=True)
-    shown = [np.clip(m, 0, 1) ** (1 / 2.2) for m in (ours.mean, theirs.mean)]
+    display = [np.clip(m, 0, 1) ** (1 / 2.2) for m in (ours.mean, theirs.mean)]
     t = np.clip(t.mean(-1) / 10, -1, 1)
     signs = 0.5 + np.stack([t, -abs(t), -t], -1) / 2
-    mi.Bitmap((np.concatenate([*shown, signs], 1) * 255).astype(np.uint8)).write(str(folder / f"{name}.png"))
+    mi.Bitmap((np.concatenate([*display, signs], 1) * 255).astype(np.uint8)).write(str(folder / f"{name}.png"))
 
 
 def check(args, name, path, bound):
-    """Prints a row of the table; returns whether all is well."""
+    """Prints a row of the table; returns whether the scene passes."""
     started = time.monotonic()
     course = str(path).endswith(".json")
     size, spp = ((args.course_size, args.course_spp) if course else (args.size, args.spp * MORE_SAMPLES.get(name, 1)))
@@ -129,7 +132,7 @@ def check(args, name, path, bound):
         return False
     ours *= args.wrong
     if not np.isfinite(ours).all() or not np.isfinite(theirs).all():
-        print(f"{name:22} FAILS: not all pixels are finite", flush=True)
+        print(f"{name:22} FAILS: non-finite pixels", flush=True)
         return False
     faults, lowest = [], []
     rounding = MORE_ROUNDING if name.startswith("map") else ROUNDING
@@ -165,28 +168,30 @@ def check(args, name, path, bound):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", help="names, separated by commas, or course: the three files in JSON; all if absent")
-    parser.add_argument("--wgray", default=str(install.ROOT / "target/release/wgray"), help="the program; none: Mitsuba in its place")
+    parser.add_argument("--scenes", help="names, separated by commas, or course: the three JSON scenes; default: all")
+    parser.add_argument("--wgray", default=str(install.ROOT / "target/release/wgray"),
+                        help="the program, or none: Mitsuba instead")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--size", type=int, default=96)
-    parser.add_argument("--spp", type=int, default=64, help="of one batch")
+    parser.add_argument("--spp", type=int, default=64, help="samples per pixel and batch")
     parser.add_argument("--batches", type=int, default=16)
     parser.add_argument("--course-size", type=int, default=96)
     parser.add_argument("--course-spp", type=int, default=512)
     parser.add_argument("--course-batches", type=int, default=48)
-    parser.add_argument("--seed", type=int, default=1, help="wgray's first; Mitsuba's are from 1001")
-    parser.add_argument("--wrong", type=float, default=1, help="a factor of wgray's pictures, which must be found")
-    parser.add_argument("--control", type=float, default=1.02, help="the factor that each scene must be able to tell from 1")
-    parser.add_argument("--own-facets", action="store_true", help="Mitsuba's own rough metal and glass, whose facets hide each other otherwise")
+    parser.add_argument("--seed", type=int, default=1, help="first seed of wgray; Mitsuba's start at 1001")
+    parser.add_argument("--wrong", type=float, default=1, help="factor on wgray's images, which must be detected")
+    parser.add_argument("--control", type=float, default=1.02, help="the factor that the test of each scene must detect")
+    parser.add_argument("--own-facets", action="store_true",
+                        help="use Mitsuba's own rough BSDFs, with the separable masking-shadowing function")
     parser.add_argument("--variant", default="llvm_ad_rgb")
-    parser.add_argument("--threads", type=int, help="all if absent")
+    parser.add_argument("--threads", type=int, help="default: all")
     parser.add_argument("--save", metavar="FOLDER", type=pathlib.Path)
     args = parser.parse_args()
     for name, least in (("size", BLOCK), ("batches", 4), ("course_size", BLOCK), ("course_batches", 4), ("spp", 1), ("course_spp", 1)):
         if getattr(args, name) < least:
             parser.error(f"--{name.replace('_', '-')}: {getattr(args, name)} must be at least {least}")
     if not 0 <= args.seed <= 1000 - max(args.batches, args.course_batches) + 1:
-        parser.error(f"--seed: {args.seed} must leave 1001 and more to Mitsuba")
+        parser.error(f"--seed: {args.seed} the seeds from 1001 are reserved for Mitsuba")
 
     mi.set_variant(args.variant)
     mi.set_log_level(mi.LogLevel.Error)

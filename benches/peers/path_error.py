@@ -1,9 +1,9 @@
-"""Prints the errors of the EXR pictures in a folder as JSON: `relative`, `absolute`; null if there are fewer than two pictures.
+"""Prints the errors of the EXR images in a folder as JSON: `relative`, `absolute`; null for fewer than two images.
 
-Both are roots of means over the pixels: of the variance, and of the variance divided by the squared mean (plus 1e-4, for the
-dark), each summed over the channels first. The pictures have the same expectation and independent noise, so a pixel's variance
-over them is the mean square of what one differs by from what they all converge to. The absolute error is mostly that of the
-pixels at the edges of a light that is seen, so the relative one is compared.
+`absolute` is the root of the mean over the pixels of the variance, `relative` that of the variance divided by the
+squared mean (plus 1e-4, for dark pixels); both are summed over the channels first. The images have the same expected
+value and independent noise, so the variance of a pixel over the images is the mean squared error of one image. The
+absolute error is dominated by the pixels at the edges of visible lights, so the relative error is compared.
 """
 import json
 import pathlib
@@ -15,11 +15,11 @@ import OpenEXR
 count, mean, square = 0, 0, 0
 for path in sorted(pathlib.Path(sys.argv[1]).glob("*.exr")):
     channels = OpenEXR.File(str(path), separate_channels=True).channels()
-    picture = np.stack([channels[c].pixels for c in "RGB"], -1).astype(float)
+    image = np.stack([channels[c].pixels for c in "RGB"], -1).astype(float)
     count += 1
-    step = picture - mean
+    step = image - mean
     mean = mean + step / count
-    square = square + step * (picture - mean)
+    square = square + step * (image - mean)
 if count < 2:
     print("null")
 else:

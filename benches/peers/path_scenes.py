@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Writes the scenes by which path_check.py holds wgray's path tracer against Mitsuba's, with their meshes.
+"""Writes the scenes of path_check.py, which compares wgray's path tracer with Mitsuba's, and their meshes.
 
     python path_scenes.py FOLDER
 
-TOML files of 96 x 96 pixels lie in FOLDER, the course's three files in JSON in FOLDER/configs, their meshes in FOLDER/assets.
-The course's dragon and bunny are not passed on: bumpy closed meshes of about their size and place stand for them.
-`ray_differentials` is off, as Mitsuba does not filter its checkers.
+TOML files of 96 x 96 pixels are written to FOLDER, the three JSON files of the course to FOLDER/configs, their meshes
+to FOLDER/assets. The course's dragon and bunny are not redistributed: bumpy closed meshes of similar size and position
+replace them. `ray_differentials` is off, because Mitsuba does not filter its checkers.
 """
 import json
 import math
@@ -53,7 +53,7 @@ def rectangle(material, center, size, normal, tangent):
     return shape("rectangle", material, center=center, size=size, normal=normal, tangent=tangent)
 
 
-def lamp(center=(0.9, -0.6, 2.4), size=(0.8, 0.5), normal=(-0.4, 0.3, -1), color=(9, 8, 7)):
+def area_light(center=(0.9, -0.6, 2.4), size=(0.8, 0.5), normal=(-0.4, 0.3, -1), color=(9, 8, 7)):
     return table("lights", "rectangle", center=list(center), size=list(size), normal=list(normal), tangent=[1, 0, 0], color=list(color))
 
 
@@ -62,13 +62,13 @@ WALL = rectangle("floor", [0, 1.5, 1], [5, 2], [0, -1, 0], [1, 0, 0])
 
 
 def ball(keys, more="", **render):
-    """A ball of a material on a floor, under a light and the sky."""
-    return (head(**render) + ENVIRONMENT + FLOOR + material("ball", keys) + lamp()
+    """A ball of a material on a floor, under an area light and a constant environment."""
+    return (head(**render) + ENVIRONMENT + FLOOR + material("ball", keys) + area_light()
             + shape("sphere", "ball", center=[0, 0, 0.55], radius=0.5) + more)
 
 
 def emitter(*shapes, emission='emission = [4, 3, 2]', more=""):
-    """A shape that shines on both sides, between a floor and a wall; nothing else does."""
+    """A two-sided emissive shape between a floor and a wall, the only emitter."""
     lit = material("lit", 'type = "diffuse"\ncolor = [0.3, 0.4, 0.5]\n' + emission)
     return head() + more + FLOOR + WALL + lit + material("red", 'type = "diffuse"\ncolor = [0.7, 0.2, 0.1]') + "".join(shapes) + shape(
         "sphere", "red", center=[-0.7, -0.4, 0.25], radius=0.25)
@@ -84,7 +84,7 @@ def many_lights(count=64):
         color = [power * source.uniform(0.2, 1) for _ in range(3)]
         if i % 8:
             side = source.uniform(0.05, 0.2)
-            text += lamp(at, [side, side / 2], [source.uniform(-1, 1), source.uniform(-1, 1), -1], color)
+            text += area_light(at, [side, side / 2], [source.uniform(-1, 1), source.uniform(-1, 1), -1], color)
         else:
             text += table("lights", "point", position=at, color=[c / 20 for c in color])
     text += table("lights", "directional", direction=[0.5, 0.6, -1], color=[0.6, 0.5, 0.4])
@@ -94,12 +94,12 @@ def many_lights(count=64):
 
 
 def room(depth, rr=5):
-    """A closed, bright room, where light goes far."""
+    """A closed room of high albedo, with long paths."""
     text = head("position = [0, -0.9, 1]\nlook_at = [0, 1, 1.2]\nfov = 100", depth, rr) + material("white", 'type = "diffuse"\ncolor = [0.9, 0.85, 0.8]')
     for center, normal, tangent in (([0, 0, 0], [0, 0, 1], [1, 0, 0]), ([0, 0, 2], [0, 0, -1], [1, 0, 0]), ([0, 1, 1], [0, -1, 0], [1, 0, 0]),
                                     ([0, -1, 1], [0, 1, 0], [1, 0, 0]), ([-1, 0, 1], [1, 0, 0], [0, 1, 0]), ([1, 0, 1], [-1, 0, 0], [0, 1, 0])):
         text += rectangle("white", center, [2, 2], normal, tangent)
-    return (text + material("mirror", 'type = "conductor"\ncolor = [0.9, 0.8, 0.6]') + lamp([0, 0, 1.95], [0.6, 0.4], [0, 0, -1])
+    return (text + material("mirror", 'type = "conductor"\ncolor = [0.9, 0.8, 0.6]') + area_light([0, 0, 1.95], [0.6, 0.4], [0, 0, -1])
             + shape("sphere", "mirror", center=[0.4, 0.4, 0.3], radius=0.3) + rectangle("white", [-0.3, 0.3, 0.7], [0.7, 0.7], [0.5, -1, 0.3], [1, 0, 0]))
 
 
@@ -110,7 +110,7 @@ SHAPES = (shape("disk", "ball", center=[-0.8, 0.2, 0.5], radius=0.4, normal=[0.4
 MESH = shape("mesh", "ball", file="meshes/blob.obj", normals="flat", scale=0.5, rotate=[20, 0, 30], translate=[0, 0, 0.6])
 CHECKER = '\n[textures.checker]\ntype = "checker"\neven = [0.8, 0.7, 0.2]\nodd = [0.1, 0.2, 0.6]\nscale = [{0}, {0}]\n'
 
-# Of the path tracer's models those of which Mitsuba has the same: without compensation of energy, which it has not.
+# The materials that Mitsuba supports too, without energy compensation, which it lacks.
 GOLD = "eta = [0.143, 0.375, 1.442]\nk = [3.983, 2.386, 1.603]"
 SKY = '\n[environment]\nfile = "maps/lobes.hdr"\n'
 
@@ -148,40 +148,41 @@ SCENES = {
     "emit-all": emitter(rectangle("lit", [-0.9, 0.6, 0.9], [0.3, 0.3], [0.5, -0.6, 0.7], [1, 0, 0]),
                         shape("disk", "lit", center=[0.9, 0.5, 1], radius=0.2, normal=[-0.5, -0.6, 0.2]),
                         shape("sphere", "lit", center=[0.5, -0.5, 0.2], radius=0.1), shape("tetrahedron", "lit", vertices=TETRAHEDRON))
-    + ENVIRONMENT + lamp(),
+    + ENVIRONMENT + area_light(),
     "many-lights": many_lights(),
     "points-and-sun": head() + FLOOR + WALL + material("ball", GREY) + SHAPES + table("lights", "point", position=[-1, -1.5, 2], color=[4, 3, 2])
     + table("lights", "directional", direction=[-0.5, 0.6, -1], color=[0.5, 0.8, 1]),
     "environment": head() + ENVIRONMENT + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.7, 0.7]') + SHAPES,
     "orthographic": head('type = "orthographic"\nposition = [-2, -4, 3]\nlook_at = [0, 0, 0.4]\nheight = 2.6') + ENVIRONMENT + FLOOR
-    + material("ball", GREY) + SHAPES + lamp(),
+    + material("ball", GREY) + SHAPES + area_light(),
     "checker": head() + ENVIRONMENT + CHECKER.format(8) + material("floor", 'type = "diffuse"\ncolor = { texture = "checker" }')
     + rectangle("floor", [0, 0, 0], [5, 5], [0, 0, 1], [1, 0, 0]) + material("ball", 'type = "conductor"\ncolor = [0.9, 0.9, 0.9]')
-    + shape("sphere", "ball", center=[0, 0, 0.5], radius=0.5) + lamp(),
+    + shape("sphere", "ball", center=[0, 0, 0.5], radius=0.5) + area_light(),
     "plane": head("position = [0, -4, 3.2]\nlook_at = [0, 0, 0.4]\nfov = 30") + ENVIRONMENT + material("floor", GREY) + shape(
-        "plane", "floor", point=[0, 0, 0], normal=[0, 0, 1], tangent=[1, 0, 0]) + material("ball", GREY) + SHAPES + lamp(),
-    "mesh": head() + ENVIRONMENT + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.4, 0.3]') + MESH + lamp(),
-    "mesh-glass": head() + ENVIRONMENT + FLOOR + material("ball", 'type = "dielectric"\nior = 1.4\ncolor = [0.8, 0.9, 1]') + MESH + lamp(),
+        "plane", "floor", point=[0, 0, 0], normal=[0, 0, 1], tangent=[1, 0, 0]) + material("ball", GREY) + SHAPES + area_light(),
+    "mesh": head() + ENVIRONMENT + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.4, 0.3]') + MESH + area_light(),
+    "mesh-glass": head() + ENVIRONMENT + FLOOR + material("ball", 'type = "dielectric"\nior = 1.4\ncolor = [0.8, 0.9, 1]') + MESH + area_light(),
     "instances": head() + ENVIRONMENT + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.4, 0.3]') + '\n[meshes.blob]\nfile = "meshes/blob.obj"\n'
     + "".join(f'\n[[instances]]\nmesh = "blob"\nmaterial = "ball"\nscale = 0.2\nrotate = [0, {40 * i}, {70 * i}]\ntranslate = [{0.5 * i - 1}, {0.3 * i - 0.8}, 0.25]\n'
-              for i in range(5)) + lamp(),
+              for i in range(5)) + area_light(),
     **{f"conductor-rough{n}": ball(rough("conductor", n, "color = [0.9, 0.7, 0.4]")) for n in (0.1, 0.3, 0.6, 1)},
     "conductor-gold": ball(rough("conductor", 0.4, GOLD)), "conductor-gold-smooth": ball('type = "conductor"\n' + GOLD),
     "conductor-brushed": ball(rough("conductor", 0.3, GOLD + "\nanisotropy = 0.8")),
     "conductor-brushed-across": ball(rough("conductor", 0.3, GOLD + "\nanisotropy = 0.8\nanisotropy_rotation = 90")),
-    "conductor-mesh": head() + ENVIRONMENT + FLOOR + material("ball", rough("conductor", 0.4, GOLD)) + MESH + lamp(),
+    "conductor-mesh": head() + ENVIRONMENT + FLOOR + material("ball", rough("conductor", 0.4, GOLD)) + MESH + area_light(),
     **{f"dielectric-rough{n}": ball(rough("dielectric", n, "ior = 1.5")) for n in (0.2, 0.5, 0.9)},
     "dielectric-rough-color": ball(rough("dielectric", 0.4, "ior = 1.33\ncolor = [0.9, 0.6, 0.3]")),
     "dielectric-rough-air": ball(rough("dielectric", 0.4, "ior = 0.7")),
     "dielectric-thin": ball('type = "dielectric"\nior = 1.5\nthin = true'),
-    # Of `principled` Mitsuba has the same metal where alpha is about 0.01: at 0.04 facets hide each other otherwise there, at the ball's edge,
-    # and 0 is 0.001. Of a dielectric that reflects nothing it has what is left.
+    # Mitsuba's `principled` metal agrees for alpha near 0.01: at 0.04 its masking-shadowing function differs at the
+    # ball's edge, and it replaces 0 by 0.001. For a dielectric without reflection, other Mitsuba BSDFs match the
+    # remaining lobes.
     "principled-metal": ball('type = "principled"\nroughness = 0.1\nbase_color = [0.9, 0.7, 0.4]'),
     "principled-brushed": ball('type = "principled"\nroughness = 0.1\nanisotropy = 0.15\nbase_color = [0.9, 0.7, 0.4]'),
     "principled-ground": ball(f'{NO_MIRROR}\nbase_color = [0.8, 0.5, 0.2]'),
     "principled-sheet": ball(f'{NO_MIRROR}\n{PASSES}\nbase_color = [0.8, 0.5, 0.9]'),
     "principled-volume": ball(f'{NO_MIRROR}\n{PASSES}\nthickness = 1\nattenuation_color = [0.8, 0.3, 0.9]\nattenuation_distance = 0.6'),
-    "lens": head(CAMERA + "\naperture = 0.5\nfocus_distance = 3.2") + ENVIRONMENT + FLOOR + material("ball", GREY) + SHAPES + lamp(),
+    "lens": head(CAMERA + "\naperture = 0.5\nfocus_distance = 3.2") + ENVIRONMENT + FLOOR + material("ball", GREY) + SHAPES + area_light(),
     "map": head() + SKY + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.7, 0.7]') + SHAPES,
     "map-turned": head() + SKY + "scale = 0.5\nrotate = 130\n" + FLOOR + material("ball", 'type = "conductor"\ncolor = [0.9, 0.8, 0.7]') + SHAPES,
     "map-rough": head() + SKY + FLOOR + material("ball", rough("conductor", 0.3, GOLD)) + shape("sphere", "ball", center=[0, 0, 0.55], radius=0.5),
@@ -192,7 +193,7 @@ SCENES = {
 
 
 def blob(rows=24, seed=1, radii=(1, 1, 1), center=(0, 0, 0)):
-    """A bumpy closed mesh: vertices, and triangles that go counter-clockwise as seen from outside."""
+    """A bumpy closed mesh: vertices, and triangles in counter-clockwise order seen from outside."""
     def point(theta, phi):
         d = [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
         r = 0.85 + 0.1 * math.sin(5 * d[0] + 3 * d[1] + seed) + 0.05 * math.sin(9 * d[1] - 7 * d[2] + 2 * seed)
@@ -208,9 +209,9 @@ def blob(rows=24, seed=1, radii=(1, 1, 1), center=(0, 0, 0)):
 
 
 def block(corners, height):
-    """A cuboid on the floor, by its corners (x, z) in their order; y is up."""
+    """A prism on the floor over the polygon of the corners (x, z); y is up."""
     turn = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(corners, corners[1:] + corners[:1]))
-    corners = corners if turn < 0 else corners[::-1]  # counter-clockwise as seen from above, where z points down the page
+    corners = corners if turn < 0 else corners[::-1]  # counter-clockwise seen from above, with z pointing down the page
     vertices = [[x, y, z] for y in (0, height) for x, z in corners]
     quads = [(4, 5, 6, 7), (3, 2, 1, 0), *((i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4) for i in range(4))]
     return vertices, [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
@@ -251,7 +252,7 @@ COURSE = {
 
 
 def write_map(path, width=256):
-    """A pale sky with a warm, bright side and a cold one, as a Radiance file without compression."""
+    """Writes a pale sky with a bright, warm lobe and a cold one as an uncompressed Radiance file."""
     height = width // 2
     lobes = [((0.5, -0.7, 0.5), 30, (12, 10, 7)), ((-0.8, 0.1, 0.3), 8, (0.5, 0.9, 1.6))]
     lobes = [([x / math.hypot(*to) for x in to], sharp, color) for to, sharp, color in lobes]
@@ -259,7 +260,7 @@ def write_map(path, width=256):
     for row in range(height):
         polar = math.pi * (row + 0.5) / height
         for column in range(width):
-            turn = math.pi * (1 - 2 * (column + 0.5) / width)  # the middle is towards +x, the left half towards +y
+            turn = math.pi * (1 - 2 * (column + 0.5) / width)  # the centre is +x, the left half is towards +y
             d = (math.sin(polar) * math.cos(turn), math.sin(polar) * math.sin(turn), math.cos(polar))
             color = [0.15, 0.18, 0.22]
             for to, sharp, light in lobes:
@@ -278,7 +279,7 @@ def write_obj(path, mesh):
 
 
 def write(folder):
-    """Writes everything; returns the paths of the scenes by their names."""
+    """Writes all files; returns the paths of the scenes by name."""
     folder = pathlib.Path(folder)
     write_obj(folder / "meshes" / "blob.obj", blob())
     write_map(folder / "maps" / "lobes.hdr")

@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
-"""Compares wgray's picture with POV-Ray's, in linear values, and shows where and why they differ.
+"""Compares wgray's image with POV-Ray's, in linear values, and classifies the pixels that differ.
 
     benches/peers/run --install-only        once
     target/peers/venv/bin/python benches/peers/povray_check.py [--device lavapipe] [--scene scenes/cornell.toml]
 
-The scene with every `specular` set to white (POV-Ray's highlight has the light's colour) at its own size, one pixel
-sample at the pixel's centre, 16 light samples; POV-Ray once with its `area_light` and once with a point light for each
-light sample (povray_scenes.py says how these differ). Prints the share of pixels within 0.004 in every channel and what
-the rest are; writes the scenes, the EXR pictures and difference-*.png into --out. Exit status 1 below --goal for either.
+The scene is rendered at its own size with every `specular` set to white (POV-Ray's highlight has the light's colour),
+one sample at each pixel's centre and 16 light samples; by POV-Ray once with its `area_light` and once with a point
+light per light sample (povray_scenes.py documents the difference). Prints the percentage of pixels within 0.004 in
+every channel and the classes of the others; writes the scenes, the EXR images and difference-*.png to --out. Exit
+status 1 if either is below --goal.
 
-A third renderer, the formulas written down once more in numpy with float64, says what a pixel shows and is compared
-with both; `--device none` compares POV-Ray with it alone, without wgray.
+A third renderer, an independent implementation of the formulas in numpy with float64, classifies the pixels and is
+compared with both; `--device none` compares only POV-Ray with it, without wgray.
 """
 import argparse
 import os
@@ -31,10 +32,10 @@ import povray_scenes
 import scenes
 
 MISS, LIGHT = -1, -2
-CLASSES = {  # in the order in which a pixel is claimed; colours of difference.png
+CLASSES = {  # a pixel belongs to the first class that applies; colours of difference.png
     "light": ((255, 220, 0), "the light, which POV-Ray's camera does not see"),
     "edge": ((255, 0, 0), "within a pixel of another primitive"),
-    "shadow": ((0, 120, 255), "penumbra: here or a pixel away, some light samples are seen and some are not"),
+    "shadow": ((0, 120, 255), "penumbra: some light samples are occluded, here or a pixel away, and some are not"),
     "other": ((255, 0, 255), "none of these"),
 }
 
@@ -45,7 +46,7 @@ def dots(a, b):
 
 
 class Numpy:
-    """wgray's formulas in float64, written from the scene's description: closest hits, shadows, Phong radiance."""
+    """wgray's formulas in float64, implemented independently: closest hits, shadows, Phong radiance."""
 
     def __init__(self, scene):
         self.scene, self.primitives = scene, []
@@ -101,7 +102,7 @@ class Numpy:
         return np.where(np.isnan(t), np.inf, t), normal
 
     def hit(self, o, d):
-        """Distance, primitive (or MISS) and the normals' functions of the closest hits."""
+        """Distance and primitive (or MISS) of the closest hits, and the normal functions of all primitives."""
         best, which, normals = np.full(d.shape[:-1], np.inf), np.full(d.shape[:-1], MISS), []
         for i, (intersect, row, _) in enumerate(self.primitives):
             t, normal = intersect(o, d, *row)
@@ -121,7 +122,7 @@ class Numpy:
         return np.array(s.position, float), d / np.linalg.norm(d, axis=-1, keepdims=True)
 
     def render(self, width, height, samples):
-        """Radiance, the primitive that a pixel shows (or LIGHT, MISS) and the number of light samples that reach it."""
+        """Radiance, the visible primitive (or LIGHT, MISS) and the number of unoccluded light samples of each pixel."""
         n_grid = int(round(samples ** .5))
         o, d = self.rays(width, height)
         t, which, normals = self.hit(o, d)
@@ -157,7 +158,7 @@ class Numpy:
 
 
 def white_specular(text):
-    """The scene with every material's `specular` white."""
+    """Returns the scene with a white `specular` in every material."""
     text = re.sub(r"(?m)^\s*specular\s*=.*\n", "", text)
     text = re.sub(r"(?m)^(\[materials\.[^\]]+\])\s*(#.*)?$", r"\1\nspecular = [1, 1, 1]", text)
     for name, row in tomllib.loads(text)["materials"].items():
@@ -172,7 +173,7 @@ def read(path):
 
 
 def beside(values):
-    """Pixels one of whose eight neighbours has another value."""
+    """The mask of pixels with a different value in one of the eight neighbours."""
     a = np.pad(values, 1, mode="edge")
     h, w = values.shape
     return np.any([a[y:y + h, x:x + w] != values for y in range(3) for x in range(3)], axis=0)
@@ -180,20 +181,20 @@ def beside(values):
 
 def compare(name, image, other, which, partly, tolerance, out=None):
     difference = abs(image - other).max(-1)
-    off = ~(difference <= tolerance)  # NaN is off
+    off = ~(difference <= tolerance)  # true for NaN
     print(f"{name}: {100 * (1 - off.mean()):.3f} % of {off.size} pixels within {tolerance}; "
           f"median difference {np.median(difference):.2e}, largest {difference.max():.3g}")
     claims = {"light": which == LIGHT, "edge": beside(which), "shadow": partly | beside(partly), "other": np.ones_like(off)}
-    picture = np.repeat(np.clip(other, 0, 1).mean(-1, keepdims=True) ** (1 / 2.2) * 127, 3, -1)
+    marked = np.repeat(np.clip(other, 0, 1).mean(-1, keepdims=True) ** (1 / 2.2) * 127, 3, -1)
     left = off.copy()
     for kind, (colour, meaning) in CLASSES.items():
         now = left & claims[kind]
         left &= ~now
-        picture[now] = colour
+        marked[now] = colour
         where = f", the first at {tuple(int(v) for v in np.argwhere(now)[0][::-1])}" if now.any() else ""
         print(f"    {kind:7} {now.sum():6}  {100 * now.mean():.3f} %  {meaning}{where}")
     if out:
-        write_png(out, picture.astype(np.uint8))
+        write_png(out, marked.astype(np.uint8))
         print(f"    marked in {os.path.relpath(out)}: " + ", ".join(f"{k} {v[0]}" for k, v in CLASSES.items()))
     return 1 - off.mean()
 
@@ -211,12 +212,12 @@ def main():
     parser.add_argument("--scene", type=pathlib.Path, default=install.ROOT / "scenes/cornell.toml")
     parser.add_argument("--device", default="lavapipe", help="wgray's --device, or none")
     parser.add_argument("--wgray", default=install.ROOT / "target/release/wgray")
-    parser.add_argument("--folder", type=pathlib.Path, default=install.FOLDER, help="where `run` installs")
-    parser.add_argument("--out", type=pathlib.Path, help="default FOLDER/povray_check")
-    parser.add_argument("--size", type=int, help="instead of the scene's own")
+    parser.add_argument("--folder", type=pathlib.Path, default=install.FOLDER, help="installation folder of `run`")
+    parser.add_argument("--out", type=pathlib.Path, help="output folder; default: FOLDER/povray_check")
+    parser.add_argument("--size", type=int, help="width and height; default: those of the scene")
     parser.add_argument("--light-samples", type=int, default=16)
     parser.add_argument("--tolerance", type=float, default=0.004)
-    parser.add_argument("--goal", type=float, default=95, help="percent")
+    parser.add_argument("--goal", type=float, default=95, help="required percentage of pixels within the tolerance")
     args = parser.parse_args()
     out = args.out or args.folder / "povray_check"
     out.mkdir(parents=True, exist_ok=True)
@@ -226,7 +227,7 @@ def main():
     scene = scenes.load(variant)
     width, height = (args.size, args.size) if args.size else (scene.width, scene.height)
     command, environment = install.Peers(args.folder).povray()
-    pictures = {}
+    images = {}
     for name, points in (("area light", False), ("point lights", True)):
         base = out / f"povray-{name.replace(' ', '-')}"
         base.with_suffix(".pov").write_text(povray_scenes.povray(scene, args.light_samples, width, height, points))
@@ -234,7 +235,7 @@ def main():
                               env=os.environ | environment, capture_output=True, text=True)
         if done.returncode:
             sys.exit(f"POV-Ray failed:\n{done.stderr[-2000:]}")
-        pictures[name] = read(f"{base}.exr")
+        images[name] = read(f"{base}.exr")
     reference, which, seen = Numpy(scene).render(width, height, args.light_samples)
     rest = which, (seen > 0) & (seen < args.light_samples * len(scene.lights)), args.tolerance
     ours, image = "numpy", reference
@@ -243,8 +244,8 @@ def main():
                         f"{width}x{height}", "--device", args.device, "-q", "-o", out / "wgray.exr"], check=True)
         ours, image = "wgray", read(out / "wgray.exr")
         compare("wgray against numpy", image, reference, *rest)
-    shares = {name: compare(f"{ours} against POV-Ray, {name}", image, picture, *rest,
-                            out / f"difference-{name.replace(' ', '-')}.png") for name, picture in pictures.items()}
+    shares = {name: compare(f"{ours} against POV-Ray, {name}", image, theirs, *rest,
+                            out / f"difference-{name.replace(' ', '-')}.png") for name, theirs in images.items()}
     for name, share in shares.items():
         if not 100 * share >= args.goal:
             sys.exit(f"{name}: only {100 * share:.3f} %, the goal is {args.goal:g} %")

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Writes a wgray scene for POV-Ray 3.7 to standard output: povray_scenes.py SCENE.toml LIGHT_SAMPLES [SIZE]
 
-Phong shading without distance falloff, lights unseen by the camera. POV-Ray's phong highlight has the light's colour,
-so the picture is that of a scene whose materials' `specular` is white; ambient and diffuse colours must be equal.
+Phong shading without distance falloff; lights are invisible to the camera. POV-Ray's Phong highlight has the light's
+colour, so the image is that of a scene whose materials have a white `specular`; ambient and diffuse colours must be
+equal.
 
-An area light comes in two ways. As POV-Ray's `area_light`, its own and fastest way, used for timing. It multiplies the
-mean shadow by the mean shading, `mean(V) * mean(f)`, where wgray takes `mean(V * f)`: they differ in penumbrae. Or as a
-point light for each sample, which is wgray's formula.
+An area light is converted in one of two ways. POV-Ray's `area_light` is its fastest, used for timing. It multiplies the
+mean visibility by the mean shading, `mean(V) * mean(f)`, whereas wgray computes `mean(V * f)`: they differ in
+penumbrae. A point light per sample gives wgray's formula.
 """
 import math
 import struct
@@ -48,7 +49,7 @@ def shape(s, ambient):
 
 
 def mesh(s, paint):
-    """A `mesh2`: flat triangles, as wgray's are where a file has no normals."""
+    """A `mesh2` of flat triangles, as wgray renders a file without normals."""
     vertices, triangles = read_ply(s.file)
     rows = ", ".join(f"<{x:.9g},{y:.9g},{z:.9g}>" for x, y, z in vertices)
     faces = ", ".join(f"<{a},{b},{c}>" for a, b, c in triangles)
@@ -75,25 +76,25 @@ def read_ply(file):
 def light(l, samples, points):
     n = math.isqrt(samples)
     if n * n != samples or n < 2:
-        raise ValueError(f"{samples} light samples are no n x n grid")
+        raise ValueError(f"{samples} light samples: must be a square number of at least 4")
     if points:
         cells = [(2 * i + 1) / n - 1 for i in range(n)]
         colour = vec(scenes.scaled(l.color, 1 / samples))
         return "\n".join(f"light_source {{ {vec(add(l.center, scenes.scaled(l.u, s), scenes.scaled(l.v, t)))} rgb {colour} }}"
                          for s in cells for t in cells)
-    # POV-Ray samples an area light's axes from end to end; these ends are the outermost cell centres of our grid.
-    # area_illumination: shade by every sample, not only shadow by it.
+    # POV-Ray samples an area light's axes from end to end; these ends are the outermost cell centres of wgray's grid.
+    # With area_illumination the shading uses all samples, not only the shadows.
     axes = [vec(scenes.scaled(axis, 2 * (n - 1) / n)) for axis in (l.u, l.v)]
     return f"light_source {{ {vec(l.center)} rgb {vec(l.color)} area_light {axes[0]}, {axes[1]}, {n}, {n} area_illumination on }}"
 
 
 def povray(scene, light_samples, width, height, points=False):
-    # POV-Ray's angle is the horizontal one. It samples pixels at their centres, as wgray does (povray_check.py shows it).
+    # POV-Ray's angle is horizontal. It samples pixels at their centres, as wgray does (tested by povray_check.py).
     angle = 2 * math.degrees(math.atan(math.tan(math.radians(scene.fov) / 2) * width / height))
     return "\n".join([
         "#version 3.7;",
         "global_settings { assumed_gamma 1.0 ambient_light rgb 1 max_trace_level 5 }",
-        # POV-Ray's axes are left-handed; the negative `right` makes them ours.
+        # POV-Ray's axes are left-handed; the negative `right` makes them right-handed.
         f"camera {{ location {vec(scene.position)} right -x*{width}/{height} up y sky {vec(scene.up)} "
         f"angle {angle:.9g} look_at {vec(scene.look_at)} }}",
         *(light(l, light_samples, points) for l in scene.lights),

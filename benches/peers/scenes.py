@@ -1,7 +1,7 @@
-"""Reads wgray's scene files for the peers, so that a scene stands in one place.
+"""Reads wgray's scene files for other renderers.
 
-`load` takes the part of the format that the benchmark scenes use (docs/scene-format.md) and refuses the rest: what the phong
-integrator renders, with plain colours under rectangle lights, or with `integrator="path"` what the path tracer does.
+`load` supports the part of the format that the benchmark scenes use (docs/scene-format.md) and rejects the rest: scenes
+for the Phong integrator, with constant colours and rectangle lights, or, with `integrator="path"`, for the path tracer.
 """
 import json
 import math
@@ -32,8 +32,10 @@ def unit(a):
 
 @dataclass
 class Material:
-    """Colours are lists of three numbers or a Checker. `kind` is the format's type, but for "mirror" and "glass", which are
-    "conductor" and "dielectric"."""
+    """A material. Colours are lists of three numbers or a Checker.
+
+    `kind` is the type of the format, except that "mirror" is "conductor" and "glass" is "dielectric".
+    """
     kind: str = "phong"
     ambient: list | None = None
     diffuse: list | None = None
@@ -43,8 +45,8 @@ class Material:
     ior: float = 1
     absorption: list | None = None
     emission: list | None = None
-    alpha: tuple = (0, 0)  # of the microfacets, along the tangent and across it; (0, 0) is smooth
-    index: tuple | None = None  # the metal's n and k
+    alpha: tuple = (0, 0)  # GGX roughness along and across the tangent; (0, 0) is smooth
+    index: tuple | None = None  # n and k of a metal
     thin: bool = False
     metallic: float = 0
     coat: tuple = (0, 0)  # clearcoat and its roughness
@@ -59,7 +61,7 @@ class Checker:
 
 @dataclass
 class Quad:
-    """A rectangle, `center + s u + t v` with s and t in [-1, 1]; of a light: its `color` too."""
+    """A rectangle, `center + s u + t v` with s and t in [-1, 1]; `color` is that of a light."""
     center: list
     u: list
     v: list
@@ -83,8 +85,8 @@ class Point:
 
 
 @dataclass
-class Spot:
-    """A cone with a hard edge."""
+class SpotLight:
+    """A spot light with a hard edge."""
     position: list
     direction: list
     color: list
@@ -93,7 +95,7 @@ class Spot:
 
 @dataclass
 class Map:
-    """An equirectangular image around the scene, its middle towards +x and its upper edge towards +z, turned about z by degrees."""
+    """An equirectangular environment map: the centre is +x, the upper edge +z; rotated about z by degrees."""
     file: str
     scale: float
     rotate: float
@@ -131,7 +133,7 @@ class Plane:
 
 @dataclass
 class Mesh:
-    """The triangles of a file, moved by an affine map of three rows of four numbers. `normals`: "smooth", "flat", "file", None."""
+    """The triangles of a file, with an affine 3 x 4 transform. `normals`: "smooth", "flat", "file", None."""
     file: str
     normals: str | None
     to_world: list
@@ -150,9 +152,9 @@ class Scene:
     shapes: list = field(default_factory=list)
     lights: list = field(default_factory=list)
     integrator: str = "phong"
-    height_seen: float | None = None  # of an orthographic camera
+    height_seen: float | None = None  # for an orthographic camera
     environment: list | Map | None = None
-    lens: tuple | None = None  # diameter and distance of focus
+    lens: tuple | None = None  # diameter and focus distance
     max_depth: int = 8
     rr_depth: int = 5
     spp: int = 16
@@ -165,7 +167,7 @@ def quad(row, **more):
 
 
 def product(a, b):
-    """The affine map that applies b, then a; each is three rows of four numbers."""
+    """The affine transform that applies b, then a; each is three rows of four numbers."""
     rows = [*b, [0, 0, 0, 1]]
     return [[sum(row[k] * rows[k][j] for k in range(4)) for j in range(4)] for row in a]
 
@@ -186,7 +188,7 @@ UP = {"x": [[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0]],
 
 
 def to_world(row, up):
-    """The map of a mesh: its axis that is up, then scale, rotate, translate, or the matrix in their place."""
+    """The transform of a mesh: up axis, then scale, rotation, translation, or the matrix instead of these three."""
     if "matrix" in row:
         return product(row["matrix"][:3], UP[up])
     x, y, z = row["scale"] if isinstance(row.get("scale"), list) else [row.get("scale", 1)] * 3
@@ -202,27 +204,27 @@ def to_world(row, up):
 
 
 def color(path, row, key, textures, default=None):
-    """A colour of a material: three numbers, or a checker where the path tracer renders."""
+    """A colour of a material: three numbers, or a checker for the path tracer."""
     value = row.get(key, default)
     if not isinstance(value, dict):
         return value
     texture = textures.get(value["texture"], {})
     if texture.get("type") != "checker" or "rotate" in texture or "offset" in texture:
-        raise ValueError(f"{path}: {key}: the peers' textures are checkers, neither turned nor moved")
+        raise ValueError(f"{path}: {key}: other renderers support only checkers, without rotation or offset")
     return Checker(texture["even"], texture["odd"], texture.get("scale", [1, 1]))
 
 
 def material(path, row, textures, traced):
     kind = {"mirror": "conductor", "glass": "dielectric"}.get(row["type"], row["type"])
     if kind != "phong" and not traced:
-        raise ValueError(f"{path}: a material {row['type']!r}: the peers' materials are phong")
+        raise ValueError(f"{path}: a material {row['type']!r}: other renderers support only phong here")
     rough = kind in ("conductor", "dielectric", "principled")
     if "normal_map" in row or "metal" in row or isinstance(row.get("roughness"), dict):
-        raise ValueError(f"{path}: the peers have neither normal maps, rough textures nor the named metals")
+        raise ValueError(f"{path}: other renderers support neither normal maps, roughness textures nor named metals")
     if row.get("roughness", 0) != 0 and not rough:
-        raise ValueError(f"{path}: a rough {kind}: the peers have no such model")
+        raise ValueError(f"{path}: a rough {kind}: other renderers lack this model")
     if rough and row.get("roughness", 0) != 0 and kind != "principled" and row.get("energy_compensation", True):
-        raise ValueError(f"{path}: the peers compensate for no energy: energy_compensation must be false")
+        raise ValueError(f"{path}: other renderers do not compensate for energy: energy_compensation must be false")
     made = Material(kind, emission=color(path, row, "emission", textures))
     if kind == "principled":
         made.color, made.metallic = color(path, row, "base_color", textures, [1, 1, 1]), row.get("metallic", 1)
@@ -230,18 +232,18 @@ def material(path, row, textures, traced):
             return bare(path, row, made)
         other = set(row) - {"type", "base_color", "metallic", "roughness", "anisotropy", "clearcoat", "clearcoat_roughness"}
         if other:
-            raise ValueError(f"{path}: the peers' principled has no {', '.join(sorted(other))}")
+            raise ValueError(f"{path}: other renderers' principled does not support {', '.join(sorted(other))}")
         across = row.get("roughness", 1) ** 2
         made.alpha = (across + (1 - across) * row.get("anisotropy", 0) ** 2, across)
         made.coat = (row.get("clearcoat", 0), row.get("clearcoat_roughness", 0))
         return made
     if rough:
-        # glTF's: along the tangent mix(alpha, 1, anisotropy^2). A quarter of a turn exchanges the two.
+        # The formula of glTF: mix(alpha, 1, anisotropy^2) along the tangent. Rotation by 90 degrees exchanges the two.
         alpha = row.get("roughness", 0) ** 2
         along = alpha + (1 - alpha) * row.get("anisotropy", 0) ** 2 if alpha else 0
         turn = row.get("anisotropy_rotation", 0)
         if turn not in (0, 90):
-            raise ValueError(f"{path}: the peers turn anisotropy by 0 or 90 degrees")
+            raise ValueError(f"{path}: other renderers support anisotropy rotations of 0 and 90 degrees")
         made.alpha = (along, alpha) if turn == 0 else (alpha, along)
         made.index = (row["eta"], row["k"]) if "eta" in row else None
         made.thin = row.get("thin", False)
@@ -253,17 +255,18 @@ def material(path, row, textures, traced):
         made.color = color(path, row, "tint" if row["type"] in ("mirror", "glass") else "color", textures, [1, 1, 1])
         made.ior, made.absorption = row.get("ior", 1), row.get("absorption")
     if not traced and not all(isinstance(c, list) for c in (made.ambient, made.diffuse, made.specular)):
-        raise ValueError(f"{path}: the peers' colours are plain")
+        raise ValueError(f"{path}: other renderers support only constant colours here")
     return made
 
 
 def bare(path, row, made):
-    """A `principled` dielectric that reflects nothing is another material: its ground alone, or without a ground what lets all light pass."""
+    """A `principled` dielectric without specular reflection: its diffuse base, or full transmission without a base."""
     known = {"type", "base_color", "metallic", "specular", "transmission", "thickness", "ior", "roughness", "attenuation_color", "attenuation_distance"}
     passes, thick = row.get("transmission", 0), row.get("thickness", 0) > 0
     straight = row.get("roughness", 1) == 0 and row.get("ior", 1.5) == 1
     if set(row) - known or passes not in (0, 1) or (passes and not straight):
-        raise ValueError(f"{path}: the peers know of principled without reflection the ground, and what passes straight on")
+        raise ValueError(f"{path}: of principled without reflection, other renderers support only the diffuse base and "
+                         "undeflected transmission")
     made.kind = "dielectric" if passes else "diffuse"
     if passes:
         made.thin = not thick
@@ -281,16 +284,16 @@ def load(path, integrator="phong"):
     camera, render = text["camera"], text.get("render", {})
     orthographic = camera.get("type", "perspective") == "orthographic"
     if camera.get("type") == "panorama" or camera.get("blades", 0) or "f_number" in camera:
-        raise ValueError(f"{path}: the peers have neither panoramas, blades nor f-numbers")
+        raise ValueError(f"{path}: other renderers support neither panoramas, blades nor f-numbers")
     if render.get("integrator", "phong") != integrator:
-        raise ValueError(f"{path}: render.integrator must be {integrator!r} here")
+        raise ValueError(f"{path}: render.integrator must be {integrator!r}")
     if orthographic and not traced:
-        raise ValueError(f"{path}: the peers' scenes have a perspective camera")
+        raise ValueError(f"{path}: other renderers support only perspective cameras here")
     if any(render.get("background", [0, 0, 0])):
-        raise ValueError(f"{path}: the peers' scenes have a black background")
+        raise ValueError(f"{path}: other renderers support only a black background")
     scene = Scene(text["image"]["width"], text["image"]["height"], camera["position"], camera["look_at"],
                   camera.get("up", [0, 0, 1]), camera.get("fov"), render.get("ambient", [0, 0, 0]), integrator=integrator,
-                  height_seen=camera["height"] if orthographic else None, environment=surroundings(path, text.get("environment", {})),
+                  height_seen=camera["height"] if orthographic else None, environment=environment(path, text.get("environment", {})),
                   lens=(camera["aperture"], camera.get("focus_distance", math.dist(camera["position"], camera["look_at"])))
                   if camera.get("aperture") else None, max_depth=render.get("max_depth", 8), rr_depth=render.get("rr_depth", 5),
                   spp=render.get("pixel_samples", {}).get("count", 16))
@@ -300,7 +303,7 @@ def load(path, integrator="phong"):
 
     def mesh(row, source):
         if "material" not in row or "materials" in row:
-            raise ValueError(f"{path}: the peers' meshes have one material, `material`")
+            raise ValueError(f"{path}: other renderers support only meshes with one material, `material`")
         file = os.path.join(folder, source["file"])
         scene.shapes.append(Mesh(file, source.get("normals"), to_world(row, source.get("up", "z")), materials[row["material"]]))
 
@@ -318,18 +321,18 @@ def load(path, integrator="phong"):
             scene.lights.append(Point(row["position"], row["color"]))
         elif row["type"] == "spot" and traced:
             if row.get("inner_angle", 0) != row["cone_angle"]:
-                raise ValueError(f"{path}: the peers' spots fall off by another formula: inner_angle must be cone_angle")
-            scene.lights.append(Spot(row["position"], row["direction"], row["color"], row["cone_angle"]))
+                raise ValueError(f"{path}: other renderers' spot lights fall off differently: inner_angle must be cone_angle")
+            scene.lights.append(SpotLight(row["position"], row["direction"], row["color"], row["cone_angle"]))
         elif row["type"] == "directional" and traced:
             scene.lights.append(Sun(row["direction"], row["color"]))
         else:
-            raise ValueError(f"{path}: the peers' lights are rectangles, not {row['type']!r}")
+            raise ValueError(f"{path}: other renderers do not support lights of type {row['type']!r} here")
     return scene
 
 
-def surroundings(path, row):
+def environment(path, row):
     if set(row) - {"color", "file", "scale", "rotate"} or isinstance(row.get("rotate", 0), (list, dict)):
-        raise ValueError(f"{path}: the peers' environments are colours, or files turned about z")
+        raise ValueError(f"{path}: other renderers support only environments of one colour, or files rotated about z")
     if "file" in row:
         return Map(os.path.join(os.path.dirname(os.path.abspath(path)), row["file"]), row.get("scale", 1), row.get("rotate", 0))
     return [x * row.get("scale", 1) for x in row["color"]] if "color" in row else None
@@ -357,11 +360,11 @@ def shape(path, row, material):
         return Triangles([a, b, c, d], [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)], material)
     if kind == "plane":
         return Plane(row["point"], unit(row["normal"]), material)
-    raise ValueError(f"{path}: no peer has shapes of type {kind!r}")
+    raise ValueError(f"{path}: other renderers do not support shapes of type {kind!r}")
 
 
 def course(path):
-    """A scene in JSON. Its axes stay as they are, with y up: the picture is the same."""
+    """Reads a JSON scene. Its axes are not converted (y is up); the image is the same."""
     with open(path, encoding="utf-8") as file:
         text = json.load(file)
     camera, light = text["cam_config"], text["light_config"]

@@ -1,20 +1,20 @@
 #!/usr/bin/env python3
-"""Shows that wgray's view transforms are those of their specifications, and of Blender.
+"""Compares wgray's view transforms with their specifications and with Blender's.
 
     benches/peers/view_check.py [--wgray PROGRAM] [--count N] [--figure docs/output/views.png]
 
-The first run installs what it needs into target/peers: PyPI's bpy, for the OpenColorIO configuration that Blender comes with, and
-opencolorio, OpenEXR, numpy and pypng beside it. wgray renders a card of N colours, from 2^-12 to 2^7, greys among them, as linear EXR and,
-with every view transform and two exposures, as PNG of 16 bits. For each PNG the EXR's values are transformed
+The first run installs PyPI's bpy, for Blender's OpenColorIO configuration, and opencolorio, OpenEXR, numpy and pypng
+into target/peers. wgray renders a card of N colours, from 2^-12 to 2^7, including greys, as a linear EXR and, with
+every view transform and two exposures, as 16-bit PNGs. The EXR's values are transformed for each PNG
 
-    formula   in numpy, from what was published: the PNG must be within 2e-5 everywhere, a step of 16 bits and a third
-    Blender   by OpenColorIO with Blender's tables, which are looked up between 57 or fewer points a side: the mean must be within
-              0.003 (of 1), 99 of 100 values within 0.03. It has no gamma22
+    formula   in numpy, by the published formula: the PNG must agree to 2e-5 everywhere, 1.3 steps of 16 bits
+    Blender   by OpenColorIO with Blender's tables, which interpolate between at most 57 points per axis: the mean
+              difference must be at most 0.003, and 99 % of the values must agree to 0.03. It has no gamma22
 
---figure renders the box of scenes/cornell-path.toml, three stops too bright, and twelve hues from 2^-4 to 2^5, under each transform.
+--figure renders the box of scenes/cornell-path.toml, three stops brighter, and twelve hues from 2^-4 to 2^5, under each
+transform.
 
-Exit status 1 if one is not, or if a picture with another transform is taken for the right one, or one that is a hundredth of a stop
-brighter.
+Exit status 1 if a PNG fails, or, as a control, if it passes for another transform or for an exposure 0.01 stops higher.
 """
 import argparse
 import os
@@ -42,7 +42,7 @@ SIDE_BY_SIDE = 512
 
 
 def card(count):
-    """Linear colours, rows of a picture: greys first, then all hues, in steps of brightness."""
+    """Linear colours, as rows of an image: greys, the corners of the RGB cube, random colours."""
     random = np.random.default_rng(1)
     stops = random.uniform(-12, 7, (count, 1))
     colors = random.uniform(0, 1, (count, 3)) ** random.choice([1, 4], (count, 1)) * 2.0**stops
@@ -62,7 +62,7 @@ shapes = [{{ type = "rectangle", material = "card", center = [0, 0, 0], size = [
 """
 
 
-# ---------------------------------------------------------------- what was published
+# ---------------------------------------------------------------- published formulas
 
 
 def srgb(light):
@@ -72,7 +72,7 @@ def srgb(light):
 
 
 def neutral(light):
-    """Khronos' specification of PBR Neutral."""
+    """Khronos PBR Neutral, as specified."""
     least = light.min(1, keepdims=True)
     light = light - np.where(least < 0.08, least - 6.25 * least**2, 0.04)
     peak = light.max(1, keepdims=True)
@@ -100,7 +100,7 @@ def rgb(hue, saturation, value):
 
 
 def agx(light):
-    """AgX as AgX_LUT_Gen makes it for Blender (AgXBaseRec2020.py), clipped to Rec. 709 at the end; matrices of primaries and white."""
+    """AgX as in AgX_LUT_Gen for Blender (AgXBaseRec2020.py), clipped to Rec. 709; matrices of primaries and white."""
     wide = np.array([[0.627403914, 0.329283038, 0.043313048], [0.069097292, 0.919540405, 0.011362303], [0.016391439, 0.088013308, 0.895595253]])
     inset = primaries_moved([2.13976149, -1.22827335, -3.05174246], [0.32965205, 0.28051336, 0.12475368])
     outset = np.linalg.inv(primaries_moved([0, 0, 0], [0.32317438, 0.28325605, 0.0374326]))
@@ -121,8 +121,8 @@ def agx(light):
 
 
 def primaries_moved(degrees, shares):
-    """To Rec. 2020 from primaries that are turned around its white along its triangle's edges, and pulled towards it: each by its
-    angle and its share (working_space.py of AgX_LUT_Gen)."""
+    """The matrix to Rec. 2020 from its primaries, each rotated about the white point along the edges of the triangle by
+    an angle, and moved towards the white point by a fraction (working_space.py of AgX_LUT_Gen)."""
     white, corners = np.array([0.3127, 0.3290]), np.array([[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]])
     moved = []
     for corner, degree, share in zip(corners, degrees, shares):
@@ -133,7 +133,7 @@ def primaries_moved(degrees, shares):
 
 
 def to_edge(corners, way):
-    """As far along a way as the triangle around the origin goes."""
+    """The distance to the triangle around the origin in a direction."""
     reached = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0)):
         far, along = np.linalg.solve(np.array([way, a - b]).T, a)
@@ -158,7 +158,7 @@ BLENDER = {"srgb": "Standard", "agx": "AgX", "khronos-pbr-neutral": "Khronos PBR
 
 
 def blender(name, light):
-    """By Blender's configuration."""
+    """The transform of Blender's configuration."""
     (path,) = pathlib.Path(os.environ["WGRAY_VIEW_CHECK"]).glob("lib/python*/site-packages/bpy/*/datafiles/colormanagement/config.ocio")
     config = ocio.Config.CreateFromFile(str(path))
     view = ocio.DisplayViewTransform(src="Linear Rec.709", display="sRGB", view=BLENDER[name])
@@ -182,7 +182,7 @@ def render(args, folder, name, *options):
 
 
 def hues(stops):
-    """A scene of hues, downwards, and stops, to the right."""
+    """The TOML text of a chart: hues along the rows, stops along the columns."""
     head = "image = { width = 240, height = 120 }\n"
     head += 'camera = { type = "orthographic", position = [0, 0, 1], look_at = [0, 0, 0], up = [0, 1, 0], height = 12 }\n'
     text = head + 'render = { integrator = "path", max_depth = 0, pixel_samples = { pattern = "grid", count = 4 } }\n'
@@ -197,7 +197,7 @@ def hues(stops):
 
 
 def figure(args, path):
-    """What the transforms make of two scenes, side by side."""
+    """Writes two scenes under each transform, side by side."""
     columns = []
     with tempfile.TemporaryDirectory() as folder:
         scene, out = os.path.join(folder, "hues.toml"), os.path.join(folder, "out.png")
@@ -228,18 +228,18 @@ def main():
         colors = card(args.count)
         OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION}, {"RGB": colors}).write(os.path.join(folder, "card.exr"))
         pathlib.Path(folder, "card.toml").write_text(SCENE.format(width=colors.shape[1], height=colors.shape[0]))
-        light = render(args, folder, "card.exr".replace("card", "linear"))
-        assert np.array_equal(light, colors.reshape(-1, 3)), "the card's colours are not those of the picture"
+        light = render(args, folder, "linear.exr")
+        assert np.array_equal(light, colors.reshape(-1, 3)), "the image does not have the card's colours"
         print(f"{len(light)} colours\n")
         print("| transform | stops | largest from the formula | mean from Blender | 99 % within |\n| --- | --- | --- | --- | --- |")
         for name, formula in FORMULAS.items():
             for stops in (0, -1.25):
-                shown = render(args, folder, "shown.png", "--bit-depth", "16", "--view-transform", name, "--exposure", str(stops))
+                displayed = render(args, folder, "displayed.png", "--bit-depth", "16", "--view-transform", name, "--exposure", str(stops))
                 exposed = light * 2.0**stops
-                apart = np.abs(shown - formula(exposed)).max()
+                apart = np.abs(displayed - formula(exposed)).max()
                 row, good = [name, f"{stops}", f"{apart:.1e}"], apart < 2e-5
                 if name in BLENDER:
-                    difference = np.abs(shown - blender(name, exposed))
+                    difference = np.abs(displayed - blender(name, exposed))
                     mean, most = difference.mean(), np.quantile(difference, 0.99)
                     row, good = [*row, f"{mean:.5f}", f"{most:.4f}"], good and mean < 0.003 and most < 0.03
                 else:
@@ -250,7 +250,7 @@ def main():
                     for error in (0, 0.01):
                         if (other, error) == (name, 0):
                             continue
-                        if np.abs(shown - wrong(exposed * 2.0**error)).max() < 2e-5:
+                        if np.abs(displayed - wrong(exposed * 2.0**error)).max() < 2e-5:
                             print(f"{name} passes for {other} with {error} stops more")
                             failed = True
     sys.exit(failed)

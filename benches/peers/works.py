@@ -1,4 +1,4 @@
-"""What `run` times."""
+"""The works that `run` times."""
 import dataclasses
 
 import generate
@@ -10,17 +10,17 @@ ALL = ("lavapipe", "mesa-backports", "cpu", "mitsuba", "povray")
 @dataclasses.dataclass
 class Work:
     title: str
-    scene: str  # a file of the repository, or the name of a scene of generate.py
+    scene: str  # a file of the repository, or the name of a scene in generate.py
     size: int = 512
-    kind: str = "render"  # or "cold", "cached": the whole process; "build": reading a mesh and building its tree
+    kind: str = "render"  # or "cold", "cached": the whole process; "build": reading a mesh and building its BVH
     lights: int = 1
     renderers: tuple = ALL
-    repeats: int = 3  # of a round
+    repeats: int = 3  # per round
     integrator: str = "phong"
     spp: int = 16
 
     def generated(self):
-        """The generated scenes that it takes."""
+        """The generated scenes that the work needs."""
         if self.scene not in generate.SCENES:
             return []
         return [self.scene] + ([f"{self.scene}-tiny"] if self.kind == "build" else [])
@@ -30,7 +30,7 @@ class Work:
         return dataclasses.replace(self, title=title, size=size)
 
     def rays(self, spp, light_samples):
-        """A path counts as one."""
+        """The number of nominal rays. A path counts as one ray."""
         return self.size ** 2 * spp * (1 if self.integrator == "path" else 1 + light_samples * self.lights)
 
 
@@ -77,10 +77,10 @@ PATH = {
     "path-rock70k": path("paths around a rock of 69,312 triangles", "path-rock70k", 400),
     "path-cold": path("paths in the assignment scene, whole process, caches empty", CORNELL_PATH, 400, "cold"),
 }
-MATERIALS = {name: dataclasses.replace(work, renderers=NO_POVRAY) for name, work in {  # cycles_scenes.py has not these
+MATERIALS = {name: dataclasses.replace(work, renderers=NO_POVRAY) for name, work in {  # not supported by cycles_scenes.py
     "spheres": path("a rough metal and a rough glass sphere under a map", "path-spheres", 400),
-    "lamps1": path("a room with one lamp", "path-lamps1", 400),
-    "lamps1000": path("a room with 1,000 lamps", "path-lamps1000", 400),
+    "lamps1": path("a room with one area light", "path-lamps1", 400),
+    "lamps1000": path("a room with 1,000 area lights", "path-lamps1000", 400),
     "principled70k": path("principled on a rock of 69,312 triangles", "path-principled70k", 400),
 }.items()}
 WORKS = SMALL | LARGE | PATH | MATERIALS

@@ -1,4 +1,4 @@
-//! The text of a scene in a course's JSON.
+//! Parses arbitrary text as a scene in JSON.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

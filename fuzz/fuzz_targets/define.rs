@@ -1,4 +1,4 @@
-//! KEY=VALUE of --define, put into a scene.
+//! Applies arbitrary `--define KEY=VALUE` texts to a scene.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! A glTF file that has everything, with some values of its JSON and some words of its bytes changed; the whole way to a picture.
+//! Loads and renders a glTF file with all features after random changes of JSON values and of words of its buffer.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -15,9 +15,9 @@ fuzz_target!(|bytes: &[u8]| {
     let words = binary.len() / 4;
     while choices.are_left() {
         let at = choices.below(words) * 4;
-        let strange = [f32::NAN, f32::INFINITY, -3e38, 1e-40, 1e9, 0.0].map(f32::to_bits);
+        let special = [f32::NAN, f32::INFINITY, -3e38, 1e-40, 1e9, 0.0].map(f32::to_bits);
         let word = match choices.below(8) {
-            i @ 0..6 => strange[i],
+            i @ 0..6 => special[i],
             _ => choices.word(),
         };
         binary[at..at + 4].copy_from_slice(&word.to_le_bytes());

@@ -1,4 +1,4 @@
-//! The bytes of a glTF file, with or without a container.
+//! Reads arbitrary bytes as a glTF file, .gltf or .glb.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Compressed views of glTF: streams of another encoder with some of their bytes changed, or any bytes.
+//! Decodes compressed views of glTF: streams of another encoder with changed bytes, or arbitrary bytes.
 #![no_main]
 
 use std::sync::OnceLock;
@@ -11,7 +11,7 @@ use wgray_fuzz::{Choices, container, file, small_model};
 
 const STREAMS: &str = include_str!("../../crates/scene/src/gltf/meshopt/streams.txt");
 
-/// Mode, filter, stride, count and bytes of each.
+/// Returns mode, filter, stride, count and bytes of each stream.
 fn streams() -> &'static [(&'static str, &'static str, u64, u64, Vec<u8>)] {
     static ALL: OnceLock<Vec<(&str, &str, u64, u64, Vec<u8>)>> = OnceLock::new();
     ALL.get_or_init(|| {
@@ -42,7 +42,7 @@ fuzz_target!(|bytes: &[u8]| {
         let at = choices.below(last + 1);
         stream[at] = choices.byte();
     }
-    // Positions of triangles, or their indices, out of the view.
+    // The view has the positions of triangles, or their indices.
     let kind = if mode == "ATTRIBUTES" { "VEC3" } else { "SCALAR" };
     let component = if mode == "ATTRIBUTES" { 5126 } else { 5125 };
     let attributes = if mode == "ATTRIBUTES" {

@@ -1,4 +1,4 @@
-//! The bytes of a file of materials, which a mesh of a scene has.
+//! Reads arbitrary bytes as the MTL file of a mesh and renders the scene.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! The bytes of a mesh file: OBJ.
+//! Reads arbitrary bytes as an OBJ file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

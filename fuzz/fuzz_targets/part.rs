@@ -1,4 +1,4 @@
-//! A part of a picture whose hashes are right: its header, and the words and values of its pieces, are any.
+//! Merges a part file with valid hashes after random changes of its header and of the words and values of its pieces.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -47,7 +47,7 @@ fn written(header: &Value, pieces: &[[u32; 14]], data: &[u8]) -> Vec<u8> {
     file
 }
 
-/// The bytes of a first hit.
+/// Size of a first hit in bytes.
 const HIT: u64 = size_of::<wgray_render::records::FirstHit>() as u64;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -77,7 +77,7 @@ fuzz_target!(|bytes: &[u8]| {
         let layout = parts.layout();
         let whole = layout.region;
         let _ = parts.read(&mut |_| Ok(()));
-        // What the command line asks before it writes.
+        // The checks of the command line before it writes.
         let out = file(&format!("out.{ending}"), b"");
         let Some(format) = Format::of(&out) else { return };
         if format.check_size(whole.width(), whole.height()).is_err() {

@@ -1,4 +1,4 @@
-//! The bytes of a picture that wgray diff reads.
+//! Reads arbitrary bytes as an image file for `wgray diff`.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! The bytes of a mesh file: PLY.
+//! Reads arbitrary bytes as a PLY file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

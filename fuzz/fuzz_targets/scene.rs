@@ -1,4 +1,4 @@
-//! The whole way: a scene with some of its values changed, to a description, to a scene, to a picture, and to a file and back.
+//! Parses, writes, re-parses, validates and renders scene files after random changes of their values.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -30,13 +30,13 @@ fuzz_target!(|bytes: &[u8]| {
     while choices.are_left() {
         changed(&mut file, &mut |count| choices.below(count));
     }
-    // What has no form in TOML stays as it was.
+    // Skips values that TOML cannot represent.
     let Ok(text) = toml::to_string(&file) else { return };
     let Ok(description) = Description::parse(&text, "a.toml") else {
         return;
     };
-    let written = description.to_toml().expect("a text");
-    let again = Description::parse(&written, "a.toml").expect("what was written");
+    let written = description.to_toml().expect("a description converts to TOML");
+    let again = Description::parse(&written, "a.toml").expect("written TOML is valid");
     assert_eq!(again.to_toml().ok(), Some(written));
     let _ = description.validate_with(&Assets::default());
     let overrides = Overrides {

@@ -1,4 +1,4 @@
-//! The bytes of a mesh file: STL.
+//! Reads arbitrary bytes as an STL file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

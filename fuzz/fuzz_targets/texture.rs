@@ -1,4 +1,4 @@
-//! The bytes of an image that a texture names: PNG, JPEG, WebP, KTX2, EXR, HDR.
+//! Reads arbitrary bytes as the image of a texture and of an environment: PNG, JPEG, WebP, KTX2, EXR, HDR.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -29,7 +29,7 @@ fuzz_target!(|bytes: &[u8]| {
     let mut assets = Assets::default();
     assets.encoded.insert("a".to_owned(), bytes.into());
     if let Ok(scene) = description.validate_with(&assets) {
-        // Tables of a large image around the scene take long, and are no reader's.
+        // The importance tables of a large environment map take long and are not part of the readers.
         if bytes.len() < 1 << 16 {
             render(&scene);
         }

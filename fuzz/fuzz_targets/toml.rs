@@ -1,4 +1,4 @@
-//! The text of a scene file.
+//! Parses arbitrary text as a scene file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

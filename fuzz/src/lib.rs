@@ -1,4 +1,4 @@
-//! What the fuzz targets share: choices out of bytes, files for readers that take a path, and one sample of a picture.
+//! Shared code of the fuzz targets: choices from the input bytes, files for readers that need a path, a small render.
 
 #[path = "../../crates/scene/src/gltf/changed.rs"]
 mod changed;
@@ -16,36 +16,36 @@ use wgray::{Device, Options, Overrides, Scene};
 pub use changed::changed;
 pub use everything::everything;
 
-/// Choices that bytes make; where there are no more of them it is always the first.
+/// Choices made by the input bytes; 0 once they are used up.
 pub struct Choices<'a>(pub &'a [u8]);
 
 impl Choices<'_> {
-    /// A byte.
+    /// Returns the next byte.
     pub fn byte(&mut self) -> u8 {
         let (first, rest) = self.0.split_first().unwrap_or((&0, &[]));
         self.0 = rest;
         *first
     }
 
-    /// A word.
+    /// Returns the next four bytes as a little-endian word.
     pub fn word(&mut self) -> u32 {
         u32::from_le_bytes(std::array::from_fn(|_| self.byte()))
     }
 
-    /// One of so many.
+    /// Returns a number below `count`, 0 for a count of 0.
     pub fn below(&mut self, count: usize) -> usize {
         let wide = count > 256;
         let number = u16::from_le_bytes([self.byte(), if wide { self.byte() } else { 0 }]);
         usize::from(number) % count.max(1)
     }
 
-    /// Whether bytes are left.
+    /// Returns whether unused bytes are left.
     pub fn are_left(&self) -> bool {
         !self.0.is_empty()
     }
 }
 
-/// The path of a file with these bytes, in a folder of the process's own.
+/// Writes a file to a temporary folder of the process and returns its path.
 pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| tempfile::tempdir().expect("a folder for files"));
@@ -54,7 +54,7 @@ pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// What makes a picture small.
+/// Overrides for a small, fast render.
 pub fn small() -> Overrides {
     Overrides {
         size: Some((3, 2)),
@@ -64,7 +64,7 @@ pub fn small() -> Overrides {
     }
 }
 
-/// The same for models, before a colour: the tables of the studio take longer than all else.
+/// Like [`small`] for models, with a constant environment, because the tables of the studio would dominate the time.
 pub fn small_model() -> Overrides {
     Overrides {
         environment: Some(EnvironmentDescription::new([0.5, 0.5, 0.5])),
@@ -72,16 +72,16 @@ pub fn small_model() -> Overrides {
     }
 }
 
-/// Renders a scene on the CPU. Whatever passed the checks has a picture.
+/// Renders a scene on the CPU. A scene that passed validation must render without an error.
 pub fn render(scene: &Scene) {
     let options = Options {
         device: Device::Cpu,
         ..Options::default()
     };
-    wgray::render(scene, &options).expect("a picture");
+    wgray::render(scene, &options).expect("a valid scene renders");
 }
 
-/// A container of a JSON and bytes.
+/// Returns a .glb file of a JSON and a buffer.
 pub fn container(json: &serde_json::Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');

@@ -38,20 +38,20 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     var state = before;
     let path = before.path;
     let hit = closest_hit(path.ray, path.origin_prim, path.inside_prim);
-    let met = hit.primitive != NO_INDEX;
+    let is_hit = hit.primitive != NO_INDEX;
     let shown = ((ALPHA == 0u) & ((ENVIRONMENT_FLAGS & ENVIRONMENT_INVISIBLE) == 0u)) | (path.depth > 0u);
-    var arriving = environment.radiance;
+    var environment_light = environment.radiance;
     if (ENVIRONMENT_FLAGS & ENVIRONMENT_MAP) != 0u {
-        if !met {
-            arriving = environment_mis(path.ray.direction, state.pdf, state.prev_normal);
+        if !is_hit {
+            environment_light = environment_mis(path.ray.direction, state.pdf, state.prev_normal);
         }
     }
     if (ENVIRONMENT_FLAGS & BACKGROUND) != 0u {
-        arriving = select(arriving, environment.background, path.depth == 0u);
+        environment_light = select(environment_light, environment.background, path.depth == 0u);
     }
-    state = add_radiance(state, path.throughput * arriving, !met & shown, path.depth);
+    state = add_radiance(state, path.throughput * environment_light, !is_hit & shown, path.depth);
     if (TLAS_KINDS != 0u) | (LOOKUPS != 0u) {
-        if !met {
+        if !is_hit {
             state.ended = true;
             return state;
         }
@@ -65,8 +65,8 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     }
     var material = bounded(shading.material);
     if ALPHA_SURFACES != 0u {
-        if met & !alpha_accepts(material, pixel, state.sample, path.depth, RAY_BSDF, hit, surface.side) {
-            return past(state, surface, at, hit.t);
+        if is_hit & !alpha_accepts(material, pixel, state.sample, path.depth, RAY_BSDF, hit, surface.side) {
+            return continue_through(state, surface, at, hit.t);
         }
     }
     if ABSORPTION != 0u {
@@ -77,7 +77,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         state.path.throughput *= transmittance(absorption, hit.t + state.skipped_distance);
     }
     if EMISSIVE != 0u {
-        state = add_emission(state, prim, hit, surface, material, met);
+        state = add_emission(state, prim, hit, surface, material, is_hit);
     }
     surface.shading_normal = shaded_normal(surface, material, shading.normal);
     state.skipped_distance = 0.0;
@@ -91,11 +91,11 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         }
     }
     if LAYERS != 0u {
-        if met {
+        if is_hit {
             state = record_first_hit_layers(state, surface, material);
         }
     }
-    let goes_on = met & (path.depth < BOUNCES) & (material.kind != EMITTER);
+    let continues = is_hit & (path.depth < BOUNCES) & (material.kind != EMITTER);
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 1u + 2u * path.depth));
     let other_key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 2u + 2u * path.depth));
     var choices = vec2u(0u); // lobe, Russian roulette
@@ -133,7 +133,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
                     chosen = light_tree_select(chosen.emitter, surface.ray_origin, normal, other_key.xy, state.sample);
                 }
                 let u = decision(key.xy, state.sample);
-                state = add_direct_light(state, prim, surface, material, mixture, chosen, u, goes_on, pixel);
+                state = add_direct_light(state, prim, surface, material, mixture, chosen, u, continues, pixel);
             }
             state = sample_bsdf(state, prim, surface, material, mixture, decision(key.zw, state.sample), unit_float(choices.x));
         }
@@ -141,7 +141,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     if RR_DEPTH < BOUNCES {
         state = with_roulette(state, unit_float(choices.y));
     }
-    state.ended |= !goes_on | !(largest(state.path.throughput) > 0.0);
+    state.ended |= !continues | !(largest(state.path.throughput) > 0.0);
     return state;
 }
 
@@ -190,28 +190,28 @@ fn add_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> P
 }
 
 // Adds the emission of the hit surface, with its MIS weight.
-fn add_emission(state: PathState, prim: HitPrimitive, hit: Hit, surface: Surface, material: Material, met: bool) -> PathState {
+fn add_emission(state: PathState, prim: HitPrimitive, hit: Hit, surface: Surface, material: Material, is_hit: bool) -> PathState {
     let one_sided = material.kind == EMITTER;
-    let shines = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
+    let is_emissive = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
     var ray = state.path.ray;
-    var seen = hit;
+    var from_previous = hit;
     if ALPHA_SURFACES != 0u {
         ray.origin -= ray.direction * state.skipped_distance;
-        seen.t += state.skipped_distance;
+        from_previous.t += state.skipped_distance;
     }
-    var weighs = (state.pdf > 0.0) & (EMITTERS != 0u);
+    var uses_mis = (state.pdf > 0.0) & (EMITTERS != 0u);
     var density = material.density;
     if LIGHT_TREE != 0u {
-        density = light_tree_pdf(hit, met & shines & weighs, state.prev_position, state.prev_normal);
-        weighs &= density > 0.0;
+        density = light_tree_pdf(hit, is_hit & is_emissive & uses_mis, state.prev_position, state.prev_normal);
+        uses_mis &= density > 0.0;
     }
-    let weighed = power_heuristic(state.pdf, emitter_pdf(prim, seen, density, ray, surface.normal));
-    let weight = select(1.0, weighed, weighs);
-    return add_radiance(state, state.path.throughput * material.emission * weight, met & shines, state.path.depth);
+    let mis_weight = power_heuristic(state.pdf, emitter_pdf(prim, from_previous, density, ray, surface.normal));
+    let weight = select(1.0, mis_weight, uses_mis);
+    return add_radiance(state, state.path.throughput * material.emission * weight, is_hit & is_emissive, state.path.depth);
 }
 
 // Continues behind a surface that the ray skips.
-fn past(before: PathState, surface: Surface, at: HitDifferential, t: f32) -> PathState {
+fn continue_through(before: PathState, surface: Surface, at: HitDifferential, t: f32) -> PathState {
     var state = before;
     state.path = pass_through_path(before.path, surface, at);
     if CAMERA_INVISIBLE != 0u {
@@ -297,13 +297,13 @@ fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, mate
     }
     found *= select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta);
     let most = largest(found);
-    let dark = !wanted | !(most > 0.0) | !(most < INFINITE_T);
+    let is_dark = !wanted | !(most > 0.0) | !(most < INFINITE_T);
     if ALPHA_SURFACES != 0u {
         let bounce = state.path.depth + 1u;
-        let occluded = is_occluded_alpha(dark, from_side, to, light.t_max, light.primitive, pixel, state.sample, bounce);
+        let occluded = is_occluded_alpha(is_dark, from_side, to, light.t_max, light.primitive, pixel, state.sample, bounce);
         return add_radiance(state, found, !occluded, bounce);
     }
-    let occluded = is_occluded(dark, from_side, to, light.t_max, light.primitive);
+    let occluded = is_occluded(is_dark, from_side, to, light.t_max, light.primitive);
     return add_radiance(state, found, !occluded, state.path.depth + 1u);
 }
 

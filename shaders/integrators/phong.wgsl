@@ -16,7 +16,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
     }
     var sum = vec3f(0.0);
     var pending: array<Path, MAX_SPLIT_DEPTH>;
-    var waiting = 0u;
+    var pending_count = 0u;
     for (var leaf = 0u; leaf < MAX_PATH_LEAVES; leaf++) {
         var hit = no_hit();
         var prim: HitPrimitive;
@@ -33,23 +33,23 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
                 hit.primitive = NO_INDEX;
                 break;
             }
-            let scattered = scatter(prim, hit, path, pixel, sample);
-            path = scattered.primary;
-            if scattered.splits {
-                pending[waiting] = scattered.secondary;
-                waiting++;
+            let split = scatter(prim, hit, path, pixel, sample);
+            path = split.primary;
+            if split.splits {
+                pending[pending_count] = split.secondary;
+                pending_count++;
             }
         }
-        var seen = environment.background;
+        var radiance = environment.background;
         if hit.primitive != NO_INDEX {
-            seen = radiance_from(prim, hit, path, pixel, sample);
+            radiance = radiance_from(prim, hit, path, pixel, sample);
         }
-        sum += path.throughput * seen;
-        if waiting == 0u {
+        sum += path.throughput * radiance;
+        if pending_count == 0u {
             break;
         }
-        waiting--;
-        path = pending[waiting];
+        pending_count--;
+        path = pending[pending_count];
     }
     return sum;
 }

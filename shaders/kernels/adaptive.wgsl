@@ -16,8 +16,8 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     var moments = film[pixels + index];
     var pilot = film[2u * pixels + index];
     var end = params.samples.y;
-    let looks = params.samples.x < PILOT_SAMPLES;
-    if !looks {
+    let is_pilot = params.samples.x < PILOT_SAMPLES;
+    if !is_pilot {
         end = samples_wanted(neighbor_pilot_sum(place), PILOT_SAMPLES, bitcast<f32>(SQUARED_ERROR), end);
     }
     var layers = Layers();
@@ -45,7 +45,7 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
         store_layers(layers, index, 3u);
     }
     film[pixels + index] = moments;
-    if looks {
+    if is_pilot {
         film[2u * pixels + index] = pilot_finish(pilot, sum, moments);
     }
     report_completion(local);

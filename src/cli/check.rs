@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use crate::scene::{CameraPath, Define, Overrides, Projection, Scene, SceneError};
 use clap::ValueHint;
-use wgray_image::visible::visible;
+use wgray_image::sanitize::escape_control;
 #[cfg(feature = "gpu")]
 use wgray_render::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray_render::pack::pack;
@@ -69,7 +69,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 printed = writeln!(
                     io::stdout().lock(),
                     "{}",
-                    visible(&format!("{}: ok: {summary}", path.display()))
+                    escape_control(&format!("{}: ok: {summary}", path.display()))
                 );
             }
             Ok(_) => {} // the reader of standard output has closed it

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 #[cfg(feature = "gpu")]
-use wgray_render::gpu::{self, FloatControls, Info};
+use wgray_render::gpu::{self, FloatControls, GpuInfo};
 
 pub fn run() -> ExitCode {
     super::ended(list(&mut io::stdout().lock()), ExitCode::SUCCESS)
@@ -34,9 +34,9 @@ fn list(out: &mut impl Write) -> io::Result<()> {
 }
 
 #[cfg(feature = "gpu")]
-fn list_adapters(out: &mut impl Write, adapters: &[Info]) -> io::Result<()> {
+fn list_adapters(out: &mut impl Write, adapters: &[GpuInfo]) -> io::Result<()> {
     for (number, info) in (1..).zip(adapters) {
-        let Info {
+        let GpuInfo {
             name,
             driver,
             backend,

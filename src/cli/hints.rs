@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use wgray_image::visible::visible;
+use wgray_image::sanitize::escape_control;
 
 /// Options of other renderers and their equivalents.
 const OPTIONS: [(&str, &str); 21] = [
@@ -58,7 +58,7 @@ pub fn improve(mut error: clap::Error) -> clap::Error {
         let Some(ContextValue::String(word)) = error.get(kind) else {
             continue;
         };
-        let shown = visible(word);
+        let shown = escape_control(word);
         let shown = match shown.chars().count() {
             0..=MAX_WORD_LEN => shown.into_owned(),
             _ => shown.chars().take(MAX_WORD_LEN).chain("...".chars()).collect(),

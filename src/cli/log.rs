@@ -13,7 +13,7 @@ use tracing::span::{Attributes, Id};
 use tracing::{Event, Subscriber};
 use tracing_subscriber::layer::{Context, Layer};
 use tracing_subscriber::registry::LookupSpan;
-use wgray_image::visible::{visible, visible_lines};
+use wgray_image::sanitize::{escape_control, escape_control_in_lines};
 
 /// The format of messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -91,7 +91,7 @@ pub fn say(level: Level, message: &str) {
 /// Prints a message with additional JSON fields.
 pub fn tell(level: Level, message: &str, facts: Facts) {
     if !is_json() {
-        write(&visible(&format!("{}{message}", level.prefix())));
+        write(&escape_control(&format!("{}{message}", level.prefix())));
         return;
     }
     #[derive(Serialize)]
@@ -119,7 +119,7 @@ pub fn tell(level: Level, message: &str, facts: Facts) {
 /// Prints text that continues the previous message; a JSON message has it in its fields instead.
 pub fn explain(text: &str) {
     if !is_json() {
-        write(&visible_lines(text));
+        write(&escape_control_in_lines(text));
     }
 }
 

@@ -12,7 +12,7 @@ use wgray_render::job::Parts;
 use super::frames::{self, Frame};
 use super::log::{self, Level};
 use super::numbers::whole;
-use super::outputs::{Files, Layered, Outputs};
+use super::outputs::{Files, LayerPolicy, Outputs};
 use super::picture_options::PictureOptions;
 use super::{Interrupted, Usage, signal};
 
@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let mut layout = parts.layout();
     layout.view = args.pictures.view(layout.view);
-    let outputs = Outputs::find(&pictures, first, (&layout.aovs, Layered::Available), None)?;
+    let outputs = Outputs::find(&pictures, first, (&layout.aovs, LayerPolicy::Available), None)?;
     outputs.check(&files, None)?;
     outputs.check_size(layout.region)?;
     let begun = outputs.begin().map_err(RenderError::Output)?;

@@ -133,7 +133,7 @@ pub fn main() -> ExitCode {
     };
     prepare_environment(threads);
     signal::file_size_limit_is_an_error();
-    wgray_image::contain::install_quiet_hook(); // panics caused by a lost device are converted to errors
+    wgray_image::panic_guard::install_quiet_hook(); // panics caused by a lost device are converted to errors
     let result = start_threads(threads).and_then(|()| match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),

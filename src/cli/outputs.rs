@@ -62,7 +62,7 @@ impl Files {
 
 /// Determines whether every layer must be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layered {
+pub enum LayerPolicy {
     /// Layers were requested: an output must support them.
     Requested,
     /// Layers are available and are written by the outputs that support them.
@@ -78,7 +78,7 @@ impl Outputs {
     pub fn find(
         options: &PictureOptions,
         default: &Path,
-        (aovs, layered): (&[Aov], Layered),
+        (aovs, layered): (&[Aov], LayerPolicy),
         stats: Option<&Path>,
     ) -> anyhow::Result<Outputs> {
         let paths = match options.output.as_slice() {
@@ -97,7 +97,7 @@ impl Outputs {
         }
         let formats = formats(&found, options.format)?;
         options.check(&formats)?;
-        if let Layered::Requested = layered {
+        if let LayerPolicy::Requested = layered {
             check_layers(aovs, &found, &formats)?;
         }
         let mut pictures = Vec::new();

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::image::{BitDepth, ExrCompression, ExrType, Format, Metadata, SaveOptions, Saved};
+use crate::image::{BitDepth, ExrCompression, ExrType, Format, Metadata, SaveOptions, SaveReport};
 use crate::scene::{ViewSettings, ViewTransform};
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
@@ -71,7 +71,7 @@ impl PictureOptions {
     }
 
     /// Warns about values that exceeded the range of a format.
-    pub fn warn(&self, saved: &Saved, say: &mut dyn FnMut(&str)) {
+    pub fn warn(&self, saved: &SaveReport, say: &mut dyn FnMut(&str)) {
         for (name, count) in &saved.too_large {
             say(&format!(
                 "{name}: {count} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float"

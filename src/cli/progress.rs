@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::facts_of;
 use super::log::{self, Level};
 
-/// The form of progress.
+/// The display of progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
     // A bar on a terminal; otherwise a line every ten seconds. JSON messages use the intervals of Plain.
@@ -34,7 +34,7 @@ const STEPS: f64 = 1000.0;
 
 /// The progress of one render. Dropping it removes the bar.
 pub struct Progress {
-    form: Form,
+    display: Display,
     /// Label printed before each line, with a colon; empty when rendering a single image.
     label: String,
     /// The frame number.
@@ -46,7 +46,7 @@ pub struct Progress {
     printed: (u32, Instant),
 }
 
-enum Form {
+enum Display {
     Bar(Option<ProgressBar>),
     Lines { at_tenths: bool },
     Openjd,
@@ -56,17 +56,17 @@ enum Form {
 impl Progress {
     /// Returns the progress of an image; `label` names the frame if several are rendered.
     pub fn new(mode: Mode, label: Option<String>, frame: Option<u32>) -> Progress {
-        let form = match mode {
-            Mode::Auto if log::is_json() => Form::Lines { at_tenths: true },
-            Mode::Auto if !std::io::stderr().is_terminal() => Form::Lines { at_tenths: false },
-            Mode::Auto => Form::Bar(None),
-            Mode::Plain => Form::Lines { at_tenths: true },
-            Mode::Openjd => Form::Openjd,
-            Mode::None => Form::None,
+        let display = match mode {
+            Mode::Auto if log::is_json() => Display::Lines { at_tenths: true },
+            Mode::Auto if !std::io::stderr().is_terminal() => Display::Lines { at_tenths: false },
+            Mode::Auto => Display::Bar(None),
+            Mode::Plain => Display::Lines { at_tenths: true },
+            Mode::Openjd => Display::Openjd,
+            Mode::None => Display::None,
         };
         let start = Instant::now();
         Progress {
-            form,
+            display,
             label: label.map(|label| format!("{label}: ")).unwrap_or_default(),
             frame,
             start,
@@ -80,30 +80,30 @@ impl Progress {
         let elapsed = self.start.elapsed();
         let first = *self.first.get_or_insert(fraction);
         let remaining = remaining(elapsed, first, fraction);
-        match &mut self.form {
+        match &mut self.display {
             // With several frames, short ones have a bar too.
-            Form::Bar(bar) if elapsed > PATIENCE || !self.label.is_empty() => {
+            Display::Bar(bar) if elapsed > PATIENCE || !self.label.is_empty() => {
                 let bar = bar.get_or_insert_with(|| new_bar(elapsed, &self.label));
                 bar.set_position((fraction * STEPS) as u64);
                 if let Some(remaining) = remaining {
                     bar.set_message(format!(", about {} left", text_of(remaining)));
                 }
             }
-            Form::Lines { at_tenths } => {
+            Display::Lines { at_tenths } => {
                 let tenths = (fraction * 10.0) as u32;
                 if (*at_tenths && tenths > self.printed.0) || self.printed.1.elapsed() > INTERVAL {
                     self.print(fraction, remaining);
                     self.printed = (tenths, Instant::now());
                 }
             }
-            Form::Openjd => {
+            Display::Openjd => {
                 let hundredths = (fraction * 100.0) as u32;
                 if hundredths > self.printed.0 {
                     log::say(Level::Progress, &format!("openjd_progress: {hundredths}"));
                     self.printed.0 = hundredths;
                 }
             }
-            Form::Bar(_) | Form::None => {}
+            Display::Bar(_) | Display::None => {}
         }
     }
 
@@ -148,7 +148,7 @@ fn text_of(duration: Duration) -> String {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Form::Bar(Some(bar)) = &self.form {
+        if let Display::Bar(Some(bar)) = &self.display {
             bar.finish_and_clear();
         }
     }

@@ -1,9 +1,9 @@
 //! Invalid command lines and scenes: one message, the documented exit code, no output file.
 
-use super::{NO_DRIVER, Place, Ran, SCENE};
+use super::{NO_DRIVER, Ran, SCENE, TestFolder};
 
 #[track_caller]
-fn assert_failed(place: &Place, ran: &Ran, code: i32, message: &str) {
+fn assert_failed(place: &TestFolder, ran: &Ran, code: i32, message: &str) {
     assert_eq!(ran.code, code, "{}", ran.stderr);
     assert_eq!(ran.stdout, "");
     assert!(ran.stderr.starts_with("error: "), "{}", ran.stderr);
@@ -13,7 +13,7 @@ fn assert_failed(place: &Place, ran: &Ran, code: i32, message: &str) {
 
 #[test]
 fn wrong_command_lines_exit_with_2() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let cases: [(&[&str], &str); 37] = [
         (&["--size", "64"], "--size"),
         (&["--size", "64x"], "--size"),
@@ -66,10 +66,10 @@ fn wrong_command_lines_exit_with_2() {
         (&["--progress", "loud"], "--progress"),
         (&["-q", "-v"], "cannot be used with"),
         (
-            &["-o", "picture.gif"],
-            "picture.gif: must end in .png, .exr, .jpg, .jpeg or .webp",
+            &["-o", "image.gif"],
+            "image.gif: must end in .png, .exr, .jpg, .jpeg or .webp",
         ),
-        (&["-o", "picture"], "must end in .png, .exr"),
+        (&["-o", "image"], "must end in .png, .exr"),
         (&["-o", ".png"], "must end in .png, .exr"),
         (&["another.toml"], "another.toml"),
         (&["--unknown"], "--unknown"),
@@ -89,8 +89,8 @@ fn wrong_command_lines_exit_with_2() {
 }
 
 #[test]
-fn a_size_in_the_option_makes_room_for_the_crop() {
-    let place = Place::new();
+fn a_crop_may_use_the_size_of_the_option() {
+    let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "--size", "20x20", "--crop", "0,0,11,7"]);
 }
 
@@ -138,7 +138,7 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
         ("[render]", "[render", "bad.toml:3:"),
     ];
     for (from, to, message) in cases {
-        let place = Place::new();
+        let place = TestFolder::new();
         assert!(SCENE.contains(from), "{from}");
         let bad = place.path("small.toml").with_file_name("bad.toml");
         let text = SCENE.replacen(from, to, 1);
@@ -149,7 +149,7 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
             assert_failed(&place, &ran, 3, message);
             assert!(
                 ran.stderr.starts_with("error: bad.toml"),
-                "the place is first: {}",
+                "the message does not start with the file: {}",
                 ran.stderr
             );
         }
@@ -158,8 +158,8 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
 
 /// Keys that only apply to the path integrator are rejected under another integrator, with the message of the file.
 #[test]
-fn an_integrator_in_the_option_needs_a_scene_for_it() {
-    let place = Place::new();
+fn an_integrator_option_validates_the_scene() {
+    let place = TestFolder::new();
     let scene = place.path("small.toml");
     for (from, to, message) in [
         (
@@ -191,8 +191,8 @@ fn an_integrator_in_the_option_needs_a_scene_for_it() {
 }
 
 #[test]
-fn a_missing_scene_is_a_bad_scene() {
-    let place = Place::new();
+fn a_missing_scene_exits_with_3() {
+    let place = TestFolder::new();
     for command in ["render", "check"] {
         assert_failed(
             &place,
@@ -204,16 +204,16 @@ fn a_missing_scene_is_a_bad_scene() {
 }
 
 #[test]
-fn the_check_goes_on_after_a_bad_scene() {
-    let place = Place::new();
+fn the_check_continues_after_an_invalid_scene() {
+    let place = TestFolder::new();
     let ran = place.run(&["check", "none.toml", "small.toml"]);
     assert_eq!(ran.code, 3);
     assert!(ran.stderr.contains("none.toml") && ran.stdout.starts_with("small.toml: ok"));
 }
 
 #[test]
-fn a_device_that_is_not_there_exits_with_4() {
-    let place = Place::new();
+fn a_missing_device_exits_with_4() {
+    let place = TestFolder::new();
     let ran = place.run(&["render", "small.toml", "--device", "abacus"]);
     assert_failed(
         &place,

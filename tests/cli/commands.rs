@@ -1,10 +1,10 @@
 //! Commands other than `render`, and the help.
 
-use super::{NO_DRIVER, Place, project_scene};
+use super::{NO_DRIVER, TestFolder, project_scene};
 
 #[test]
 fn devices_are_listed() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let ran = place.run(&["devices"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     for word in ["driver", "largest buffer", "cpu", "auto selects: "] {
@@ -18,7 +18,7 @@ fn devices_are_listed() {
 
 #[test]
 fn good_scenes_pass_the_check_without_a_device() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let cornell = project_scene("cornell.toml");
     let ran = place.run_with(&["check", "small.toml", &cornell], &NO_DRIVER);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
@@ -36,7 +36,7 @@ fn good_scenes_pass_the_check_without_a_device() {
 
 #[test]
 fn a_check_warns_of_scenes_that_render_black() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let (start, lit) = super::SCENE.split_once("[[lights]]").unwrap();
     let (_, shapes) = lit.split_once("[[shapes]]").unwrap();
     let dark = format!("{start}[[shapes]]{shapes}").replace("[0.1, 0.1, 0.1]", "[0, 0, 0]");
@@ -51,7 +51,7 @@ fn a_check_warns_of_scenes_that_render_black() {
 
 #[test]
 fn a_mesh_away_from_the_origin_is_found_in_view() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("far.obj", "v 100 0 0\nv 101 0 0\nv 100 0 1\nf 1 2 3\n");
     let (start, rest) = super::SCENE.split_once("[[shapes]]").unwrap();
     let mesh = "[[shapes]]\ntype = 'mesh'\nmaterial = 'gray'\nfile = 'far.obj'\n";
@@ -78,8 +78,8 @@ fn a_mesh_away_from_the_origin_is_found_in_view() {
 }
 
 #[test]
-fn help_and_version_are_no_errors() {
-    let place = Place::new();
+fn help_and_version_exit_with_0() {
+    let place = TestFolder::new();
     for arguments in [
         &["--help"][..],
         &["render", "--help"],
@@ -112,13 +112,13 @@ fn help_and_version_are_no_errors() {
         "--quiet",
         "--verbose",
     ] {
-        assert!(help.contains(option), "{option} is not told of");
+        assert!(help.contains(option), "{option} is missing in the help");
     }
 }
 
 #[test]
 fn the_scenes_of_the_documents_are_good() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for document in ["README.md", "docs/scene-format.md"] {
         let text = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(document)).unwrap();
         let scenes: Vec<&str> = text

@@ -5,10 +5,10 @@ use std::fs;
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, LayerAttributes, SmallVec, WritableImage as _, f16};
 use exr::prelude::{Encoding, Image};
 
-use super::{Place, Ran};
+use super::{Ran, TestFolder};
 
 /// Writes an 8-bit PNG; the number of values determines the color type.
-fn png(place: &Place, name: &str, (width, height): (u32, u32), values: &[u8]) {
+fn png(place: &TestFolder, name: &str, (width, height): (u32, u32), values: &[u8]) {
     let color = match values.len() / (width * height) as usize {
         1 => png::ColorType::Grayscale,
         2 => png::ColorType::GrayscaleAlpha,
@@ -18,7 +18,14 @@ fn png(place: &Place, name: &str, (width, height): (u32, u32), values: &[u8]) {
     write_png(place, name, (width, height), color, png::BitDepth::Eight, values);
 }
 
-fn write_png(place: &Place, name: &str, size: (u32, u32), color: png::ColorType, depth: png::BitDepth, values: &[u8]) {
+fn write_png(
+    place: &TestFolder,
+    name: &str,
+    size: (u32, u32),
+    color: png::ColorType,
+    depth: png::BitDepth,
+    values: &[u8],
+) {
     let file = fs::File::create(place.path(name)).unwrap();
     let mut encoder = png::Encoder::new(file, size.0, size.1);
     encoder.set_color(color);
@@ -29,12 +36,12 @@ fn write_png(place: &Place, name: &str, size: (u32, u32), color: png::ColorType,
     encoder.write_header().unwrap().write_image_data(values).unwrap();
 }
 
-fn exr(place: &Place, name: &str, size: (usize, usize), channels: Vec<(&str, FlatSamples)>) {
+fn exr(place: &TestFolder, name: &str, size: (usize, usize), channels: Vec<(&str, FlatSamples)>) {
     exr_parts(place, name, size, vec![("part", channels)], Encoding::FAST_LOSSLESS);
 }
 
 fn exr_parts(
-    place: &Place,
+    place: &TestFolder,
     name: &str,
     size: (usize, usize),
     parts: Vec<(&str, Vec<(&str, FlatSamples)>)>,
@@ -66,7 +73,7 @@ fn gray(values: &[f32]) -> Vec<(&'static str, FlatSamples)> {
 }
 
 /// Writes two images of 4 x 2 pixels that differ by 10 steps in one value.
-fn two(place: &Place) -> (Vec<u8>, Vec<u8>) {
+fn two(place: &TestFolder) -> (Vec<u8>, Vec<u8>) {
     let a: Vec<u8> = (0..24).map(|i| i * 9).collect();
     let mut b = a.clone();
     b[16] += 10; // pixel (1, 1), green
@@ -93,7 +100,7 @@ fn json(ran: &Ran) -> serde_json::Value {
 
 #[test]
 fn the_same_bits_pass_and_any_other_bit_fails() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let (a, _) = two(&place);
     png(&place, "copy.png", (4, 2), &a);
     for other in ["a.png", "copy.png"] {
@@ -115,7 +122,7 @@ fn the_same_bits_pass_and_any_other_bit_fails() {
 
 #[test]
 fn json_has_the_same_names() {
-    let place = Place::new();
+    let place = TestFolder::new();
     two(&place);
     let ran = place.run(&["diff", "a.png", "b.png", "--json"]);
     assert_eq!(ran.code, 5);
@@ -154,8 +161,8 @@ fn json_has_the_same_names() {
 }
 
 #[test]
-fn limits_say_what_is_too_much() {
-    let place = Place::new();
+fn limits_decide_the_exit_code() {
+    let place = TestFolder::new();
     two(&place);
     let passes = |limits: &[&str]| {
         let options: Vec<&str> = limits.iter().flat_map(|limit| ["--fail", limit]).collect();
@@ -191,7 +198,7 @@ fn limits_say_what_is_too_much() {
 
 #[test]
 fn wrong_command_lines_exit_with_2() {
-    let place = Place::new();
+    let place = TestFolder::new();
     two(&place);
     exr(&place, "depth.exr", (2, 1), vec![("depth.Z", floats(&[1.0, 2.0]))]);
     let metrics = "different, largest, share, rmse, rel_mse, psnr, ssim, flip";
@@ -244,13 +251,13 @@ fn wrong_command_lines_exit_with_2() {
 }
 
 #[test]
-fn what_is_no_picture_exits_with_1() {
-    let place = Place::new();
+fn files_that_are_not_images_exit_with_1() {
+    let place = TestFolder::new();
     let (a, _) = two(&place);
     let whole = place.read("a.png");
     for (name, bytes) in [
         ("empty.png", &[][..]),
-        ("text.png", b"no picture"),
+        ("text.png", b"not a PNG!"),
         ("short.png", &whole[..whole.len() / 2]),
         ("endless.png", &whole[..whole.len() - 12]),
     ] {
@@ -284,8 +291,8 @@ fn what_is_no_picture_exits_with_1() {
     }
     // the cause is printed only once
     for arguments in [["diff", "absent.png", "a.png"], ["diff", "a.png", "absent.png"]] {
-        let told = "error: absent.png: cannot be read: No such file or directory (os error 2)\n";
-        assert_eq!(place.run(&arguments).stderr, told);
+        let message = "error: absent.png: cannot be read: No such file or directory (os error 2)\n";
+        assert_eq!(place.run(&arguments).stderr, message);
     }
     // the format comes from the content, not from the extension
     png(&place, "a.exr", (4, 2), &a);
@@ -294,7 +301,7 @@ fn what_is_no_picture_exits_with_1() {
 
 #[test]
 fn different_sizes_and_places_differ() {
-    let place = Place::new();
+    let place = TestFolder::new();
     two(&place);
     png(&place, "wide.png", (8, 1), &[0; 24]);
     let ran = place.run(&["diff", "a.png", "wide.png", "--fail", "rmse=1", "--out", "out.png"]);
@@ -314,8 +321,8 @@ fn different_sizes_and_places_differ() {
 }
 
 #[test]
-fn channels_that_one_lacks_differ_unless_left_out() {
-    let place = Place::new();
+fn missing_channels_differ_unless_excluded() {
+    let place = TestFolder::new();
     let colors = || gray(&[0.25, 0.5]);
     let depth = |z: f32| vec![("depth.Z", floats(&[1.0, z]))];
     exr(&place, "both.exr", (2, 1), [colors(), depth(2.0)].concat());
@@ -354,8 +361,8 @@ fn channels_that_one_lacks_differ_unless_left_out() {
 }
 
 #[test]
-fn what_is_no_finite_number_is_counted_and_fails() {
-    let place = Place::new();
+fn non_finite_values_are_counted_and_fail() {
+    let place = TestFolder::new();
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     let red = |values: &[f32]| {
         let mut channels = gray(&[0.5; 4]);
@@ -384,8 +391,8 @@ fn what_is_no_finite_number_is_counted_and_fails() {
 }
 
 #[test]
-fn signed_zeros_are_other_bits_that_weigh_nothing() {
-    let place = Place::new();
+fn signed_zeros_differ_by_zero() {
+    let place = TestFolder::new();
     exr(&place, "plus.exr", (1, 1), gray(&[0.0]));
     exr(&place, "minus.exr", (1, 1), gray(&[-0.0]));
     let ran = place.run(&["diff", "plus.exr", "minus.exr"]);
@@ -399,8 +406,8 @@ fn signed_zeros_are_other_bits_that_weigh_nothing() {
 }
 
 #[test]
-fn the_threshold_is_what_the_share_is_above() {
-    let place = Place::new();
+fn the_share_counts_differences_above_the_threshold() {
+    let place = TestFolder::new();
     let (a, mut b) = two(&place);
     b[0] += 1;
     png(&place, "b.png", (4, 2), &b);
@@ -416,8 +423,8 @@ fn the_threshold_is_what_the_share_is_above() {
 }
 
 #[test]
-fn only_what_is_asked_for_is_computed() {
-    let place = Place::new();
+fn only_requested_metrics_are_computed() {
+    let place = TestFolder::new();
     two(&place);
     let ran = place.run(&[
         "diff",
@@ -448,9 +455,9 @@ fn only_what_is_asked_for_is_computed() {
 }
 
 #[test]
-fn how_a_file_stores_values_does_not_matter() {
+fn encodings_of_equal_values_are_equal() {
     use png::{BitDepth, ColorType};
-    let place = Place::new();
+    let place = TestFolder::new();
     let colors = [
         10, 20, 30, 200, 100, 0, 10, 20, 30, 10, 20, 30, 200, 100, 0, 200, 100, 0, 10, 20, 30, 10, 20, 30,
     ];
@@ -527,7 +534,7 @@ fn how_a_file_stores_values_does_not_matter() {
 
 #[test]
 fn jpegs_and_interlaced_pngs_are_read() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let jpeg = |name: &str, value: u8| {
         let pixels = vec![value; 16 * 8 * 3];
         image::save_buffer(place.path(name), &pixels, 16, 8, image::ColorType::Rgb8).unwrap();
@@ -567,7 +574,7 @@ fn jpegs_and_interlaced_pngs_are_read() {
 
 #[test]
 fn parts_of_an_exr_are_layers() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let parts = |x: f32| vec![("beauty", gray(&[0.5])), ("normal", vec![("X", floats(&[x]))])];
     exr_parts(&place, "a.exr", (1, 1), parts(0.0), Encoding::FAST_LOSSLESS);
     exr_parts(&place, "b.exr", (1, 1), parts(1.0), Encoding::FAST_LOSSLESS);
@@ -579,7 +586,7 @@ fn parts_of_an_exr_are_layers() {
 
 #[test]
 fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for name in ["out.png", "out.exr"] {
         place.quietly(&["render", "small.toml", "--device", "cpu", "-o", name]);
     }
@@ -607,7 +614,7 @@ fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
 
 #[test]
 fn standard_input_and_pipes_are_read() {
-    let place = Place::new();
+    let place = TestFolder::new();
     two(&place);
     let lines: [(&str, i32); 3] = [
         ("cat a.png | \"$0\" diff - a.png", 0),
@@ -632,8 +639,8 @@ fn standard_input_and_pipes_are_read() {
 }
 
 #[test]
-fn a_picture_of_the_difference_shows_where_it_is() {
-    let place = Place::new();
+fn the_difference_image_shows_the_location() {
+    let place = TestFolder::new();
     // one bit of one pixel in half a million
     let (width, height) = (1000, 500);
     let mut values = vec![60; width * height * 3];
@@ -670,8 +677,8 @@ fn a_picture_of_the_difference_shows_where_it_is() {
 }
 
 #[test]
-fn a_picture_that_cannot_be_written_exits_with_8() {
-    let place = Place::new();
+fn an_unwritable_difference_image_exits_with_8() {
+    let place = TestFolder::new();
     two(&place);
     let before = place.read("a.png");
     fs::create_dir(place.path("folder.png")).unwrap();
@@ -699,8 +706,8 @@ fn a_picture_that_cannot_be_written_exits_with_8() {
 }
 
 #[test]
-fn the_smallest_and_the_longest_pictures_have_all_figures() {
-    let place = Place::new();
+fn all_metrics_exist_for_extreme_sizes() {
+    let place = TestFolder::new();
     for (width, height) in [(1, 1), (65536, 1), (1, 65536), (10, 11), (11, 10)] {
         let count = (width * height * 3) as usize;
         png(&place, "a.png", (width, height), &vec![50; count]);

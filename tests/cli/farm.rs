@@ -4,7 +4,7 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 
-use super::{Place, Ran, program, project};
+use super::{Ran, TestFolder, program, project};
 
 /// A name with characters that are special in a shell, in YAML or in Open Job Description.
 const ODD: &str = "it's $HOME \"{{a}}\" #1 é.toml";
@@ -18,7 +18,7 @@ fn template(name: &str) -> String {
 }
 
 /// Writes the template for Slurm with these settings.
-fn write_slurm(place: &Place, variables: &str, scene: &str, options: &str, output: &str) {
+fn write_slurm(place: &TestFolder, variables: &str, scene: &str, options: &str, output: &str) {
     let text = template("slurm.sh");
     let (head, rest) = text.split_once("# Settings.").expect("the settings");
     let (_, rest) = rest
@@ -49,14 +49,14 @@ fn run(words: &[&str], variables: &[(&str, &str)]) -> Ran {
 }
 
 /// Runs a task of an array as Slurm does.
-fn task(place: &Place, kind: &str, first: &str, index: &str) -> Ran {
+fn task(place: &TestFolder, kind: &str, first: &str, index: &str) -> Ran {
     let script = place.path("slurm.sh").display().to_string();
     let folder = place.folder().display().to_string();
     run(&[&script, kind, &folder, first], &[("SLURM_ARRAY_TASK_ID", index)])
 }
 
 /// Renders the scene with the odd name, and returns the bytes of its image and of one with another seed.
-fn whole(place: &Place) -> [Vec<u8>; 2] {
+fn whole(place: &TestFolder) -> [Vec<u8>; 2] {
     fs::copy(place.path("small.toml"), place.path(ODD)).expect("a copy");
     ["", "--seed 5"].map(|more| {
         let line = format!("$0 render {ODD_QUOTED} {OPTIONS} {more} --reproducible -o whole.exr");
@@ -67,7 +67,7 @@ fn whole(place: &Place) -> [Vec<u8>; 2] {
 
 #[test]
 fn tasks_of_slurm_render_the_image() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let [expected, other_seed] = whole(&place);
     assert!(expected != other_seed, "the control");
     write_slurm(
@@ -109,7 +109,7 @@ fn tasks_of_slurm_render_the_image() {
 
 #[test]
 fn tasks_of_slurm_render_frames() {
-    let place = Place::new();
+    let place = TestFolder::new();
     fs::copy(project("scenes/turntable.toml"), place.path("turn.toml")).expect("a copy");
     let options = "--size 8x6 --spp 1 --device cpu";
     assert_eq!(
@@ -140,14 +140,14 @@ fn tasks_of_slurm_render_frames() {
 }
 
 /// Writes a program for tests into the folder `bin`.
-fn write_program(place: &Place, name: &str, script: &str) {
+fn write_program(place: &TestFolder, name: &str, script: &str) {
     let path = place.path("bin").join(name);
     fs::create_dir_all(place.path("bin")).expect("a folder");
     fs::write(&path, format!("#!/bin/sh\n{script}\n")).expect("a program");
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("a program");
 }
 
-fn path_with_bin(place: &Place) -> String {
+fn path_with_bin(place: &TestFolder) -> String {
     format!(
         "{}:{}",
         place.path("bin").display(),
@@ -158,7 +158,7 @@ fn path_with_bin(place: &Place) -> String {
 /// A task that is signaled before its time limit is requeued, unless it was cancelled or requeued too often.
 #[test]
 fn signaled_tasks_of_slurm_are_requeued() {
-    let place = Place::new();
+    let place = TestFolder::new();
     write_slurm(
         &place,
         "job=job tiles=1 frames=",
@@ -217,7 +217,7 @@ fn signaled_tasks_of_slurm_are_requeued() {
 
 #[test]
 fn arrays_are_as_few_as_the_cluster_allows() {
-    let place = Place::new();
+    let place = TestFolder::new();
     write_slurm(
         &place,
         "job=job tiles=2 frames='1 2 3 4 5 6'",
@@ -297,7 +297,7 @@ fn scripts(template: &str) -> Vec<String> {
 
 #[test]
 fn scripts_of_open_job_description_render_the_image() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let [expected, other_seed] = whole(&place);
     assert!(expected != other_seed, "the control");
     let scripts = scripts(&template("wgray.openjd.yaml"));

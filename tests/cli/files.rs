@@ -2,11 +2,11 @@
 
 use std::fs;
 
-use super::Place;
+use super::TestFolder;
 
 #[test]
 fn a_file_that_cannot_be_written_fails_with_8() {
-    let place = Place::new();
+    let place = TestFolder::new();
     fs::create_dir(place.path("folder.png")).unwrap();
     for (output, message) in [
         (
@@ -23,7 +23,7 @@ fn a_file_that_cannot_be_written_fails_with_8() {
     }
     let ran = place.run(&["render", "small.toml", "--stats", "nowhere/stats.json"]);
     assert_eq!(ran.code, 8);
-    assert_eq!(place.files(), ["folder.png"], "it is told before the render");
+    assert_eq!(place.files(), ["folder.png"], "reported before the render");
     assert!(
         ran.stderr.contains("nowhere/stats.json: cannot be written"),
         "{}",
@@ -33,7 +33,7 @@ fn a_file_that_cannot_be_written_fails_with_8() {
 
 #[test]
 fn a_file_is_replaced_by_the_next() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("out.png", "old");
     place.quietly(&["render", "small.toml", "-o", "out.png"]);
     assert!(place.read("out.png").starts_with(b"\x89PNG"));
@@ -51,7 +51,7 @@ mod unix {
 
     #[test]
     fn permissions_are_those_of_any_new_file() {
-        let place = Place::new();
+        let place = TestFolder::new();
         place.quietly(&["render", "small.toml", "--stats", "stats.json"]);
         let mode = |name: &str| fs::metadata(place.path(name)).unwrap().permissions().mode();
         assert_eq!(mode("small.png"), mode("small.toml"));
@@ -60,8 +60,8 @@ mod unix {
 
     /// Simulates a full disk by a limit on file sizes.
     #[test]
-    fn half_a_file_is_not_kept() {
-        let place = Place::new();
+    fn an_incomplete_file_is_removed() {
+        let place = TestFolder::new();
         for (output, aov) in [("out.png", "normal"), ("out.exr", "depth")] {
             place.write(output, "old");
             let command = "trap '' XFSZ; ulimit -f 8; exec \"$0\" render small.toml --size 300x300 --spp 1 \"$@\"";
@@ -84,7 +84,7 @@ mod unix {
     }
 
     /// Starts a render that would take minutes and waits until its temporary file exists.
-    fn long_render(place: &Place, shell: &str, options: &[&str]) -> Child {
+    fn long_render(place: &TestFolder, shell: &str, options: &[&str]) -> Child {
         let before = temporary(place);
         let child = Command::new("sh")
             .current_dir(place.path("."))
@@ -101,7 +101,7 @@ mod unix {
         while temporary(place) == before {
             assert!(
                 start.elapsed() < Duration::from_secs(60),
-                "no file was begun: {:?}",
+                "no file was created: {:?}",
                 place.files()
             );
             std::thread::sleep(Duration::from_millis(20));
@@ -109,7 +109,7 @@ mod unix {
         child
     }
 
-    fn temporary(place: &Place) -> Vec<String> {
+    fn temporary(place: &TestFolder) -> Vec<String> {
         place
             .files()
             .into_iter()
@@ -126,7 +126,7 @@ mod unix {
     }
 
     #[test]
-    fn an_interrupted_render_leaves_no_trace() {
+    fn an_interrupted_render_leaves_no_files() {
         crate::cli::heed_interrupts();
         for (device, signal, code) in [
             ("cpu", "-INT", 130),
@@ -134,7 +134,7 @@ mod unix {
             ("cpu", "-TERM", 143),
             ("cpu", "-HUP", 129),
         ] {
-            let place = Place::new();
+            let place = TestFolder::new();
             place.write("out.exr", "old");
             let mut child = long_render(&place, "", &["--spp", "400", "--device", device]);
             std::thread::sleep(Duration::from_millis(100)); // the signal handler is installed after the file is created
@@ -147,9 +147,9 @@ mod unix {
 
     /// Signals that `nohup` (SIGHUP) and shells (SIGINT, for background jobs) ignore for their children.
     #[test]
-    fn signals_that_were_ignored_at_the_start_stay_so() {
+    fn ignored_signals_stay_ignored() {
         for signal in ["HUP", "INT", "TERM"] {
-            let place = Place::new();
+            let place = TestFolder::new();
             let ignore = format!("trap '' {signal};");
             let mut child = long_render(
                 &place,
@@ -163,8 +163,8 @@ mod unix {
     }
 
     #[test]
-    fn what_a_killed_render_left_tells_whose_it_is_and_is_removed_by_the_next() {
-        let place = Place::new();
+    fn temporary_files_of_killed_renders_are_removed_by_the_next() {
+        let place = TestFolder::new();
         let mut killed = long_render(&place, "", &["--spp", "400", "--device", "cpu"]);
         send("-KILL", &killed);
         killed.wait().unwrap();
@@ -184,7 +184,7 @@ mod unix {
             .into_iter()
             .find(|name| name.contains(&format!("-{}@", living.id())))
             .unwrap();
-        assert!(!place.path(&left).exists(), "removed as the next one began");
+        assert!(!place.path(&left).exists(), "removed by the next render");
         place.quietly(&["render", "small.toml", "-o", "out.exr", "--device", "cpu"]);
         let mut expected = [other_machine, other_output, folder, living_file];
         expected.sort();
@@ -194,8 +194,8 @@ mod unix {
     }
 
     #[test]
-    fn a_reader_that_goes_is_no_failure() {
-        let place = Place::new();
+    fn a_closed_pipe_is_not_an_error() {
+        let place = TestFolder::new();
         let output = Command::new("sh")
             .current_dir(place.path("."))
             .args(["-c", "{ \"$0\" check small.toml small.toml; echo $? >&2; } | true"])

@@ -3,11 +3,11 @@
 use std::fs;
 use std::time::{Duration, SystemTime};
 
-use super::{NO_DRIVER, Place, SCENE};
+use super::{NO_DRIVER, SCENE, TestFolder};
 use crate::gltf::build::png;
 
 /// Writes the test scene with a camera that moves from left to right and is centered at frame 5.
-fn moving(place: &Place, interpolation: &str) {
+fn moving(place: &TestFolder, interpolation: &str) {
     let keys = "{ frame = 1, position = [-2, -5, 1] }, { frame = 5, position = [0, -5, 1] }, { frame = 9, position = [2, -5, 1] }";
     let path = format!("fov = 40, path = {{ interpolation = \"{interpolation}\", keys = [{keys}] }} }}");
     assert!(SCENE.contains("fov = 40 }"));
@@ -15,7 +15,7 @@ fn moving(place: &Place, interpolation: &str) {
 }
 
 /// Returns the width and the bits of the colors of an EXR. The metadata may depend on the source file.
-fn bits(place: &Place, name: &str) -> (u32, Vec<u32>) {
+fn bits(place: &TestFolder, name: &str) -> (u32, Vec<u32>) {
     let picture = image::open(place.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     let picture = picture.into_rgb32f();
     (
@@ -26,12 +26,12 @@ fn bits(place: &Place, name: &str) -> (u32, Vec<u32>) {
 
 const CPU: [&str; 2] = ["--device", "cpu"];
 
-fn quietly(place: &Place, arguments: &[&str]) {
+fn quietly(place: &TestFolder, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &CPU[..]].concat());
 }
 
 /// Runs a render that must be rejected with this code and message and write no file.
-fn refused(place: &Place, arguments: &[&str], code: i32, told: &str) {
+fn refused(place: &TestFolder, arguments: &[&str], code: i32, message: &str) {
     let before = place.files();
     let ran = place.run(&[&["render"], arguments, &CPU[..]].concat());
     assert_eq!(
@@ -40,14 +40,14 @@ fn refused(place: &Place, arguments: &[&str], code: i32, told: &str) {
         "{arguments:?}: {}",
         ran.stderr
     );
-    assert!(ran.stderr.contains(told), "{arguments:?}: {}\n{told}", ran.stderr);
+    assert!(ran.stderr.contains(message), "{arguments:?}: {}\n{message}", ran.stderr);
     assert_eq!(place.files(), before, "{arguments:?}");
 }
 
 #[test]
-fn a_frame_is_what_the_camera_sees_from_there() {
+fn a_frame_equals_a_still_image_of_its_camera() {
     for interpolation in ["linear", "smooth"] {
-        let place = Place::new();
+        let place = TestFolder::new();
         moving(&place, interpolation);
         quietly(&place, &["moving.toml", "--frames", "1-9:4", "-o", "out.###.exr"]);
         assert_eq!(
@@ -80,7 +80,7 @@ fn a_frame_is_what_the_camera_sees_from_there() {
 
 #[test]
 fn on_any_device_frames_have_the_same_bits() {
-    let place = Place::new();
+    let place = TestFolder::new();
     moving(&place, "smooth");
     place.run(&["render", "moving.toml", "--frames", "2-4", "-o", "any.#.exr"]);
     quietly(&place, &["moving.toml", "--frames", "2-4", "-o", "cpu.#.exr"]);
@@ -93,7 +93,7 @@ fn on_any_device_frames_have_the_same_bits() {
 
 #[test]
 fn names_have_the_numbers_and_folders_keep_their_marks() {
-    let place = Place::new();
+    let place = TestFolder::new();
     moving(&place, "linear");
     fs::create_dir(place.path("a##b")).unwrap();
     let arguments = [
@@ -143,8 +143,8 @@ fn names_have_the_numbers_and_folders_keep_their_marks() {
 }
 
 #[test]
-fn names_that_do_not_tell_frames_apart_are_refused() {
-    let place = Place::new();
+fn ambiguous_frame_names_are_rejected() {
+    let place = TestFolder::new();
     moving(&place, "linear");
     fs::create_dir(place.path("a#")).unwrap();
     let rule = "needs # for the frame number, such as out.####.png, with 2 frames";
@@ -175,7 +175,7 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
     place.write("textured.toml", &texture);
     let input = ["textured.toml", "--frames", "1-2", "-o", "t.#.png"];
     refused(&place, &input, 2, "--output: t.2.png is an input of the scene");
-    for (frames, told) in [
+    for (frames, message) in [
         (
             "",
             "must be whole numbers from 0 to 999999999, such as 5, 1-10, 1-10:2 or 1-3,7",
@@ -187,13 +187,13 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
         ("1-4000000000", "4000000000: must be whole numbers from 0 to 999999999"),
         ("0-999999999", "must be at most 100000 frames"),
     ] {
-        refused(&place, &["moving.toml", "--frames", frames, "-o", "#.png"], 2, told);
+        refused(&place, &["moving.toml", "--frames", frames, "-o", "#.png"], 2, message);
     }
 }
 
 #[test]
-fn ten_thousand_frames_are_no_cliff() {
-    let place = Place::new();
+fn ten_thousand_frames_are_planned_fast() {
+    let place = TestFolder::new();
     moving(&place, "smooth");
     let small = [
         "moving.toml",
@@ -226,8 +226,8 @@ fn ten_thousand_frames_are_no_cliff() {
 }
 
 #[test]
-fn frames_that_are_there_stay_if_that_is_asked_for() {
-    let place = Place::new();
+fn existing_frames_are_skipped_on_request() {
+    let place = TestFolder::new();
     moving(&place, "linear");
     let arguments = [
         "moving.toml",
@@ -255,9 +255,9 @@ fn frames_that_are_there_stay_if_that_is_asked_for() {
     };
     let is_old = |name: &str| fs::metadata(place.path(name)).unwrap().modified().unwrap() == old;
     all.iter().copied().for_each(age);
-    let again = |told: &str| {
+    let again = |message: &str| {
         let ran = place.run(&[&["render"], &arguments[..], &CPU].concat());
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, told));
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, message));
     };
     again("note: skipped 3 of 3: the output files exist\n");
     assert!(all.into_iter().all(is_old));
@@ -294,16 +294,16 @@ fn frames_that_are_there_stay_if_that_is_asked_for() {
 }
 
 #[test]
-fn a_camera_without_a_view_is_refused_before_anything_is_rendered() {
-    let place = Place::new();
+fn invalid_cameras_are_rejected_before_the_first_frame() {
+    let place = TestFolder::new();
     let path = "fov = 40, path.keys = [{ frame = 1, position = [0, -5, 1] }, { frame = 7, position = [0, 5, 1] }] }";
     place.write("through.toml", &SCENE.replace("fov = 40 }", path));
-    let told = "through.toml:2: camera.path: at frame 4, look_at: [0, 0, 1] must differ from the camera's position";
-    refused(&place, &["through.toml", "--frames", "1-7", "-o", "#.png"], 3, told);
+    let message = "through.toml:2: camera.path: at frame 4, look_at: [0, 0, 1] must differ from the camera's position";
+    refused(&place, &["through.toml", "--frames", "1-7", "-o", "#.png"], 3, message);
     quietly(&place, &["through.toml", "--frames", "1-7:2", "-o", "#.png"]);
     let ran = place.run(&["check", "through.toml"]);
     assert_eq!(ran.code, 3);
-    assert!(ran.stderr.contains(told), "{}", ran.stderr);
+    assert!(ran.stderr.contains(message), "{}", ran.stderr);
     moving(&place, "linear");
     let ran = place.run(&["check", "moving.toml"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
@@ -315,8 +315,8 @@ fn a_camera_without_a_view_is_refused_before_anything_is_rendered() {
 }
 
 #[test]
-fn a_frame_that_fails_ends_the_run_and_what_was_done_stays() {
-    let place = Place::new();
+fn a_failed_frame_ends_the_run_and_finished_frames_remain() {
+    let place = TestFolder::new();
     moving(&place, "linear");
     // /dev/full passes the check at the start, as it is not a regular file. Writing the second frame to it fails.
     #[cfg(target_os = "linux")]
@@ -335,8 +335,8 @@ fn a_frame_that_fails_ends_the_run_and_what_was_done_stays() {
 }
 
 #[test]
-fn progress_and_notes_say_which_frame_and_come_once() {
-    let place = Place::new();
+fn progress_and_notes_name_the_frame() {
+    let place = TestFolder::new();
     moving(&place, "linear");
     let ran = place.run(
         &[
@@ -346,8 +346,8 @@ fn progress_and_notes_say_which_frame_and_come_once() {
         .concat(),
     );
     assert_eq!(ran.code, 0);
-    for told in ["frame 3 (1 of 2): 100 % done", "frame 5 (2 of 2): 100 % done"] {
-        assert!(ran.stderr.contains(told), "{}", ran.stderr);
+    for message in ["frame 3 (1 of 2): 100 % done", "frame 5 (2 of 2): 100 % done"] {
+        assert!(ran.stderr.contains(message), "{}", ran.stderr);
     }
     let ran = place.run_with(
         &["render", "small.toml", "--frames", "1-3", "--size", "2x2"],
@@ -367,7 +367,7 @@ fn progress_and_notes_say_which_frame_and_come_once() {
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_all_frames() {
-    let place = Place::new();
+    let place = TestFolder::new();
     moving(&place, "linear");
     let mut child = std::process::Command::new(super::program())
         .current_dir(place.path("."))
@@ -401,13 +401,13 @@ fn a_signal_ends_all_frames() {
     assert!(files.len() > 3 && files.len() < 1000, "{}", files.len());
     assert!(
         files.iter().all(|name| !name.starts_with('.')),
-        "something is left behind: {files:?}"
+        "files left behind: {files:?}"
     );
 }
 
 #[test]
-fn a_defined_render_is_that_of_an_edited_scene() {
-    let place = Place::new();
+fn a_define_equals_an_edited_scene() {
+    let place = TestFolder::new();
     for (name, defines, edits) in [
         (
             "seed",
@@ -444,9 +444,9 @@ fn a_defined_render_is_that_of_an_edited_scene() {
 }
 
 #[test]
-fn bad_defines_are_told() {
-    let place = Place::new();
-    for (define, told) in [
+fn invalid_defines_are_rejected() {
+    let place = TestFolder::new();
+    for (define, message) in [
         (
             "camera.fov=wide",
             "error: --define camera.fov: \"wide\" must be a number\n",
@@ -473,10 +473,10 @@ fn bad_defines_are_told() {
         ),
         ("render.seed=", "render.seed: has no value after the ="),
     ] {
-        refused(&place, &["small.toml", "-o", "x.png", "--define", define], 2, told);
+        refused(&place, &["small.toml", "-o", "x.png", "--define", define], 2, message);
         let ran = place.run(&["check", "small.toml", "--define", define]);
         assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{define}: {}", ran.stderr);
-        assert!(ran.stderr.contains(told), "{define}: {}", ran.stderr);
+        assert!(ran.stderr.contains(message), "{define}: {}", ran.stderr);
     }
     place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
     refused(
@@ -488,7 +488,7 @@ fn bad_defines_are_told() {
     quietly(&place, &["bad.toml", "-o", "x.png", "-D", "shapes[0].radius=1"]);
     // An invalid value for a model file without a scene also names the option.
     place.write("tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    for (define, told) in [
+    for (define, message) in [
         (
             "camera.fov=1000",
             "--define camera.fov: 1000 must be from 0.001 to 179.999",
@@ -496,13 +496,13 @@ fn bad_defines_are_told() {
         ("image.width=0", "--define image.width: 0 must be from 1 to 65536"),
     ] {
         let ran = place.run(&["check", "tri.obj", "-D", define]);
-        assert_eq!((ran.code, ran.stderr), (2, format!("error: {told}\n")));
+        assert_eq!((ran.code, ran.stderr), (2, format!("error: {message}\n")));
     }
 }
 
 #[test]
-fn scenes_in_json_take_frames_and_defines_of_their_own_keys() {
-    let place = Place::new();
+fn json_scenes_support_frames_and_defines() {
+    let place = TestFolder::new();
     place.write("floor.obj", "v -1 0 -1\nv 1 0 -1\nv 0 0 1\nf 1 3 2\n");
     let scene = r#"{ "spp": 4, "max_depth": 2, "image_resolution": [6, 4],
         "cam_config": { "position": [0, 2, 4], "look_at": [0, 0, 0], "ref_up": [0, 1, 0], "vertical_fov": 40 },
@@ -550,7 +550,7 @@ fn scenes_in_json_take_frames_and_defines_of_their_own_keys() {
 
 #[test]
 fn truncated_images_and_parts_are_rendered_again() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for name in ["a.png", "a.exr", "a.jpg", "a.webp", "a.part"] {
         let tile: &[&str] = if name == "a.part" { &["--tile", "1/2"] } else { &[] };
         let arguments = [&["render", "small.toml", "-o", name, "--skip-existing"], tile, &CPU].concat();
@@ -566,6 +566,6 @@ fn truncated_images_and_parts_are_rendered_again() {
             assert!(!skips(), "{name} of {length} bytes");
             assert_eq!(place.read(name), whole, "{name} of {length} bytes");
         }
-        assert!(skips(), "{name} is whole");
+        assert!(skips(), "{name} is complete");
     }
 }

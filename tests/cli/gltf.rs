@@ -2,13 +2,13 @@
 
 use std::fs;
 
-use super::{Place, SCENE, read_png};
+use super::{SCENE, TestFolder, read_png};
 use crate::model::Model;
 
 const QUICK: [&str; 6] = ["--size", "24x16", "--spp", "2", "--device", "cpu"];
 
-fn place(model: &Model) -> Place {
-    let place = Place::with_file("small.toml", SCENE);
+fn place(model: &Model) -> TestFolder {
+    let place = TestFolder::with_file("small.toml", SCENE);
     model.write_glb(place.folder(), "box.glb");
     model.write_gltf(place.folder(), "box");
     place
@@ -21,22 +21,22 @@ fn with_cameras() -> Model {
     }
 }
 
-fn quietly(place: &Place, arguments: &[&str]) {
+fn quietly(place: &TestFolder, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &QUICK].concat());
 }
 
 /// Returns the pixels as bits, rendered with these options.
-fn bits(place: &Place, arguments: &[&str]) -> Vec<u32> {
+fn bits(place: &TestFolder, arguments: &[&str]) -> Vec<u32> {
     quietly(place, &[arguments, &["-o", "bits.exr"]].concat());
     pixels(place, "bits.exr")
 }
 
-fn pixels(place: &Place, name: &str) -> Vec<u32> {
+fn pixels(place: &TestFolder, name: &str) -> Vec<u32> {
     let picture = image::open(place.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     picture.into_rgb32f().into_raw().into_iter().map(f32::to_bits).collect()
 }
 
-fn refused(place: &Place, arguments: &[&str], code: i32, told: &str) {
+fn refused(place: &TestFolder, arguments: &[&str], code: i32, message: &str) {
     let before = place.files();
     let ran = place.run(arguments);
     assert_eq!(
@@ -45,12 +45,12 @@ fn refused(place: &Place, arguments: &[&str], code: i32, told: &str) {
         "{arguments:?}: {}",
         ran.stderr
     );
-    assert!(ran.stderr.contains(told), "{arguments:?}: {}\n{told}", ran.stderr);
+    assert!(ran.stderr.contains(message), "{arguments:?}: {}\n{message}", ran.stderr);
     assert_eq!(place.files(), before, "{arguments:?}");
 }
 
 #[test]
-fn a_model_by_itself_is_a_picture() {
+fn a_model_renders_without_a_scene() {
     let place = place(&Model::default());
     let ran = place.run(&["check", "box.glb", "box.gltf"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
@@ -88,21 +88,24 @@ fn a_model_by_itself_is_a_picture() {
         "{left} {right} {top} {bottom}"
     );
     let middle = picture.get_pixel(12, 10).0;
-    assert!(middle[0] > middle[2], "the box is of clay: {middle:?}");
+    assert!(middle[0] > middle[2], "the box is clay: {middle:?}");
     quietly(&place, &["box.gltf"]);
     assert_eq!(read_png(&place.path("box.png")).0, 24);
 }
 
 #[test]
-fn each_option_shows_something_else_and_names_and_numbers_are_alike() {
+fn options_select_parts_by_name_or_index() {
     let place = place(&with_cameras());
     let plain = bits(&place, &["box.glb"]);
     let mut seen = vec![plain.clone()];
     let other = |options: &[&[&str]], seen: &mut Vec<Vec<u32>>| {
         let of = |options: &&[&str]| bits(&place, &[&["box.glb"], *options].concat());
         let all: Vec<_> = options.iter().map(of).collect();
-        assert!(all.iter().all(|bits| *bits == all[0]), "{options:?} are the same");
-        assert!(!seen.contains(&all[0]), "{options:?} show something else");
+        assert!(
+            all.iter().all(|bits| *bits == all[0]),
+            "{options:?} give the same image"
+        );
+        assert!(!seen.contains(&all[0]), "{options:?} give different images");
         seen.push(all[0].clone());
     };
     other(&[&["--camera", "side camera"], &["--camera", "1"]], &mut seen);
@@ -145,7 +148,7 @@ fn each_option_shows_something_else_and_names_and_numbers_are_alike() {
 #[test]
 fn what_is_not_there_is_told_with_what_is() {
     let place = place(&with_cameras());
-    for (option, value, told) in [
+    for (option, value, message) in [
         (
             "--camera",
             "above",
@@ -176,13 +179,13 @@ fn what_is_not_there_is_told_with_what_is() {
         ("--view", "above", "invalid value 'above' for '--view"),
     ] {
         for command in ["render", "check"] {
-            refused(&place, &[command, "box.glb", option, value], 2, told);
+            refused(&place, &[command, "box.glb", option, value], 2, message);
         }
         refused(
             &place,
             &["convert", "box.glb", "-o", "box.toml", "--force", option, value],
             2,
-            told,
+            message,
         );
     }
     refused(
@@ -202,8 +205,8 @@ fn what_is_not_there_is_told_with_what_is() {
         ("--fov", "40"),
         ("--up", "z"),
     ] {
-        let told = format!("error: {option}: only applies to model files, and small.toml is a scene file");
-        refused(&place, &["render", "small.toml", option, value], 2, &told);
+        let message = format!("error: {option}: only applies to model files, and small.toml is a scene file");
+        refused(&place, &["render", "small.toml", option, value], 2, &message);
     }
     let still = Model {
         animated: false,
@@ -243,7 +246,7 @@ fn what_is_not_there_is_told_with_what_is() {
 }
 
 #[test]
-fn frames_are_moments_of_the_animation() {
+fn frames_are_times_of_the_animation() {
     let place = place(&with_cameras());
     quietly(&place, &["box.glb", "--frames", "0-12:6", "-o", "f.##.exr"]);
     quietly(&place, &["box.glb", "--frames", "5", "--fps", "10", "-o", "fps.exr"]);
@@ -286,7 +289,7 @@ fn frames_are_moments_of_the_animation() {
     assert_ne!(pixels(&place, "s18.exr"), pixels(&place, "s12.exr"));
 }
 
-fn moment(place: &Place, time: &str) -> Vec<u32> {
+fn moment(place: &TestFolder, time: &str) -> Vec<u32> {
     bits(place, &["box.glb", "--time", time])
 }
 
@@ -341,7 +344,7 @@ fn a_converted_scene_has_the_same_bits() {
 }
 
 #[test]
-fn a_conversion_keeps_what_it_reads_and_names_files_from_where_it_is() {
+fn a_conversion_keeps_its_input_and_uses_relative_paths() {
     let place = place(&Model::default());
     let same = ["convert", "small.toml", "-o", "./small.toml"];
     refused(&place, &same, 2, "is an input of the scene");
@@ -483,7 +486,7 @@ fn a_conversion_prints_the_asset_root_to_pass() {
 }
 
 #[test]
-fn a_turntable_shows_a_model_from_all_around() {
+fn a_turntable_frames_the_model() {
     let place = place(&Model::default());
     // The margin of 5 % is at least two pixels.
     let small = ["--size", "60x40", "--spp", "1", "--device", "cpu"];
@@ -507,9 +510,9 @@ fn a_turntable_shows_a_model_from_all_around() {
                 .enumerate_pixels()
                 .any(|(x, y, p)| edge(x, y) == at_edge && p.0[3] > 0)
         };
-        assert!(covered(false) && !covered(true), "frame {frame} is whole");
+        assert!(covered(false) && !covered(true), "frame {frame} is complete");
         let bytes = picture.into_raw();
-        assert!(!seen.contains(&bytes), "frame {frame} is like another");
+        assert!(!seen.contains(&bytes), "frame {frame} equals another");
         seen.push(bytes);
     }
 }

@@ -55,27 +55,27 @@ fn page() -> String {
 }
 
 #[test]
-fn the_golden_pictures_hold() {
+fn the_golden_images_match() {
     let example = Example::new();
     let ran = example.check(&[]);
-    let hint = "pictures that are meant to change: examples/golden/check update";
+    let hint = "after an intended change of an image, run examples/golden/check update";
     assert_eq!(ran.code, 0, "{hint}\n{}{}", ran.stdout, ran.stderr);
     assert_eq!(ran.stdout.matches("color R G B: identical").count(), 2);
 }
 
 #[test]
-fn a_changed_scene_fails_as_the_page_says_until_it_is_taken() {
+fn a_changed_scene_fails_until_updated() {
     let example = Example::new();
     example.change();
     let ran = example.check(&[]);
     assert_eq!(ran.code, 5, "{}{}", ran.stdout, ran.stderr);
-    let told = page();
-    let told = told.split("```text\n").nth(1).and_then(|text| text.split("```").next());
-    let told = told.expect("the page shows what is told");
-    assert!(ran.stdout.contains(told), "{}is not\n{told}", ran.stdout);
+    let page = page();
+    let report = page.split("```text\n").nth(1).and_then(|text| text.split("```").next());
+    let report = report.expect("the page shows the report");
+    assert!(ran.stdout.contains(report), "{}is not\n{report}", ran.stdout);
     assert!(
         ran.stdout.contains("out/balls.png against golden/balls.png"),
-        "all are checked"
+        "an image is not checked"
     );
     let made = image::open(example.folder.path().join("out/ball.diff.png")).unwrap();
     assert_eq!(
@@ -91,7 +91,7 @@ fn a_changed_scene_fails_as_the_page_says_until_it_is_taken() {
 }
 
 #[test]
-fn a_scene_without_a_golden_picture_fails_until_it_has_one() {
+fn a_scene_without_a_golden_image_fails() {
     let example = Example::new();
     let scenes = example.folder.path().join("scenes");
     fs::copy(scenes.join("ball.toml"), scenes.join("new.toml")).unwrap();
@@ -106,8 +106,8 @@ fn a_scene_without_a_golden_picture_fails_until_it_has_one() {
 }
 
 #[test]
-fn the_page_names_what_there_is() {
-    let (page, help) = (page(), super::Place::new().run(&["diff", "--help"]).stdout);
+fn the_page_names_existing_files() {
+    let (page, help) = (page(), super::TestFolder::new().run(&["diff", "--help"]).stdout);
     let help = help.split_whitespace().collect::<Vec<_>>().join(" "); // help lines wrap at the terminal width
     for metric in [
         "different",

@@ -1,6 +1,6 @@
 //! The help of all commands.
 
-use super::{Place, Ran};
+use super::{Ran, TestFolder};
 
 /// Returns the names of the commands that a help text lists.
 fn listed(help: &str) -> Vec<String> {
@@ -12,7 +12,7 @@ fn listed(help: &str) -> Vec<String> {
 }
 
 /// Calls `each` with the words of every command, nested ones included.
-fn for_each_command(place: &Place, words: &[&str], each: &mut dyn FnMut(&[&str])) {
+fn for_each_command(place: &TestFolder, words: &[&str], each: &mut dyn FnMut(&[&str])) {
     each(words);
     let help = place.run(&[words, &["-h"]].concat()).stdout;
     for name in listed(&help) {
@@ -22,7 +22,7 @@ fn for_each_command(place: &Place, words: &[&str], each: &mut dyn FnMut(&[&str])
 
 #[test]
 fn help_is_short() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let mut commands = 0;
     for_each_command(&place, &[], &mut |words| {
         commands += 1;
@@ -46,7 +46,7 @@ fn help_is_short() {
 /// `-h` leaves rarely used options to `--help`; that and `wgray help` list all of them.
 #[test]
 fn the_long_help_lists_all_options() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let short = place.run(&["render", "-h"]).stdout;
     let long = place.run(&["render", "--help"]).stdout;
     assert!(!short.contains("--exr-compression") && short.contains("(see more with '--help')"));
@@ -61,7 +61,7 @@ fn the_long_help_lists_all_options() {
 
 #[test]
 fn the_most_used_options_come_first() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let help = place.run(&["render", "-h"]).stdout;
     let place_of = |option: &str| help.find(option).unwrap_or_else(|| panic!("{option}: {help}"));
     let first = [
@@ -78,7 +78,7 @@ fn the_most_used_options_come_first() {
 
 #[test]
 fn common_mistakes_have_hints() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for (arguments, message, hint) in [
         (
             &["render", "small.toml", "--width", "64"][..],

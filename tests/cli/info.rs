@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
-use super::{NO_DRIVER, Place, SCENE, project_scene};
+use super::{NO_DRIVER, SCENE, TestFolder, project_scene};
 
 /// The JSON of a scene.
-fn info(place: &Place, arguments: &[&str]) -> Value {
+fn info(place: &TestFolder, arguments: &[&str]) -> Value {
     let all = [&["info", "--json"], arguments].concat();
     let ran = place.run(&all);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{arguments:?}");
@@ -14,7 +14,7 @@ fn info(place: &Place, arguments: &[&str]) -> Value {
 
 #[test]
 fn things_are_counted() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let small = info(&place, &["small.toml", "--device", "cpu"]);
     assert_eq!(
         (&small["picture"]["width"], &small["picture"]["light_samples"]),
@@ -116,7 +116,7 @@ fn things_are_counted() {
 
 #[test]
 fn the_device_is_that_of_a_render() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let cornell = project_scene("cornell.toml");
     for scene in ["small.toml", &cornell, &project_scene("twisted-tube.toml")] {
         let foreseen = info(&place, &[scene]);
@@ -156,7 +156,7 @@ fn the_device_is_that_of_a_render() {
 
 #[test]
 fn empty_and_large_scenes_are_described_and_invalid_ones_refused() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let head = SCENE.split("[materials.gray]").next().unwrap();
     place.write("empty.toml", head);
     let ran = place.run(&["info", "empty.toml"]);

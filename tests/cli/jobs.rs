@@ -6,7 +6,7 @@ use std::io::Write as _;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::{Place, Ran, program};
+use super::{Ran, TestFolder, program};
 
 /// A render that takes a few seconds, with an auxiliary layer.
 const LONG: [&str; 8] = [
@@ -21,14 +21,14 @@ const LONG: [&str; 8] = [
 ];
 
 /// Returns the image of an uninterrupted render.
-fn expected(place: &Place) -> Vec<u8> {
+fn expected(place: &TestFolder) -> Vec<u8> {
     let mut arguments = LONG.to_vec();
     arguments.extend(["-o", "whole.exr", "--reproducible", "--device", "cpu"]);
     place.quietly(&arguments);
     place.read("whole.exr")
 }
 
-fn start(place: &Place, arguments: &[&str]) -> Child {
+fn start(place: &TestFolder, arguments: &[&str]) -> Child {
     Command::new(program())
         .current_dir(place.path("."))
         .args(LONG)
@@ -40,7 +40,7 @@ fn start(place: &Place, arguments: &[&str]) -> Child {
 }
 
 /// Waits until the checkpoint is larger than this number of bytes.
-fn wait_for(place: &Place, file: &str, bytes: u64) {
+fn wait_for(place: &TestFolder, file: &str, bytes: u64) {
     let start = Instant::now();
     while fs::metadata(place.path(file)).map_or(0, |data| data.len()) <= bytes {
         assert!(start.elapsed() < Duration::from_secs(60), "{file} does not grow");
@@ -74,7 +74,7 @@ fn ended(child: Child) -> Ran {
 }
 
 /// Resumes from the checkpoint and renders to the end.
-fn go_on(place: &Place, device: &str) -> Ran {
+fn go_on(place: &TestFolder, device: &str) -> Ran {
     let mut arguments = LONG.to_vec();
     arguments.extend(["--reproducible", "--checkpoint", "c", "--resume", "--device", device]);
     arguments.extend(["-o", "out.exr"]);
@@ -82,8 +82,8 @@ fn go_on(place: &Place, device: &str) -> Ran {
 }
 
 #[test]
-fn a_killed_render_goes_on_where_it_was() {
-    let place = Place::new();
+fn a_killed_render_resumes() {
+    let place = TestFolder::new();
     let expected = expected(&place);
     for (round, device) in (0..).zip(["cpu", "gpu", "cpu", "gpu"]) {
         let mut child = start(
@@ -120,7 +120,7 @@ fn a_killed_render_goes_on_where_it_was() {
 #[test]
 fn signals_end_a_render_with_a_checkpoint_and_a_code() {
     crate::cli::heed_interrupts();
-    let place = Place::new();
+    let place = TestFolder::new();
     let expected = expected(&place);
     let kept =
         |signal: &str| format!("note: progress is saved in c; --resume continues\nerror: interrupted by {signal}\n");
@@ -178,8 +178,8 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
 }
 
 #[test]
-fn a_second_writer_waits_and_goes_on() {
-    let place = Place::new();
+fn a_second_writer_waits_and_resumes() {
+    let place = TestFolder::new();
     let expected = expected(&place);
     let options = [
         "--checkpoint",
@@ -218,7 +218,7 @@ fn a_second_writer_waits_and_goes_on() {
 
 /// SIGTERM before the render has started also exits with the code for another attempt.
 #[cfg(target_os = "linux")]
-fn a_farm_ends_one_that_waits(place: &Place, options: &[&str]) {
+fn a_farm_ends_one_that_waits(place: &TestFolder, options: &[&str]) {
     let waiting = start(place, &[options, &["-o", "third.exr", "--requeue-exit", "75"]].concat());
     let id = waiting.id().to_string();
     let heeds = || {
@@ -230,15 +230,15 @@ fn a_farm_ends_one_that_waits(place: &Place, options: &[&str]) {
     while !heeds() {
         std::thread::sleep(Duration::from_millis(1));
     }
-    let told = std::process::Command::new("kill").args(["-TERM", &id]).status();
-    assert!(told.expect("kill").success());
+    let status = std::process::Command::new("kill").args(["-TERM", &id]).status();
+    assert!(status.expect("kill").success());
     assert_eq!(ended(waiting).code, 75);
 }
 
 /// Checks the messages for a checkpoint that exists, belongs to other options, or is not a checkpoint.
 #[test]
 fn checkpoints_of_other_jobs_are_refused() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let base = ["render", "small.toml", "-o", "out.png", "--device", "cpu"];
     let run = |more: &[&str]| place.run(&[&base[..], more].concat());
     assert_eq!(run(&["--checkpoint", "c"]).code, 0);
@@ -273,7 +273,7 @@ fn checkpoints_of_other_jobs_are_refused() {
     place.write("small.toml", &super::SCENE.replace("0.8, 0.8, 0.8", "0.8, 0.8, 0.9"));
     refused(&resume, "its scene or an option");
     place.write("small.toml", &super::SCENE.replace("# ", "#  "));
-    assert_eq!(run(&resume).code, 0, "a comment is no part of the scene");
+    assert_eq!(run(&resume).code, 0, "a comment in the scene file changes the job");
     for (bytes, rule) in [
         (Vec::new(), "it is not a part or checkpoint that wgray wrote"),
         (
@@ -284,11 +284,11 @@ fn checkpoints_of_other_jobs_are_refused() {
     ] {
         fs::write(place.path("c"), &bytes).expect("a file");
         refused(&resume, rule);
-        assert_eq!(place.read("c"), bytes, "what is refused stays");
+        assert_eq!(place.read("c"), bytes, "a rejected file was changed");
     }
     fs::remove_file(place.path("c")).expect("a file");
-    assert_eq!(run(&resume).code, 0, "where there is none yet, one is begun");
-    assert_eq!(place.read("c"), good, "the same job makes the same file");
+    assert_eq!(run(&resume).code, 0, "a missing checkpoint is not created");
+    assert_eq!(place.read("c"), good, "the same job gives another file");
     for (name, option) in [
         ("small.toml", "which names a scene"),
         ("out.png", "which names an image"),
@@ -318,7 +318,7 @@ fn checkpoints_of_other_jobs_are_refused() {
 
 #[test]
 fn a_folder_has_a_checkpoint_for_each_job() {
-    let place = Place::new();
+    let place = TestFolder::new();
     fs::create_dir(place.path("kept")).expect("a folder");
     let run = |more: &[&str]| {
         let base = [
@@ -353,9 +353,9 @@ fn a_folder_has_a_checkpoint_for_each_job() {
         let new: Vec<_> = now.difference(&seen).cloned().collect();
         let [new] = &new[..] else { panic!("{more:?}: {new:?}") };
         let ran = run(more);
-        let told = format!("error: --checkpoint: kept/{new}: already exists; pass --resume to continue it");
+        let message = format!("error: --checkpoint: kept/{new}: already exists; pass --resume to continue it");
         assert!(
-            ran.code == 2 && ran.stderr.starts_with(&told),
+            ran.code == 2 && ran.stderr.starts_with(&message),
             "{more:?}: {}",
             ran.stderr
         );
@@ -370,8 +370,8 @@ fn a_folder_has_a_checkpoint_for_each_job() {
 
 /// Pieces of another job behind the header of this one are rejected.
 #[test]
-fn pieces_of_another_job_are_not_believed() {
-    let place = Place::new();
+fn pieces_of_another_job_are_rejected() {
+    let place = TestFolder::new();
     let render = |more: &[&str]| {
         let ran = place.run(&[&["render", "small.toml", "--device", "cpu", "--reproducible"], more].concat());
         assert_eq!(ran.code, 0, "{}", ran.stderr);
@@ -380,20 +380,20 @@ fn pieces_of_another_job_are_not_believed() {
     render(&["--checkpoint", "a", "-o", "a.exr"]);
     render(&["--checkpoint", "b", "--seed", "1", "-o", "b.exr"]);
     let [a, b] = ["a", "b"].map(|name| place.read(name));
-    assert_eq!(a.len(), b.len(), "the headers are as long as each other");
+    assert_eq!(a.len(), b.len(), "the headers have different lengths");
     let pieces = (10 * 6) * 16 + 14 * 4 + 32 + 32;
     let start = a.len() - pieces;
     fs::write(place.path("c"), [&a[..start], &b[start..]].concat()).expect("a file");
-    let told = render(&["--checkpoint", "c", "--resume", "-o", "c.exr"]);
-    assert!(told.contains("are damaged"), "{told}");
+    let stderr = render(&["--checkpoint", "c", "--resume", "-o", "c.exr"]);
+    assert!(stderr.contains("are damaged"), "{stderr}");
     assert!(place.read("c.exr") == place.read("a.exr") && place.read("a.exr") != place.read("b.exr"));
 }
 
 /// The checkpoint is moved, removed or replaced while the render writes to it.
 #[cfg(unix)]
 #[test]
-fn a_checkpoint_that_goes_away_is_put_back_or_told_of() {
-    let place = Place::new();
+fn a_removed_checkpoint_is_restored_or_reported() {
+    let place = TestFolder::new();
     let expected = expected(&place);
     std::os::unix::fs::symlink("target", place.path("link")).expect("a link");
     let options = [
@@ -434,7 +434,7 @@ fn a_checkpoint_that_goes_away_is_put_back_or_told_of() {
 
 #[test]
 fn a_damaged_checkpoint_is_used_up_to_the_damage() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let expected = expected(&place);
     let child = start(&place, &["--checkpoint", "c", "-o", "out.exr", "--device", "cpu"]);
     assert_eq!(ended(child).code, 0);
@@ -454,15 +454,15 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
     file.write_all(&bytes[200..900]).expect("bytes");
     let ran = go_on(&place, "cpu");
     assert!(ran.stderr.contains("dropped 700 bytes after byte"), "{}", ran.stderr);
-    assert_eq!(go_on(&place, "cpu").stderr, "", "what was damaged is gone");
+    assert_eq!(go_on(&place, "cpu").stderr, "", "damaged pieces are still in the file");
     assert!(place.read("out.exr") == expected);
 }
 
 /// A full disk during a render: the output fails, the checkpoint remains, and with free space the render resumes.
 #[cfg(unix)]
 #[test]
-fn a_full_disk_loses_no_kept_work() {
-    let place = Place::new();
+fn a_full_disk_keeps_the_checkpoint() {
+    let place = TestFolder::new();
     let expected = expected(&place);
     // At most 250 KiB for each file; the checkpoint needs 400.
     let line = "trap '' XFSZ; ulimit -f 500; exec \"$0\" render small.toml --size 160x160 --spp 300 --aov normal \
@@ -474,7 +474,7 @@ fn a_full_disk_loses_no_kept_work() {
         "{}",
         ran.stderr
     );
-    assert_eq!(place.files(), ["c", "whole.exr"], "no half file");
+    assert_eq!(place.files(), ["c", "whole.exr"], "an incomplete file is left");
     let kept = fs::metadata(place.path("c")).expect("the checkpoint").len();
     assert!(kept > 50_000, "{kept}");
     let ran = go_on(&place, "cpu");
@@ -487,11 +487,11 @@ fn a_full_disk_loses_no_kept_work() {
 #[cfg(target_os = "linux")]
 #[test]
 fn full_and_read_only_file_systems() {
-    let place = Place::new();
+    let place = TestFolder::new();
     fs::create_dir(place.path("disk")).expect("a folder");
     let can = place.shell("sh", "unshare -rm mount -t tmpfs -o size=64k none disk");
     if can.code != 0 {
-        eprintln!("no name space of one's own: {}", can.stderr);
+        eprintln!("no separate mount namespace: {}", can.stderr);
         return;
     }
     let run = |options: &str, command: &str| {
@@ -533,13 +533,16 @@ fn full_and_read_only_file_systems() {
             "{}",
             read_only.stderr
         );
-        assert!(begun.elapsed() < Duration::from_secs(20), "told before the work");
+        assert!(
+            begun.elapsed() < Duration::from_secs(20),
+            "not reported before the render"
+        );
     }
 }
 
 #[test]
-fn parts_make_the_same_picture() {
-    let place = Place::new();
+fn parts_merge_to_the_same_image() {
+    let place = TestFolder::new();
     let options = [
         "small.toml",
         "--size",
@@ -668,8 +671,8 @@ fn parts_make_the_same_picture() {
 }
 
 #[test]
-fn a_part_goes_on_from_its_own_checkpoint() {
-    let place = Place::new();
+fn a_part_resumes_from_its_own_checkpoint() {
+    let place = TestFolder::new();
     let part = |more: &[&str]| {
         let base = ["render", "small.toml", "--device", "cpu", "--tile", "2/3"];
         place.run(&[&base[..], more].concat())
@@ -693,8 +696,8 @@ fn a_part_goes_on_from_its_own_checkpoint() {
 }
 
 #[test]
-fn a_time_limit_ends_with_a_whole_picture() {
-    let place = Place::new();
+fn a_time_limit_ends_with_a_complete_image() {
+    let place = TestFolder::new();
     let begun = Instant::now();
     let options = [
         "render",
@@ -718,7 +721,7 @@ fn a_time_limit_ends_with_a_whole_picture() {
     let (_, _, pixels) = super::read_png(&place.path("a.png"));
     assert!(
         pixels.chunks(3).all(|pixel| pixel != [0, 0, 0]),
-        "every pixel has a sample"
+        "a pixel has no samples"
     );
     let ran = run(&["--time-limit", "0", "-o", "a.png", "--stats", "a.json"]);
     assert_eq!(

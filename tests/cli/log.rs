@@ -9,7 +9,7 @@ use serde_json::Value;
 
 #[cfg(unix)]
 use super::program;
-use super::{NO_DRIVER, Place, Ran, SCENE};
+use super::{NO_DRIVER, Ran, SCENE, TestFolder};
 
 /// Parses the lines of standard error and checks the keys that all objects have.
 fn lines(ran: &Ran) -> Vec<Value> {
@@ -23,14 +23,14 @@ fn lines(ran: &Ran) -> Vec<Value> {
     lines.collect()
 }
 
-fn log(place: &Place, arguments: &[&str]) -> (i32, Vec<Value>) {
+fn log(place: &TestFolder, arguments: &[&str]) -> (i32, Vec<Value>) {
     let ran = place.run(&[&["--log-format", "json"], arguments].concat());
     (ran.code, lines(&ran))
 }
 
 #[test]
-fn a_render_tells_how_far_it_is_and_what_it_took() {
-    let place = Place::new();
+fn a_render_logs_progress_and_statistics() {
+    let place = TestFolder::new();
     let (code, lines) = log(
         &place,
         &[
@@ -72,12 +72,8 @@ fn a_render_tells_how_far_it_is_and_what_it_took() {
         .find(|line| line["message"] == "scene read")
         .expect("an event");
     assert!(read["seconds"].as_f64() > Some(0.0), "{read}");
-    let written = |line: &&Value| {
-        ["picture written", "render done"]
-            .iter()
-            .any(|name| line["message"] == **name)
-    };
-    assert_eq!(lines.iter().filter(written).count(), 1, "{lines:?}");
+    let done = |line: &&Value| line["message"] == "render done";
+    assert_eq!(lines.iter().filter(done).count(), 1, "{lines:?}");
     let (code, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--quiet"]);
     assert_eq!((code, lines.len()), (0, 0));
     let (_, lines) = log(&place, &["render", "small.toml", "-o", "#.png", "--frames", "1-2"]);
@@ -92,7 +88,7 @@ fn a_render_tells_how_far_it_is_and_what_it_took() {
 
 #[test]
 fn each_error_of_a_scene_is_a_message() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let bad = SCENE
         .replace("radius = 0.8", "radius = -1")
         .replace("fov = 40", "fov = 1000");
@@ -134,8 +130,8 @@ fn each_error_of_a_scene_is_a_message() {
 }
 
 #[test]
-fn errors_tell_their_place_and_exit_code() {
-    let place = Place::new();
+fn errors_have_location_and_exit_code() {
+    let place = TestFolder::new();
     place.write("value.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
     place.write("syntax.toml", "image = [\n[");
     place.write("broken.gltf", "{ \"asset\": 3 }");
@@ -189,8 +185,8 @@ fn errors_tell_their_place_and_exit_code() {
 }
 
 #[test]
-fn what_is_odd_is_a_warning_or_a_note() {
-    let place = Place::new();
+fn warnings_and_notes_have_levels() {
+    let place = TestFolder::new();
     let ran = place.run_with(
         &[
             "render",
@@ -219,7 +215,7 @@ fn what_is_odd_is_a_warning_or_a_note() {
 #[cfg(unix)]
 fn a_signal_is_an_error_with_its_exit_code() {
     super::heed_interrupts();
-    let place = Place::new();
+    let place = TestFolder::new();
     let options =
         "render small.toml --size 4000x4000 --spp 1024 --device cpu -o a.png --log-format json --progress none -v";
     let mut child = Command::new(program())
@@ -228,14 +224,14 @@ fn a_signal_is_an_error_with_its_exit_code() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program runs");
-    let mut told = BufReader::new(child.stderr.take().expect("a pipe"))
+    let mut stderr_lines = BufReader::new(child.stderr.take().expect("a pipe"))
         .lines()
         .map_while(Result::ok);
     // From here on the signals are handled.
-    assert!(told.any(|line| line.contains("\"ready\"")));
+    assert!(stderr_lines.any(|line| line.contains("\"ready\"")));
     // SAFETY: the process is a child that was not waited for.
     unsafe { libc::kill(child.id() as i32, libc::SIGTERM) };
-    let stderr: Vec<String> = told.collect();
+    let stderr: Vec<String> = stderr_lines.collect();
     let code = child.wait().expect("its end").code().unwrap_or(-1);
     let ran = Ran::new(Some(code), String::new(), &stderr.join("\n"), &[]);
     let lines = lines(&ran);
@@ -250,7 +246,7 @@ fn a_signal_is_an_error_with_its_exit_code() {
 
 #[test]
 fn lines_for_an_engine_are_not_json() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let (code, lines) = log(&place, &["render", "small.toml", "--progress", "openjd"]);
     let rule = "--progress: openjd cannot be combined with --log-format json";
     assert_eq!((code, &lines[0]["message"]), (2, &rule.into()));
@@ -258,8 +254,8 @@ fn lines_for_an_engine_are_not_json() {
 
 #[test]
 #[cfg(unix)]
-fn a_stream_that_takes_nothing_ends_no_render() {
-    let place = Place::new();
+fn an_unwritable_log_does_not_end_a_render() {
+    let place = TestFolder::new();
     for nowhere in ["2>/dev/full", "2>&-"] {
         let ran = place.shell(
             "sh",

@@ -1,9 +1,9 @@
 //! The manual pages, and completions of the command line.
 
-use super::{Place, Ran};
+use super::{Ran, TestFolder};
 
 /// The names of all commands, out of the help.
-fn commands(place: &Place) -> Vec<String> {
+fn commands(place: &TestFolder) -> Vec<String> {
     let help = place.run(&["--help"]).stdout;
     let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let names = list
@@ -20,7 +20,7 @@ fn commands(place: &Place) -> Vec<String> {
 
 #[test]
 fn every_command_has_a_page() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.quietly(&["man", "-o", "pages/man1"]);
     let mut wanted: Vec<String> = commands(&place).iter().map(|name| format!("wgray-{name}.1")).collect();
     wanted.push("wgray.1".to_owned());
@@ -81,7 +81,7 @@ fn every_command_has_a_page() {
 
 #[test]
 fn unknown_pages_are_rejected() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let ran = place.run(&["man", "paint"]);
     assert_eq!((ran.code, ran.stdout.as_str()), (2, ""));
     assert!(
@@ -124,7 +124,7 @@ fn exit_codes_are_documented() {
         .skip(2)
         .map_while(|line| line.strip_prefix("| ")?.split_once(" | "));
     let documented: Vec<&str> = rows.map(|(code, _)| code).filter(|code| code.len() == 1).collect();
-    let help = Place::new().run(&["--help"]).stdout;
+    let help = TestFolder::new().run(&["--help"]).stdout;
     let (_, codes) = help.split_once("Exit codes: ").expect("exit codes");
     let codes: Vec<&str> = codes
         .split_whitespace()
@@ -136,7 +136,7 @@ fn exit_codes_are_documented() {
 
 #[test]
 fn every_shell_has_completions_that_know_every_command() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let names = commands(&place);
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let ran = place.run(&["completions", shell]);
@@ -152,7 +152,7 @@ fn every_shell_has_completions_that_know_every_command() {
 
 /// Returns what bash offers for the last of these words.
 #[cfg(unix)]
-fn offered(place: &Place, words: &[&str]) -> Vec<String> {
+fn offered(place: &TestFolder, words: &[&str]) -> Vec<String> {
     let line = words.join("' '");
     let last = words.len() - 1;
     let script = format!(
@@ -169,7 +169,7 @@ fn offered(place: &Place, words: &[&str]) -> Vec<String> {
 #[test]
 #[cfg(unix)]
 fn bash_completes_commands_options_names_and_files() {
-    let place = Place::new();
+    let place = TestFolder::new();
     std::fs::create_dir(place.folder().join("smalls")).unwrap();
     assert_eq!(offered(&place, &["wgray", "rend"]), ["render"]);
     assert_eq!(offered(&place, &["wgray", "render", "--pixel-p"]), ["--pixel-pattern"]);

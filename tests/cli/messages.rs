@@ -1,12 +1,12 @@
 //! Text messages: a closed or full stream does not fail a render, and each message names a remedy.
 
-use super::{Place, Ran, SCENE};
+use super::{Ran, SCENE, TestFolder};
 
 #[cfg(unix)]
 mod unix {
     use super::*;
 
-    fn sh(place: &Place, line: &str) -> Ran {
+    fn sh(place: &TestFolder, line: &str) -> Ran {
         place.shell("sh", line)
     }
 
@@ -14,7 +14,7 @@ mod unix {
     const UNWRITABLE: [&str; 3] = ["2>/dev/full", "2>&-", "2>&1 >&3 3>&- | true"];
 
     #[test]
-    fn a_render_is_done_whatever_became_of_standard_error() {
+    fn a_render_ignores_an_unwritable_standard_error() {
         for redirection in UNWRITABLE {
             for options in [
                 "--progress plain --size 64x64",
@@ -22,7 +22,7 @@ mod unix {
                 // No driver is found, which prints a warning.
                 "--device auto",
             ] {
-                let place = Place::new();
+                let place = TestFolder::new();
                 let driver = "VK_DRIVER_FILES=/nonexistent.json VK_ICD_FILENAMES=/nonexistent.json";
                 let line = format!(
                     "{{ {{ {driver} $0 render small.toml {options}; echo $? > code; }} {redirection}; }} 3>&1; exit $(cat code)"
@@ -39,8 +39,8 @@ mod unix {
     }
 
     #[test]
-    fn exit_codes_stay_whatever_became_of_standard_error() {
-        let place = Place::new();
+    fn exit_codes_do_not_depend_on_standard_error() {
+        let place = TestFolder::new();
         place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
         for redirection in UNWRITABLE {
             for (command, code) in [
@@ -61,8 +61,8 @@ mod unix {
 
     /// A closed pipe is not an error, a full disk is.
     #[test]
-    fn what_is_printed_is_complete_or_the_exit_code_says_so() {
-        let place = Place::new();
+    fn incomplete_output_changes_the_exit_code() {
+        let place = TestFolder::new();
         for command in ["devices", "check small.toml", "--help", "render --help", "--version"] {
             let full = sh(&place, &format!("$0 {command} > /dev/full"));
             assert_eq!(full.code, 8, "{command}: {}", full.stderr);
@@ -88,13 +88,13 @@ mod unix {
             &place,
             "{ $0 check small.toml small.toml bad.toml small.toml; echo $? > code; } | true; exit $(cat code)",
         );
-        assert_eq!(ran.code, 3, "the check goes on without a reader: {}", ran.stderr);
+        assert_eq!(ran.code, 3, "the check stopped at the closed pipe: {}", ran.stderr);
     }
 }
 
 /// Returns the message for the scene with `from` replaced by `to`.
-fn told(from: &str, to: &str) -> String {
-    let place = Place::new();
+fn message_for(from: &str, to: &str) -> String {
+    let place = TestFolder::new();
     assert!(SCENE.contains(from), "{from}");
     place.write("bad.toml", &SCENE.replacen(from, to, 1));
     let ran = place.run(&["check", "--strict", "bad.toml"]);
@@ -104,7 +104,7 @@ fn told(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn values_of_a_wrong_kind_are_told_with_the_right_kind() {
+fn wrong_types_are_reported_with_the_right_type() {
     let samples = "pixel_samples = { pattern = \"random\", count = 3 }";
     for (from, to, message) in [
         (
@@ -170,14 +170,14 @@ fn values_of_a_wrong_kind_are_told_with_the_right_kind() {
         ),
         (samples, "seed = 1\nseed = 2", "bad.toml:7:1: duplicate key: seed = 2"),
     ] {
-        let found = told(from, to);
+        let found = message_for(from, to);
         assert!(found.contains(message), "{found}\n{message}");
     }
 }
 
 /// The parser and the validation print the same range for an integer.
 #[test]
-fn a_whole_numbers_range_is_the_same_wherever_it_is_told() {
+fn integer_ranges_are_consistent() {
     let render = |line: &str| (String::from("[render]"), format!("[render]\n{line}"));
     for (key, (from, to)) in [
         ("width", ("width = 10".to_owned(), "width = N".to_owned())),
@@ -185,7 +185,7 @@ fn a_whole_numbers_range_is_the_same_wherever_it_is_told() {
         ("max_depth", render("max_depth = N")),
         ("count", ("count = 3".to_owned(), "count = N".to_owned())),
     ] {
-        let [negative, zero] = ["-1", "0"].map(|value| told(&from, &to.replace('N', value)));
+        let [negative, zero] = ["-1", "0"].map(|value| message_for(&from, &to.replace('N', value)));
         let range = |message: &str| message.split(" from ").nth(1).map(str::to_owned);
         assert!(
             range(&zero).is_some() && range(&zero) == range(&negative),
@@ -217,14 +217,14 @@ fn messages_of_long_keys_and_values_are_short() {
             format!("[textures.a]\ntype = 'image'\nfile = '{long}'\n[materials.gray]"),
         ),
     ] {
-        let message = told(from, &to);
+        let message = message_for(from, &to);
         assert!(message.len() < 1500, "{} bytes: {}", message.len(), &message[..200]);
         assert!(message.contains("..."), "{message}");
     }
     let many: String = (0..2000)
         .map(|i| format!("[materials.m{i}]\ntype = 'mirror'\n"))
         .collect();
-    let message = told(
+    let message = message_for(
         "[[shapes]]\ntype = \"sphere\"\nmaterial = \"gray\"",
         &format!("{many}[[shapes]]\ntype = \"sphere\"\nmaterial = \"zebra\""),
     );
@@ -232,8 +232,8 @@ fn messages_of_long_keys_and_values_are_short() {
 }
 
 #[test]
-fn wrong_arguments_are_told_with_the_way_out() {
-    let place = Place::new();
+fn wrong_arguments_name_a_remedy() {
+    let place = TestFolder::new();
     let grid = SCENE.replacen("pixel_samples = { pattern = \"random\", count = 3 }\n", "", 1);
     place.write("grid.toml", &grid);
     let adaptive = place.run(&["render", "grid.toml", "--adaptive", "0.1"]);
@@ -265,8 +265,8 @@ fn wrong_arguments_are_told_with_the_way_out() {
 }
 
 #[test]
-fn an_image_outside_the_asset_root_is_told_with_both() {
-    let place = Place::new();
+fn an_image_outside_the_asset_root_is_reported_with_both_paths() {
+    let place = TestFolder::new();
     image::RgbImage::new(2, 2).save(place.path("tile.png")).unwrap();
     std::fs::create_dir(place.path("sub")).unwrap();
     let texture = "[textures.a]\ntype = 'image'\nfile = 'tile.png'\n[[lights]]";
@@ -297,24 +297,24 @@ fn an_image_outside_the_asset_root_is_told_with_both() {
 }
 
 #[test]
-fn what_is_odd_about_a_mesh_is_told_once() {
-    let place = Place::new();
+fn mesh_warnings_appear_once() {
+    let place = TestFolder::new();
     place.write("odd.obj", "v 0 0 0\nv 1 0 0\nv 0 0 2\nf 1 2 3\nf 1 1 2\n");
     let shape = "[[shapes]]\ntype = 'mesh'\nfile = 'odd.obj'\nmaterial = 'gray'\n";
     place.write("odd.toml", &format!("{SCENE}{shape}"));
-    let told = "warning: odd.toml: odd.obj: 1 of 2 triangles has no area (degenerate) and was removed";
+    let warning = "warning: odd.toml: odd.obj: 1 of 2 triangles has no area (degenerate) and was removed";
     for options in [&[][..], &["-v"]] {
         let ran = place.run(&[&["render", "odd.toml", "--device", "cpu"], options].concat());
         assert_eq!(ran.code, 0, "{}", ran.stderr);
-        assert!(ran.stderr.lines().any(|line| line == told), "{}", ran.stderr);
+        assert!(ran.stderr.lines().any(|line| line == warning), "{}", ran.stderr);
         assert_eq!(ran.stderr.matches("degenerate").count(), 1, "{}", ran.stderr);
     }
 }
 
 #[test]
-fn words_of_a_bad_command_line_are_shown_and_short() {
-    let place = Place::new();
-    for (arguments, told) in [
+fn arguments_in_messages_are_escaped_and_short() {
+    let place = TestFolder::new();
+    for (arguments, expected) in [
         (
             &["render", "small.toml", "--size", "\u{1b}[31m\nx"][..],
             "error: invalid value '\\u{1b}[31m\\nx' for '--size <WxH>': must be ",
@@ -327,7 +327,7 @@ fn words_of_a_bad_command_line_are_shown_and_short() {
     ] {
         let ran = place.run(arguments);
         assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{arguments:?}");
-        assert!(ran.stderr.starts_with(told), "{arguments:?}: {}", ran.stderr);
+        assert!(ran.stderr.starts_with(expected), "{arguments:?}: {}", ran.stderr);
     }
     // Plain words get a suggestion.
     let ran = place.run(&["rendr"]);

@@ -28,8 +28,8 @@ mod summary;
 
 use std::path::Path;
 
-use crate::place::Place;
 use crate::sources::path as project;
+use crate::test_folder::TestFolder;
 
 /// Restores the default actions of SIGINT and SIGHUP for child processes. Shells ignore the former for background jobs,
 /// `nohup` ignores the latter.
@@ -119,10 +119,10 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 "#;
 
-impl Place {
+impl TestFolder {
     /// Creates a folder with the scene `small.toml`.
-    fn new() -> Place {
-        Place::with_file("small.toml", SCENE)
+    fn new() -> TestFolder {
+        TestFolder::with_file("small.toml", SCENE)
     }
 
     /// Returns the names of all files, hidden ones included, except `small.toml`.

@@ -2,11 +2,11 @@
 
 use wgray::image::read_exr;
 
-use super::{NO_DRIVER, Place, SCENE, read_png};
+use super::{NO_DRIVER, SCENE, TestFolder, read_png};
 
 #[test]
 fn options_stand_in_for_the_scenes_values() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let cases: [(&[&str], &str, &str); 5] = [
         (&["--size", "13x4"], "width = 10, height = 6", "width = 13, height = 4"),
         (&["--spp", "2"], "count = 3", "count = 2"),
@@ -30,7 +30,7 @@ fn options_stand_in_for_the_scenes_values() {
 
 #[test]
 fn bounces_are_as_many_as_the_option_says() {
-    let place = Place::new();
+    let place = TestFolder::new();
     // With a depth of 1, light enters the glass but does not leave it.
     let ball = SCENE.replacen("material = \"gray\"", "material = \"glass\"", 1);
     let ball = ball.replace(
@@ -49,7 +49,7 @@ fn bounces_are_as_many_as_the_option_says() {
 /// The warning about ignored keys is the same for the option and the key.
 #[test]
 fn an_integrator_stands_in_for_the_scenes() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let path = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nmax_depth = 0");
     place.write("path.toml", &path);
     let option = ["--integrator", "path", "--max-depth", "0", "--device", "cpu"];
@@ -77,7 +77,7 @@ fn an_integrator_stands_in_for_the_scenes() {
 
 #[test]
 fn a_crop_has_the_pixels_of_the_whole() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "-o", "whole.exr"]);
     place.quietly(&["render", "small.toml", "-o", "whole.png"]);
     place.quietly(&["render", "small.toml", "-o", "part.exr", "--crop", "2,1,9,5"]);
@@ -106,7 +106,7 @@ fn a_crop_has_the_pixels_of_the_whole() {
 
 #[test]
 fn devices_are_chosen_by_kind_and_by_part_of_a_name() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "--reproducible", "-o", "auto.exr"]);
     let listed = place.run(&["devices"]).stdout;
     let mut names = vec!["gpu", "cpu", "auto"];
@@ -130,7 +130,7 @@ fn devices_are_chosen_by_kind_and_by_part_of_a_name() {
 /// Software Vulkan divides and takes square roots with correct rounding, so that the option has no effect.
 #[test]
 fn rounding_in_software_gives_the_same_picture() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for device in ["auto", "cpu"] {
         let arguments = ["render", "small.toml", "--device", device, "-o"];
         place.quietly(&[&arguments[..], &["own.exr"]].concat());
@@ -141,7 +141,7 @@ fn rounding_in_software_gives_the_same_picture() {
 
 #[test]
 fn any_number_of_threads_gives_the_same_picture() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "--reproducible", "-o", "all.exr"]);
     for (device, threads) in [("auto", "1"), ("cpu", "1"), ("cpu", "3")] {
         place.quietly(&[
@@ -165,7 +165,7 @@ fn any_number_of_threads_gives_the_same_picture() {
 
 #[test]
 fn progress_is_told_as_asked() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let plain = place.run(&["render", "small.toml", "--progress", "plain"]);
     assert_eq!((plain.code, plain.stdout.as_str()), (0, ""));
     assert!(plain.stderr.contains("100 % done after"), "{}", plain.stderr);
@@ -179,7 +179,7 @@ fn progress_is_told_as_asked() {
 
 #[test]
 fn without_a_driver_auto_renders_on_the_cpu_and_says_so_in_a_line() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "--reproducible", "-o", "gpu.exr"]);
     let ran = place.run_with(&["render", "small.toml", "--reproducible", "-o", "cpu.exr"], &NO_DRIVER);
     assert_eq!((ran.code, ran.stdout.as_str()), (0, ""));

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::Place;
+use super::TestFolder;
 
 /// A scene with a mesh that needs some hundred megabytes.
-fn large(place: &Place) {
+fn large(place: &TestFolder) {
     const SIDE: usize = 300;
     let mut mesh = String::new();
     for y in 0..=SIDE {
@@ -32,7 +32,7 @@ fn large(place: &Place) {
 /// Whatever allocation fails first, the program ends with one line and code 7, and leaves no file.
 #[test]
 fn the_program_ends_with_code_7() {
-    let place = Place::new();
+    let place = TestFolder::new();
     large(&place);
     let before = place.files();
     let (mut failed, mut succeeded) = (0, 0);
@@ -69,7 +69,7 @@ fn the_program_ends_with_code_7() {
 /// Other commands, too, end without a panic if no thread can be started.
 #[test]
 fn other_commands_end_with_code_7() {
-    let place = Place::new();
+    let place = TestFolder::new();
     large(&place);
     let mut failed = 0;
     for limit in (0..24).map(|i| 24_000 + 1_500 * i) {
@@ -85,7 +85,7 @@ fn other_commands_end_with_code_7() {
 /// An image that is too large for the memory is an error with its size, as before.
 #[test]
 fn handled_allocations_are_errors() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let options = "--spp 1 --size 30000x30000 --time-limit 1 --device cpu --threads 1 -o out.png";
     let ran = place.shell(
         "sh",

@@ -3,16 +3,16 @@
 use wgray::image::{difference, encode, read_exr};
 use wgray_image::Region;
 use wgray_render::cpu::Cpu;
-use wgray_render::job::{self, Cut};
+use wgray_render::job::{self, WorkSplit};
 
-use super::{Place, SCENE, read_png};
+use super::{SCENE, TestFolder, read_png};
 use crate::patterns;
 use crate::pictures::{film, reference, whole};
 use crate::scenes::{packed, parse};
 
 #[test]
-fn the_picture_has_the_scenes_name_and_is_in_the_current_folder() {
-    let place = Place::new();
+fn the_default_output_has_the_scenes_name() {
+    let place = TestFolder::new();
     std::fs::create_dir(place.path("scenes")).unwrap();
     place.write("scenes/my.scene.toml", SCENE);
     place.quietly(&["render", "scenes/my.scene.toml"]);
@@ -20,8 +20,8 @@ fn the_picture_has_the_scenes_name_and_is_in_the_current_folder() {
 }
 
 #[test]
-fn a_png_holds_the_means_as_a_screen_shows_them() {
-    let place = Place::new();
+fn a_png_has_display_values_of_the_means() {
+    let place = TestFolder::new();
     place.quietly(&["render", "small.toml"]);
     let expected: Vec<u8> = reference(&parse(SCENE))
         .means()
@@ -32,8 +32,8 @@ fn a_png_holds_the_means_as_a_screen_shows_them() {
 }
 
 #[test]
-fn an_exr_holds_the_means_themselves() {
-    let place = Place::new();
+fn an_exr_has_the_linear_means() {
+    let place = TestFolder::new();
     for device in ["gpu", "cpu"] {
         place.quietly(&["render", "small.toml", "-o", "out.EXR", "--device", device]);
         let found = read_exr(&place.path("out.EXR")).unwrap();
@@ -47,8 +47,8 @@ fn an_exr_holds_the_means_themselves() {
 }
 
 #[test]
-fn an_exr_says_where_in_the_picture_its_pixels_are() {
-    let place = Place::new();
+fn an_exr_of_a_crop_has_its_data_window() {
+    let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "-o", "part.exr", "--crop", "2,1,9,5"]);
     let meta = exr::meta::MetaData::read_from_file(place.path("part.exr"), true).unwrap();
     let header = &meta.headers[0];
@@ -66,7 +66,7 @@ fn an_exr_says_where_in_the_picture_its_pixels_are() {
 
 #[test]
 fn aovs_are_layers_of_an_exr() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.quietly(&[
         "render",
         "small.toml",
@@ -78,7 +78,7 @@ fn aovs_are_layers_of_an_exr() {
     let scene = parse(SCENE);
     let mut backend = Cpu::new(&scene);
     let hits = job::first_hits(&mut backend, whole(&scene)).unwrap();
-    let means: Vec<[f32; 3]> = film(&mut backend, &scene, whole(&scene), &Cut::default())
+    let means: Vec<[f32; 3]> = film(&mut backend, &scene, whole(&scene), &WorkSplit::default())
         .means()
         .collect();
     let image = exr::prelude::read_first_flat_layer_from_file(place.path("out.exr")).unwrap();
@@ -125,7 +125,7 @@ fn aovs_are_layers_of_an_exr() {
 
 #[test]
 fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let options = ["--pixel-pattern", "sobol", "--spp", "8", "--adaptive", "0.02"];
     let files = [
         "-o",
@@ -144,7 +144,7 @@ fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
         max_samples: None,
     });
     let scene = packed(&description);
-    let film = film(&mut Cpu::new(&scene), &scene, whole(&scene), &Cut::default());
+    let film = film(&mut Cpu::new(&scene), &scene, whole(&scene), &WorkSplit::default());
     let counts: Vec<u32> = film.sample_counts().collect();
     assert!(
         counts.contains(&16) && counts.iter().any(|count| *count > 16),
@@ -213,7 +213,7 @@ fn path_scene(settings: &str) -> String {
 #[test]
 fn layers_of_paths_are_those_of_the_film() {
     const NAMES: [&str; 5] = ["emission", "direct", "indirect", "albedo", "shading_normal"];
-    let place = Place::new();
+    let place = TestFolder::new();
     let inner = Region {
         x0: 1,
         y0: 1,
@@ -224,7 +224,7 @@ fn layers_of_paths_are_those_of_the_film() {
         let text = path_scene(if alpha { "alpha = true" } else { "" });
         place.write("path.toml", &text);
         let scene = parse(&text).with_layers();
-        let film = film(&mut Cpu::new(&scene), &scene, region, &Cut::default());
+        let film = film(&mut Cpu::new(&scene), &scene, region, &WorkSplit::default());
         let hits = job::first_hits(&mut Cpu::new(&scene), region).unwrap();
         for device in ["gpu", "cpu"] {
             if device == "gpu" && !crate::adapter::device().is_some_and(crate::adapter::bit_exact) {
@@ -251,13 +251,13 @@ fn layers_of_paths_are_those_of_the_film() {
                         ("depth.Z", ..) => hits[pixel].depth,
                         (_, Some(of), Some(i)) => film.layers[of][pixel][i % 3] / film.sums[pixel].w,
                         (_, None, Some(i)) => film.sums[pixel][i] / film.sums[pixel].w,
-                        _ => panic!("{name}: what is this?"),
+                        _ => panic!("{name}: unexpected layer"),
                     })
                     .collect();
                 assert_eq!(found.to_vec(), expected, "{name}, {device}");
                 assert!(
                     !seen.contains(&expected),
-                    "{name} is another channel's: the comparison cannot fail"
+                    "{name} equals another channel: the comparison cannot fail"
                 );
                 seen.push(expected);
             }
@@ -266,8 +266,8 @@ fn layers_of_paths_are_those_of_the_film() {
 }
 
 #[test]
-fn layers_of_paths_are_refused_without_paths() {
-    let place = Place::new();
+fn path_layers_are_rejected_under_phong() {
+    let place = TestFolder::new();
     for name in ["albedo", "direct", "indirect", "emission"] {
         let names = format!("depth,{name}");
         let ran = place.run(&["render", "small.toml", "-o", "out.exr", "--aov", &names]);
@@ -279,8 +279,8 @@ fn layers_of_paths_are_refused_without_paths() {
 }
 
 #[test]
-fn layers_of_paths_are_pictures_beside_a_png() {
-    let place = Place::new();
+fn path_layers_are_files_beside_a_png() {
+    let place = TestFolder::new();
     let text = path_scene("alpha = true");
     place.write("path.toml", &text);
     place.quietly(&[
@@ -345,7 +345,7 @@ fn layers_of_paths_are_pictures_beside_a_png() {
 
 #[test]
 fn aovs_are_files_beside_a_png() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.quietly(&[
         "render",
         "small.toml",
@@ -378,25 +378,25 @@ fn aovs_are_files_beside_a_png() {
     assert_eq!(
         (near, nothing),
         ([128; 3], [0; 3]),
-        "the middle of the picture is half bright"
+        "the sphere in the center is not at half brightness"
     );
     assert!(far[0] < near[0] && far[0] > 0, "{far:?}");
     assert_ne!(
         pixel("a.b.primitive.png", 5, 3),
         pixel("a.b.primitive.png", 0, 5),
-        "two shapes, two colours"
+        "two shapes have one color"
     );
     assert_eq!(
         pixel("a.b.primitive.png", 0, 5),
         pixel("a.b.primitive.png", 9, 5),
-        "one shape, one colour"
+        "one shape has two colors"
     );
     assert_ne!(pixel("a.b.uv.png", 0, 5), pixel("a.b.uv.png", 9, 5));
 }
 
 #[test]
 fn stats_have_the_promised_fields() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let arguments = ["--stats", "stats.json", "--crop", "0,0,5,4", "--light-samples", "9"];
     place.quietly(&[&["render", "small.toml", "-o", "out.png"], &arguments[..]].concat());
     let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
@@ -425,7 +425,11 @@ fn stats_have_the_promised_fields() {
     names.sort_unstable();
     expected.sort_unstable();
     assert_eq!(names, expected);
-    let number = |name: &str| fields[name].as_f64().unwrap_or_else(|| panic!("{name} is no number"));
+    let number = |name: &str| {
+        fields[name]
+            .as_f64()
+            .unwrap_or_else(|| panic!("{name} is not a number"))
+    };
     assert_eq!(
         [
             "width",
@@ -452,11 +456,11 @@ fn stats_have_the_promised_fields() {
 
 /// If the driver truncates loops and a sample exceeds its limit, the CPU renders instead and a message reports it.
 #[test]
-fn a_sample_too_long_for_the_driver_is_rendered_all_the_same() {
+fn a_sample_too_long_for_the_driver_is_rendered_on_the_cpu() {
     if crate::adapter::device().is_none() {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     let long = [
         "render",
         "small.toml",

@@ -2,10 +2,10 @@
 
 use std::fs;
 
-use super::{Place, Ran, SCENE};
+use super::{Ran, SCENE, TestFolder};
 
 /// Writes a scene with a texture image, a normal map and an unused texture image.
-fn textured(place: &Place) {
+fn textured(place: &TestFolder) {
     let texture = |name: &str, file: &str, encoding: &str| {
         image::RgbImage::new(2, 2).save(place.path(file)).unwrap();
         format!("[textures.{name}]\ntype = 'image'\nfile = '{file}'\nencoding = '{encoding}'\n")
@@ -24,7 +24,7 @@ fn textured(place: &Place) {
 }
 
 /// Writes a scene with a mesh whose .mtl file has two used materials, one of them textured, and an unused one.
-fn with_materials(place: &Place) {
+fn with_materials(place: &TestFolder) {
     for name in ["wood.png", "spare.png"] {
         image::RgbImage::new(2, 2).save(place.path(name)).unwrap();
     }
@@ -40,7 +40,7 @@ fn with_materials(place: &Place) {
 
 #[test]
 fn nothing_that_a_mesh_names_is_replaced() {
-    let place = Place::new();
+    let place = TestFolder::new();
     with_materials(&place);
     let keeps = "is an input of the scene; choose another name";
     for name in ["wood.png", "spare.png"] {
@@ -69,7 +69,7 @@ fn nothing_that_a_mesh_names_is_replaced() {
 
 #[test]
 fn a_mesh_has_the_colours_of_its_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     with_materials(&place);
     let picture = |scene: &str| {
         place.quietly(&["render", scene, "-o", "a.exr", "--device", "cpu"]);
@@ -90,8 +90,8 @@ fn a_mesh_has_the_colours_of_its_file() {
 
 /// Checks that the render is rejected and leaves all files unchanged.
 #[track_caller]
-pub fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {
-    let content = |place: &Place| -> Vec<(String, Vec<u8>)> {
+pub fn refused(place: &TestFolder, arguments: &[&str], code: i32, message: &str) {
+    let content = |place: &TestFolder| -> Vec<(String, Vec<u8>)> {
         let files = place.files().into_iter().filter(|name| place.path(name).is_file());
         files.map(|name| (name.clone(), place.read(&name))).collect()
     };
@@ -110,7 +110,7 @@ pub fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {
 
 #[test]
 fn no_input_is_replaced() {
-    let place = Place::new();
+    let place = TestFolder::new();
     textured(&place);
     let keeps = "is an input of the scene; choose another name";
     let foreign = "exists and was not written by wgray; name the output with -o";
@@ -152,7 +152,7 @@ fn no_input_is_replaced() {
 #[cfg(unix)]
 #[test]
 fn no_input_is_replaced_through_links() {
-    let place = Place::new();
+    let place = TestFolder::new();
     textured(&place);
     let path = |name: &str| place.path(name);
     std::os::unix::fs::symlink("tiles.png", path("soft.png")).unwrap();
@@ -173,7 +173,7 @@ fn no_input_is_replaced_through_links() {
 
 #[test]
 fn no_output_is_written_twice() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for (arguments, told) in [
         (
             &["-o", "q", "--format", "png", "--stats", "./q"][..],
@@ -203,7 +203,7 @@ fn no_output_is_written_twice() {
 
 #[test]
 fn the_picture_of_the_development_mode_is_no_input() {
-    let place = Place::new();
+    let place = TestFolder::new();
     textured(&place);
     std::fs::create_dir(place.path("folder.png")).unwrap();
     for (out, code, told) in [
@@ -229,7 +229,7 @@ fn the_picture_of_the_development_mode_is_no_input() {
 
 #[test]
 fn the_format_is_told_by_the_name_or_the_option() {
-    let place = Place::new();
+    let place = TestFolder::new();
     refused(
         &place,
         &["small.toml", "-o", "q.png", "--format", "exr"],
@@ -264,12 +264,12 @@ mod unix {
     use super::super::program;
     use super::*;
 
-    fn bash(place: &Place, line: &str) -> Ran {
+    fn bash(place: &TestFolder, line: &str) -> Ran {
         place.shell("bash", line)
     }
 
     #[track_caller]
-    fn quiet(place: &Place, line: &str) {
+    fn quiet(place: &TestFolder, line: &str) {
         let ran = bash(place, line);
         assert_eq!(
             (ran.code, ran.stdout.as_str(), ran.stderr.as_str()),
@@ -281,7 +281,7 @@ mod unix {
     /// Standard output receives the same bytes as a file.
     #[test]
     fn standard_output_takes_a_picture_or_figures() {
-        let place = Place::new();
+        let place = TestFolder::new();
         place.quietly(&["render", "small.toml", "-o", "file.png", "--device", "cpu"]);
         place.quietly(&[
             "render",
@@ -339,7 +339,7 @@ mod unix {
 
     #[test]
     fn an_input_on_standard_output_is_kept() {
-        let place = Place::new();
+        let place = TestFolder::new();
         textured(&place);
         let before = place.read("tiles.png");
         let ran = bash(&place, "$0 render tiles.toml --device cpu -o - >> tiles.png");
@@ -355,7 +355,7 @@ mod unix {
 
     #[test]
     fn a_limit_of_file_sizes_is_told_like_a_full_disk() {
-        let place = Place::new();
+        let place = TestFolder::new();
         let ran = bash(
             &place,
             "ulimit -f 1; $0 render small.toml --device cpu --size 200x200 --spp 1 -o big.exr",
@@ -371,7 +371,7 @@ mod unix {
 
     #[test]
     fn devices_are_written_through() {
-        let place = Place::new();
+        let place = TestFolder::new();
         quiet(
             &place,
             "$0 render small.toml --device cpu -o /dev/null --stats /dev/null",
@@ -404,7 +404,7 @@ mod unix {
 
     #[test]
     fn a_folder_for_temporary_files_that_is_not_there_is_told() {
-        let place = Place::new();
+        let place = TestFolder::new();
         let ran = place.run_with(
             &["render", "small.toml", "-o", "-", "--device", "cpu"],
             &[("TMPDIR", "/nonexistent")],
@@ -426,7 +426,7 @@ mod unix {
 
     #[test]
     fn a_link_stays_and_its_target_is_replaced() {
-        let place = Place::new();
+        let place = TestFolder::new();
         fs::create_dir(place.path("inner")).unwrap();
         place.write("inner/there.png", "old");
         std::os::unix::fs::symlink("inner/there.png", place.path("there.png")).unwrap();
@@ -451,7 +451,7 @@ mod unix {
     /// Judged by the mode bits, as root can write to any file.
     #[test]
     fn a_read_only_file_is_refused_and_others_keep_their_mode() {
-        let place = Place::new();
+        let place = TestFolder::new();
         for (name, mode) in [("fixed.png", 0o444), ("open.png", 0o640)] {
             place.write(name, "old");
             fs::set_permissions(place.path(name), fs::Permissions::from_mode(mode)).unwrap();
@@ -477,7 +477,7 @@ mod unix {
     #[test]
     fn waiting_for_a_reader_can_be_interrupted() {
         crate::cli::heed_interrupts();
-        let place = Place::new();
+        let place = TestFolder::new();
         let made = Command::new("mkfifo").arg(place.path("p.png")).status().unwrap();
         assert!(made.success());
         let mut child = Command::new(program())

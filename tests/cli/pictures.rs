@@ -8,9 +8,9 @@ use wgray::image::{read_exr, to_8_bits, to_16_bits};
 use wgray::scene::{ViewSettings, ViewTransform};
 
 use super::outputs::refused;
-use super::{Place, SCENE, read_png};
+use super::{SCENE, TestFolder, read_png};
 
-fn render(place: &Place, arguments: &[&str]) {
+fn render(place: &TestFolder, arguments: &[&str]) {
     place.quietly(&[&["render", "small.toml", "--device", "cpu"], arguments].concat());
 }
 
@@ -50,9 +50,9 @@ fn path_scene() -> String {
 }
 
 #[test]
-fn one_render_writes_several_pictures() {
+fn one_render_writes_several_images() {
     const NAMES: [&str; 6] = ["a.png", "a.exr", "a.jpg", "a.jpeg", "a.webp", "b.PNG"];
-    let place = Place::new();
+    let place = TestFolder::new();
     let aovs = ["--aov", "depth,primitive"];
     let outputs = NAMES.map(|name| ["-o", name]).concat();
     render(&place, &[&outputs[..], &aovs].concat());
@@ -81,14 +81,14 @@ fn one_render_writes_several_pictures() {
     }
     assert_eq!(place.files(), all);
     for (name, together) in all.iter().zip(together) {
-        assert!(place.read(name) == together, "{name} is another one by itself");
+        assert!(place.read(name) == together, "{name} differs if it is the only output");
     }
     assert_ne!(place.read("a.png"), place.read("a.depth.png"));
 }
 
 #[test]
 fn a_format_without_alpha_is_noted() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("clear.toml", &path_scene());
     for (name, is_noted) in [("a.jpg", true), ("a.png", false)] {
         let ran = place.run(&["render", "clear.toml", "--device", "cpu", "-o", name]);
@@ -103,8 +103,8 @@ fn a_format_without_alpha_is_noted() {
 }
 
 #[test]
-fn a_picture_that_fails_leaves_none_of_the_others() {
-    let place = Place::new();
+fn a_failed_output_leaves_no_incomplete_files() {
+    let place = TestFolder::new();
     let ran = place.run(&[
         "render",
         "small.toml",
@@ -131,8 +131,8 @@ fn a_picture_that_fails_leaves_none_of_the_others() {
 }
 
 #[test]
-fn pngs_have_8_or_16_bits_and_tell_their_curve() {
-    let place = Place::new();
+fn pngs_have_8_or_16_bits_and_name_their_curve() {
+    let place = TestFolder::new();
     render(&place, &["-o", "a.exr"]);
     let linear = read_exr(&place.path("a.exr")).unwrap().colors;
     for transform in ViewTransform::ALL {
@@ -157,10 +157,7 @@ fn pngs_have_8_or_16_bits_and_tell_their_curve() {
         };
         let expected: Vec<u16> = shown.map(to_16_bits).collect();
         assert_eq!(deep.into_raw(), expected, "{name}");
-        assert!(
-            expected.iter().any(|value| value % 257 != 0),
-            "more than 8 bits would hold"
-        );
+        assert!(expected.iter().any(|value| value % 257 != 0), "the values fit 8 bits");
         assert_eq!(png_info(&place.path("b.normal.png")).bit_depth, png::BitDepth::Sixteen);
         let info = png_info(&place.path("a.png"));
         let (srgb, gamma) = (info.srgb.is_some(), info.gama_chunk.map(|gamma| gamma.into_scaled()));
@@ -172,8 +169,8 @@ fn pngs_have_8_or_16_bits_and_tell_their_curve() {
 }
 
 #[test]
-fn the_scene_says_how_it_is_shown_and_options_stand_in() {
-    let place = Place::new();
+fn options_override_the_view_of_the_scene() {
+    let place = TestFolder::new();
     let keys = "view_transform = 'khronos-pbr-neutral', exposure = 1.5";
     place.write(
         "shown.toml",
@@ -215,7 +212,7 @@ fn the_scene_says_how_it_is_shown_and_options_stand_in() {
         image::open(place.path("l.webp")).unwrap().into_rgb8().into_raw(),
         of_scene.2
     );
-    for (keys, told) in [
+    for (keys, message) in [
         ("exposure = 101", "image.exposure: 101 must be from -100 to 100 stops"),
         ("exposure = nan", "image.exposure: NaN must be from -100 to 100 stops"),
         ("view_transform = 'filmic'", "image.view_transform: "),
@@ -227,13 +224,13 @@ fn the_scene_says_how_it_is_shown_and_options_stand_in() {
         );
         let ran = place.run(&["check", "bad.toml"]);
         assert_eq!(ran.code, 3, "{keys}: {}", ran.stderr);
-        assert!(ran.stderr.contains(told), "{keys}: {}", ran.stderr);
+        assert!(ran.stderr.contains(message), "{keys}: {}", ran.stderr);
     }
 }
 
 #[test]
-fn exrs_are_compressed_in_every_way_without_loss() {
-    let place = Place::new();
+fn exr_compression_is_lossless() {
+    let place = TestFolder::new();
     let aovs = ["--aov", "depth,primitive", "--size", "75x70"];
     render(&place, &[&["-o", "zip.exr"], &aovs[..]].concat());
     let floats = samples(&place.path("zip.exr"));
@@ -275,8 +272,8 @@ fn exrs_are_compressed_in_every_way_without_loss() {
 }
 
 #[test]
-fn halves_that_are_too_large_are_counted() {
-    let place = Place::new();
+fn half_float_overflows_are_counted() {
+    let place = TestFolder::new();
     place.write(
         "small.toml",
         &SCENE.replace("background = [0.2, 0.3, 2]", "background = [65504, 65519, 70000]"),
@@ -298,10 +295,10 @@ fn halves_that_are_too_large_are_counted() {
     assert!(of_blue > 5, "{of_blue}");
     // Values up to 65520, halfway to the next step, round to 65504.
     assert_eq!((infinite("R"), infinite("G")), (0, 0));
-    let told = format!(
+    let warning = format!(
         "warning: h.exr: {of_blue} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float\n"
     );
-    assert_eq!(ran.stderr, told);
+    assert_eq!(ran.stderr, warning);
     place.quietly(&[
         "render",
         "small.toml",
@@ -317,8 +314,8 @@ fn halves_that_are_too_large_are_counted() {
 }
 
 #[test]
-fn thumbnails_show_the_picture() {
-    let place = Place::new();
+fn jpeg_and_webp_match_the_png() {
+    let place = TestFolder::new();
     let size = ["--size", "160x96"];
     render(
         &place,
@@ -329,7 +326,7 @@ fn thumbnails_show_the_picture() {
     let image::DynamicImage::ImageRgb8(webp) = image::open(place.path("a.webp")).unwrap() else {
         panic!("no RGB");
     };
-    assert_eq!(webp.into_raw(), exact, "WebP is without loss");
+    assert_eq!(webp.into_raw(), exact, "WebP is not lossless");
     let error = |name: &str| {
         let found = image::open(place.path(name)).unwrap().into_rgb8().into_raw();
         let squares = found
@@ -346,7 +343,7 @@ fn thumbnails_show_the_picture() {
 
 #[test]
 fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("small.toml", &path_scene());
     render(
         &place,
@@ -388,8 +385,8 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
 
 /// Radiance layers use the view settings of the image, albedo only the sRGB curve, and other layers no transform.
 #[test]
-fn layers_of_light_are_shown_as_the_picture() {
-    let place = Place::new();
+fn radiance_layers_use_the_view_of_the_image() {
+    let place = TestFolder::new();
     place.write("small.toml", &path_scene());
     let names = ["albedo", "direct", "indirect", "emission"];
     let options = [
@@ -431,8 +428,8 @@ fn layers_of_light_are_shown_as_the_picture() {
 }
 
 #[test]
-fn pictures_tell_how_they_came_to_be() {
-    let place = Place::new();
+fn images_have_metadata() {
+    let place = TestFolder::new();
     render(
         &place,
         &[
@@ -498,8 +495,8 @@ fn pictures_tell_how_they_came_to_be() {
 }
 
 #[test]
-fn a_reproducible_picture_is_the_same_wherever_it_was_rendered() {
-    let place = Place::new();
+fn reproducible_images_do_not_depend_on_the_machine() {
+    let place = TestFolder::new();
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     const NAMES: [&str; 5] = ["a.png", "a.normal.png", "a.exr", "a.webp", "a.jpg"];
     for device in ["cpu", "gpu"] {
@@ -519,17 +516,17 @@ fn a_reproducible_picture_is_the_same_wherever_it_was_rendered() {
                 assert_eq!(same, reproducible && device == "gpu", "{name} {device}");
                 files.push((name.to_owned(), bytes));
             }
-            let told = texts(&place.path("a.png"));
-            assert_eq!(told.contains_key("device"), !reproducible);
-            assert!(told.contains_key("shader_hash") && told.contains_key("seed"));
+            let metadata = texts(&place.path("a.png"));
+            assert_eq!(metadata.contains_key("device"), !reproducible);
+            assert!(metadata.contains_key("shader_hash") && metadata.contains_key("seed"));
         }
     }
 }
 
 #[test]
-fn options_that_no_picture_heeds_are_refused() {
-    let place = Place::new();
-    for (arguments, told) in [
+fn options_without_an_applicable_output_are_rejected() {
+    let place = TestFolder::new();
+    for (arguments, message) in [
         (
             &["-o", "a.exr", "--bit-depth", "16"][..],
             "--bit-depth: only applies to PNG outputs",
@@ -572,9 +569,9 @@ fn options_that_no_picture_heeds_are_refused() {
         ),
         (&["--stats", "a.webp"], "--stats: a.webp: must not end in .webp"),
     ] {
-        refused(&place, &[&["small.toml"], arguments].concat(), 2, told);
+        refused(&place, &[&["small.toml"], arguments].concat(), 2, message);
     }
-    for (option, value, told) in [
+    for (option, value, message) in [
         ("--quality", "0", "0"),
         ("--quality", "101", "101"),
         ("--exposure", "nan", "from -100 to 100"),
@@ -587,7 +584,7 @@ fn options_that_no_picture_heeds_are_refused() {
         let ran = place.run(&["render", "small.toml", "-o", "a.jpg", "-o", "a.exr", option, value]);
         assert_eq!(ran.code, 2, "{option} {value}: {}", ran.stderr);
         assert!(
-            ran.stderr.contains(option) && ran.stderr.contains(told),
+            ran.stderr.contains(option) && ran.stderr.contains(message),
             "{option} {value}: {}",
             ran.stderr
         );
@@ -613,9 +610,9 @@ fn options_that_no_picture_heeds_are_refused() {
 
 /// Rejected before rendering, as an image of that size would take long.
 #[test]
-fn pictures_that_a_format_has_no_room_for_are_refused() {
-    let place = Place::new();
-    for (name, size, told) in [
+fn images_too_large_for_a_format_are_rejected() {
+    let place = TestFolder::new();
+    for (name, size, message) in [
         (
             "a.jpg",
             "65536x60000",
@@ -631,7 +628,7 @@ fn pictures_that_a_format_has_no_room_for_are_refused() {
             &place,
             &["small.toml", "--size", size, "-o", "b.png", "-o", name],
             2,
-            told,
+            message,
         );
     }
     // A crop within the limits is accepted, and the maximum sizes are written.

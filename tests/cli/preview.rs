@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use wgray::image::read_metadata;
 
-use super::{Place, Ran, heed_interrupts, program, project_scene};
+use super::{Ran, TestFolder, heed_interrupts, program, project_scene};
 
 /// A render of minutes, whose passes take some hundredths of a second.
 const LONG: [&str; 8] = [
@@ -21,12 +21,12 @@ const LONG: [&str; 8] = [
     "1",
 ];
 
-fn start(place: &Place, arguments: &[&str]) -> Child {
+fn start(place: &TestFolder, arguments: &[&str]) -> Child {
     start_in_shell(place, "", arguments)
 }
 
 /// Starts the long render after a line of a shell.
-fn start_in_shell(place: &Place, line: &str, arguments: &[&str]) -> Child {
+fn start_in_shell(place: &TestFolder, line: &str, arguments: &[&str]) -> Child {
     heed_interrupts();
     Command::new("sh")
         .current_dir(place.path("."))
@@ -48,7 +48,7 @@ fn wait_until(what: &str, condition: impl Fn() -> bool) {
     }
 }
 
-fn wait_for(place: &Place, file: &str) {
+fn wait_for(place: &TestFolder, file: &str) {
     wait_until(file, || place.path(file).exists());
 }
 
@@ -72,7 +72,7 @@ fn partial(path: &Path) -> Option<(u32, u32)> {
 }
 
 /// The contents of all files, and removes them.
-fn take_files(place: &Place) -> Vec<(String, Vec<u8>)> {
+fn take_files(place: &TestFolder) -> Vec<(String, Vec<u8>)> {
     let files = place.files().into_iter();
     let files: Vec<_> = files.map(|name| (name.clone(), place.read(&name))).collect();
     for (name, _) in &files {
@@ -84,7 +84,7 @@ fn take_files(place: &Place) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn the_complete_files_are_the_same_with_and_without_previews() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let path_scene = project_scene("cornell-path.toml");
     let both = ["-o", "a.png", "-o", "a.exr"];
     let cases: [&[&str]; 8] = [
@@ -131,7 +131,7 @@ fn the_complete_files_are_the_same_with_and_without_previews() {
 }
 
 /// Compares an image with a render of so many samples, with these further options.
-fn has_pixels_of(place: &Place, file: &str, samples: u32, more: &[&str]) -> bool {
+fn has_pixels_of(place: &TestFolder, file: &str, samples: u32, more: &[&str]) -> bool {
     let spp = samples.to_string();
     let size = ["render", "small.toml", "--size", "150x100", "--device", "cpu"];
     place.quietly(&[&size[..], &["--spp", &spp, "-o", "expected.exr"], more].concat());
@@ -147,7 +147,7 @@ fn a_signal_leaves_the_last_whole_pass() {
         ("-TERM", "SIGTERM", 143, "gpu"),
         ("-HUP", "SIGHUP", 129, "cpu"),
     ] {
-        let place = Place::new();
+        let place = TestFolder::new();
         let files = ["out.png", "out.normal.png", "out.exr", "out.jpg", "out.webp"];
         let outputs = ["-o", "out.png", "-o", "out.exr", "-o", "out.jpg", "-o", "out.webp"];
         let more = ["--aov", "normal", "--stats", "stats.json", "--device", device];
@@ -193,7 +193,7 @@ fn a_signal_leaves_the_last_whole_pass() {
 
 #[test]
 fn a_second_signal_ends_at_once() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let child = start(&place, &["-o", "out.exr", "--device", "cpu"]);
     wait_for(&place, "out.exr");
     std::thread::sleep(Duration::from_millis(500));
@@ -212,7 +212,7 @@ fn a_second_signal_ends_at_once() {
 
 #[test]
 fn files_with_more_samples_stay() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let outputs = [
         "-o",
         "a.png",
@@ -287,7 +287,7 @@ fn files_with_more_samples_stay() {
 
 #[test]
 fn partial_files_do_not_count_as_existing() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let child = start(
         &place,
         &["--frames", "1-3", "-o", "#.png", "-o", "#.exr", "--device", "cpu"],
@@ -324,7 +324,7 @@ fn partial_files_do_not_count_as_existing() {
 
 #[test]
 fn a_checkpoint_takes_the_samples_at_a_signal() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let options = ["--spp", "2000", "--device", "cpu"];
     let render = |more: &[&str]| {
         let ran = place.run(&[&["render", "small.toml", "--size", "150x100"], &options[..], more].concat());
@@ -362,7 +362,7 @@ fn a_checkpoint_takes_the_samples_at_a_signal() {
 
 #[test]
 fn previews_need_passes_and_a_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for (options, rule) in [
         (&["--tile", "1/2", "-o", "x.part"][..], "cannot be used with '--tile"),
         (
@@ -393,7 +393,7 @@ fn previews_need_passes_and_a_file() {
 
 #[test]
 fn a_time_limit_ends_previews() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let child = start(&place, &["--time-limit", "1", "-o", "out.exr", "--device", "cpu"]);
     let ran = ended(child);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
@@ -409,7 +409,7 @@ fn a_time_limit_ends_previews() {
 #[test]
 fn a_full_disk_loses_previews_and_keeps_the_older_file() {
     for output in ["out.png", "out.exr"] {
-        let place = Place::new();
+        let place = TestFolder::new();
         let base = ["render", "small.toml", "--spp", "1", "-o", output, "--device", "cpu"];
         place.quietly(&[&base[..], &["--size", "2x2"]].concat());
         let before = place.read(output);

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use super::{Place, SCENE, read_png};
+use super::{SCENE, TestFolder, read_png};
 
 /// A sphere of a principled material under a gray environment.
 const BALL: &str = "image = { width = 12, height = 8 }\n\
@@ -12,22 +12,22 @@ const BALL: &str = "image = { width = 12, height = 8 }\n\
                     materials.m = { type = 'principled', base_color = [0.8, 0.4, 0.2] }\n\
                     shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]\n";
 
-fn ball() -> Place {
-    Place::with_file("ball.toml", BALL)
+fn ball() -> TestFolder {
+    TestFolder::with_file("ball.toml", BALL)
 }
 
-fn quietly(place: &Place, arguments: &[&str]) {
+fn quietly(place: &TestFolder, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &["--device", "cpu"]].concat());
 }
 
 /// Writes an environment map of 4 x 2 texels with a gradient.
-fn write_room(place: &Place, name: &str) {
+fn write_room(place: &TestFolder, name: &str) {
     let room = image::Rgb32FImage::from_fn(4, 2, |x, y| image::Rgb([1.0 + x as f32, 0.5, 0.25 + y as f32]));
     room.save(place.path(name)).unwrap();
 }
 
 #[test]
-fn surroundings_stand_in_for_the_scenes() {
+fn the_option_overrides_the_environment() {
     let place = ball();
     write_room(&place, "room.exr");
     fs::create_dir(place.path("sub")).unwrap();
@@ -58,7 +58,7 @@ fn surroundings_stand_in_for_the_scenes() {
 }
 
 #[test]
-fn a_background_is_seen_and_lights_nothing() {
+fn a_background_emits_no_light() {
     let place = ball();
     quietly(&place, &["ball.toml", "-o", "plain.exr"]);
     quietly(
@@ -108,14 +108,14 @@ fn a_background_is_seen_and_lights_nothing() {
 }
 
 #[test]
-fn surroundings_that_cannot_be_are_told_as_options() {
+fn invalid_environment_options_are_rejected() {
     let place = ball();
     place.write(
         "small.toml",
         &SCENE.replace("[render]", "[render]\nintegrator = 'phong'"),
     );
     place.write("text.hdr", "no image");
-    for (arguments, told) in [
+    for (arguments, message) in [
         (["ball.toml", "--environment", "none.hdr"], "--environment: \""),
         (
             ["ball.toml", "--environment", "none.hdr"],
@@ -166,7 +166,7 @@ fn surroundings_that_cannot_be_are_told_as_options() {
             "{arguments:?}: {}",
             ran.stderr
         );
-        assert!(ran.stderr.contains(told), "{arguments:?}: {}\n{told}", ran.stderr);
+        assert!(ran.stderr.contains(message), "{arguments:?}: {}\n{message}", ran.stderr);
         assert_eq!(place.files_but(|_| false), before, "{arguments:?}");
     }
     let panorama = BALL.replace("fov = 40 }", "type = 'panorama' }");
@@ -181,7 +181,7 @@ fn surroundings_that_cannot_be_are_told_as_options() {
 }
 
 #[test]
-fn a_turntable_goes_once_around() {
+fn a_turntable_is_one_full_turn() {
     let place = ball();
     quietly(&place, &["ball.toml", "-o", "still.exr"]);
     quietly(&place, &["ball.toml", "--turntable", "4", "-o", "t.##.exr"]);

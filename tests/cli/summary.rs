@@ -1,6 +1,6 @@
 //! The line about a written image, and the files that a default name must not replace.
 
-use super::{Place, SCENE, is_summary};
+use super::{SCENE, TestFolder, is_summary};
 
 /// Replaces the time of a summary, which differs from run to run.
 fn without_time(line: &str) -> String {
@@ -10,7 +10,7 @@ fn without_time(line: &str) -> String {
 
 #[test]
 fn a_render_ends_with_a_line_about_its_files() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for (arguments, lines) in [
         (&["-o", "a.png"][..], &["a.png: 10 x 6, 3 spp"][..]),
         (&["-o", "./a.png", "-o", "b.exr"], &["./a.png, b.exr: 10 x 6, 3 spp"]),
@@ -64,7 +64,7 @@ fn a_render_ends_with_a_line_about_its_files() {
 
 #[test]
 fn the_device_is_explained_with_verbose_only() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let sphere = SCENE.split("[[shapes]]").nth(1).expect("a sphere");
     let many = (0..70).map(|_| format!("[[shapes]]{sphere}")).collect::<String>();
     place.write("many.toml", &format!("{SCENE}{many}"));
@@ -77,7 +77,7 @@ fn the_device_is_explained_with_verbose_only() {
 
 #[test]
 fn a_default_name_replaces_images_of_this_program_only() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let options = ["render", "small.toml", "--device", "cpu", "--spp", "1"];
     let refused = |arguments: &[&str], name: &str| {
         let ran = place.run(&[&options[..], arguments].concat());

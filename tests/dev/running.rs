@@ -14,7 +14,7 @@ use wgray_image::Region;
 use wgray_render::film::{Film, mean};
 use wgray_render::gpu::compose::{Shaders, built_in};
 use wgray_render::gpu::{AdapterChoice, Gpu, Options, choose};
-use wgray_render::job::{self, Cut};
+use wgray_render::job::{self, WorkSplit};
 use wgray_render::pack::pack;
 use wgray_render::records::Packed;
 
@@ -167,7 +167,7 @@ impl Files {
             &mut gpu,
             whole,
             packed.sampling.pixel_samples,
-            &Cut::default(),
+            &WorkSplit::default(),
             &mut |_| true,
             &mut |film| {
                 values.extend((0..film.sums.len()).map(|i| value(&film, i)));

@@ -7,8 +7,8 @@ use std::time::Duration;
 use std::{env, fs};
 
 use crate::cli::without_summary;
-use crate::place::Place;
 use crate::sources::path as project;
+use crate::test_folder::TestFolder;
 
 /// A scene of 40 x 30 pixels in which all random numbers differ between pixels.
 pub const SCENE: &str = r#"image = { width = 40, height = 30 }
@@ -59,7 +59,7 @@ fn prepare() -> Option<Driver> {
         let without = env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some_and(|value| value == "1");
         assert!(
             without,
-            "faults are tested on lavapipe, of which there is no manifest: on Debian, 'apt-get install mesa-vulkan-drivers'"
+            "no manifest of lavapipe for the fault tests; on Debian, 'apt-get install mesa-vulkan-drivers'"
         );
         return None;
     };
@@ -136,9 +136,9 @@ impl Ran {
     }
 }
 
-impl Place {
-    pub fn of(scene: &str) -> Place {
-        Place::with_file("scene.toml", scene)
+impl TestFolder {
+    pub fn of(scene: &str) -> TestFolder {
+        TestFolder::with_file("scene.toml", scene)
     }
 
     /// Returns a command that runs the program on the driver with these faults.
@@ -166,7 +166,7 @@ impl Place {
             .expect("the program runs");
         let known = |name: &str| ["scene.toml", "log", "out.exr"].contains(&name) || name.ends_with(".png");
         let strange = self.files_but(known);
-        assert_eq!(strange, [""; 0], "a part of a file");
+        assert_eq!(strange, [""; 0], "temporary files are left");
         let stderr = without_summary(&String::from_utf8(output.stderr).expect("UTF-8"));
         assert!(
             !stderr.contains("panicked") && !stderr.contains("backtrace"),
@@ -185,7 +185,7 @@ impl Place {
     pub fn expected(&self, driver: &Driver, arguments: &[&str]) -> Picture {
         let ran = self.run_on(driver, &[arguments, &["--device", "cpu"]].concat(), &[]);
         assert_eq!((ran.code, ran.stderr.as_str(), ran.log.len()), (0, "", 0));
-        ran.picture.expect("a picture")
+        ran.picture.expect("an image")
     }
 
     pub fn start(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Child {

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use wgray::{Device, Options, Picture, Scene};
 
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 use super::driver::{SCENE, driver};
 
@@ -17,7 +17,7 @@ fn render(scene: &Scene, device: Device) -> Picture {
         device,
         ..Options::default()
     };
-    wgray::render(scene, &options).expect("a picture")
+    wgray::render(scene, &options).expect("an image")
 }
 
 /// Does nothing, except in the process that [`pictures_survive`] starts.
@@ -35,19 +35,19 @@ fn in_a_process_of_its_own() {
         ..Options::default()
     };
     let mut looks = 0;
-    let grown = wgray::render_growing(&scene, &options, &mut |growing| {
-        growing.picture()?;
+    let grown = wgray::render_progressive(&scene, &options, &mut |progress| {
+        progress.picture()?;
         looks += 1;
         Ok(ControlFlow::Continue(()))
     });
-    assert_eq!(grown.expect("a picture").pixels(), expected.pixels());
+    assert_eq!(grown.expect("an image").pixels(), expected.pixels());
     assert!(looks > 0);
 }
 
 #[test]
 fn pictures_survive() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     // The first image loses its samples; the second, after 6 submits, its samples and a readback.
     for (lose, losses) in [("2", 1), ("2,7,10", 3), ("999", 0)] {
         let log = place.path("log");
@@ -65,10 +65,10 @@ fn pictures_survive() {
             String::from_utf8_lossy(&output.stdout)
         );
         // wgpu panics at a loss, and this process has no quiet panic hook.
-        let told = String::from_utf8_lossy(&output.stderr)
+        let panics = String::from_utf8_lossy(&output.stderr)
             .matches("Error in Device::poll")
             .count();
-        assert_eq!(told, losses, "{lose}");
+        assert_eq!(panics, losses, "{lose}");
         let log = std::fs::read_to_string(&log).expect("the driver's log");
         assert_eq!(log.matches("lost").count(), losses, "{lose}: {log}");
         assert!(log.contains("submit 7\n"), "{lose}: {log}");

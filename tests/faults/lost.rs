@@ -4,7 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 use super::driver::{Ran, SCENE, driver};
 
@@ -34,7 +34,7 @@ fn warned(ran: &Ran, reopened: usize, rest: &[&str]) {
 #[test]
 fn without_faults_the_driver_renders_as_lavapipe_does() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     for device in [GPU, AUTO, ["--device", "llvmpipe"]] {
         let ran = place.run_on(driver, &device, &[]);
@@ -53,9 +53,9 @@ fn without_faults_the_driver_renders_as_lavapipe_does() {
 }
 
 #[test]
-fn a_device_that_is_lost_anywhere_is_opened_anew() {
+fn a_device_lost_anywhere_is_reopened() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     for way in WAYS {
         for submit in 1..=SUBMITS {
@@ -75,9 +75,9 @@ fn a_device_that_is_lost_anywhere_is_opened_anew() {
 }
 
 #[test]
-fn a_device_that_is_lost_several_times_is_opened_as_often() {
+fn a_device_lost_several_times_is_reopened_each_time() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     let twice = place.run_on(driver, &GPU, &[("FAULTS_LOSE", "2,4")]);
     assert_eq!((twice.code, twice.count("lost")), (0, 2), "{}", twice.stderr);
@@ -99,7 +99,7 @@ fn a_device_that_is_lost_several_times_is_opened_as_often() {
 #[test]
 fn a_long_render_survives() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let size = ["--size", "512x512", "--spp", "16"];
     let expected = place.expected(driver, &size);
     for way in WAYS {
@@ -115,13 +115,13 @@ fn a_long_render_survives() {
 }
 
 #[test]
-fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
+fn a_permanently_lost_device_is_an_error_or_the_cpu_renders() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     // Each run waits for some seconds, hence they run in parallel.
     let never = |lose: &str, device: &str| {
-        let place = Place::of(SCENE);
+        let place = TestFolder::of(SCENE);
         let faults = [("FAULTS_LOSE", lose), ("FAULTS_REFUSE", "99")];
         let ran = place.run_on(driver, &["--device", device], &faults);
         assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{lose}");
@@ -161,13 +161,13 @@ fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
 }
 
 #[test]
-fn a_device_that_is_lost_again_and_again_is_given_up() {
+fn repeated_losses_reach_a_limit() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     // In the warm-up the device never becomes ready. In the samples it does, and each loss is reported.
     let again = |lose: &str, told: usize| {
-        let place = Place::of(SCENE);
+        let place = TestFolder::of(SCENE);
         let ran = place.run_on(driver, &GPU, &[("FAULTS_LOSE", lose)]);
         assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{lose}");
         assert_eq!(
@@ -192,9 +192,9 @@ fn a_device_that_is_lost_again_and_again_is_given_up() {
 
 /// wgpu panics when it drops the queue of a device whose driver returns these codes.
 #[test]
-fn a_lost_device_that_cannot_be_given_back_is_no_end() {
+fn a_panic_on_dropping_a_lost_device_is_caught() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     for code in ["-1", "-2", "-13"] {
         for way in WAYS {
@@ -209,9 +209,9 @@ fn a_lost_device_that_cannot_be_given_back_is_no_end() {
 }
 
 #[test]
-fn a_device_that_cannot_be_opened_is_tried_again_if_it_was_asked_for() {
+fn a_requested_device_is_opened_repeatedly() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     let ran = place.run_on(driver, &GPU, &[("FAULTS_REFUSE_FIRST", "2")]);
     assert_eq!((ran.code, ran.count("device refused")), (0, 2), "{}", ran.stderr);
@@ -229,9 +229,9 @@ fn a_device_that_cannot_be_opened_is_tried_again_if_it_was_asked_for() {
 }
 
 #[test]
-fn a_slow_call_changes_nothing() {
+fn a_slow_submit_does_not_change_the_image() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let size = ["--size", "256x256"];
     let expected = place.expected(driver, &size);
     let ran = place.run_on(driver, &[&size[..], &GPU].concat(), &[("FAULTS_SLEEP", "2:1500")]);
@@ -243,7 +243,7 @@ fn a_slow_call_changes_nothing() {
 fn waiting_for_a_device_can_be_interrupted() {
     let Some(driver) = driver() else { return };
     crate::cli::heed_interrupts();
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "99")];
     let mut child = place.start(driver, &GPU, &faults);
     // After two failures, the longest pause (2 s) has begun.
@@ -260,7 +260,7 @@ fn waiting_for_a_device_can_be_interrupted() {
     let status = child.wait().unwrap();
     assert!(sent.elapsed() < Duration::from_millis(1500), "{:?}", sent.elapsed());
     assert_eq!(status.code(), Some(130));
-    assert_eq!(refused(), 2, "it has not waited to the end");
+    assert_eq!(refused(), 2, "it did not stop during the pause");
     let mut told = String::new();
     child.stderr.unwrap().read_to_string(&mut told).unwrap();
     assert!(!told.contains("panicked"), "{told}");
@@ -272,13 +272,13 @@ const CASES: &str = "WGRAY_TEST_FAULTS";
 
 /// Random faults, of devices that come back and of those that do not. `scripts/test-slow faults` runs many.
 #[test]
-fn faults_at_random_change_nothing() {
+fn random_faults_do_not_change_the_image() {
     let Some(driver) = driver() else { return };
     let asked = std::env::var(CASES).ok();
     let cases = asked
         .as_ref()
         .map_or(4, |n| n.parse().expect("WGRAY_TEST_FAULTS is a number"));
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let size = ["--size", "320x240", "--spp", "16"];
     let expected = place.expected(driver, &size);
     let (mut losses, mut refused, mut on_cpu) = (0, 0, 0);
@@ -296,7 +296,7 @@ fn faults_at_random_change_nothing() {
         let what = format!("{losses} losses, {refused} refusals, {on_cpu} of them ended by the CPU");
         let _ = writeln!(
             std::io::stderr(),
-            "{cases} renders with faults: {what}; all pictures the same"
+            "{cases} renders with faults: {what}; all images equal"
         );
     }
     assert!(losses as u64 >= cases, "{losses} losses in {cases} renders");

@@ -1,6 +1,6 @@
 //! Device memory exhaustion: an error with the sizes, or the fallback to the CPU.
 
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 use super::driver::{Ran, SCENE, driver};
 
@@ -20,7 +20,7 @@ fn told(ran: &Ran, parts: &[&str]) {
 #[test]
 fn a_film_that_does_not_fit_tells_its_size() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let (large, gpu) = (["--size", "1024x1024"], ["--device", "gpu"]);
     let expected = place.expected(driver, &large);
     let ran = place.run_on(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "8388608")]);
@@ -55,7 +55,7 @@ fn a_film_that_does_not_fit_tells_its_size() {
 #[test]
 fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let large = ["--size", "1024x1024"];
     let expected = place.expected(driver, &large);
     let free = place.run_on(driver, &[large, ["--device", "gpu"]].concat(), &[]);
@@ -85,7 +85,7 @@ fn a_scene_that_does_not_fit_tells_its_size() {
     let Some(driver) = driver() else { return };
     let textured = SCENE.replace("color = [0.5, 0.4, 0.3]", "color = { texture = \"large\" }")
         + "[textures.large]\ntype = \"image\"\nfile = \"large.png\"\n";
-    let place = Place::of(&textured);
+    let place = TestFolder::of(&textured);
     // 4 MiB of texels, and a third of that for the mip levels.
     let large = image::RgbImage::from_fn(1024, 1024, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
     large.save(place.path("large.png")).expect("an image");
@@ -103,7 +103,7 @@ fn a_scene_that_does_not_fit_tells_its_size() {
 #[test]
 fn a_call_that_has_no_memory_is_no_loss() {
     let Some(driver) = driver() else { return };
-    let place = Place::of(SCENE);
+    let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     for submit in ["1", "2", "3", "4", "5"] {
         let faults = [("FAULTS_NO_MEMORY_IN", submit)];

@@ -86,7 +86,7 @@ fn shape(kind: &str) -> (usize, usize) {
         "MAT2" => (2, 2),
         "MAT3" => (3, 3),
         "MAT4" => (4, 4),
-        other => panic!("{other} is no type of accessor"),
+        other => panic!("{other} is not an accessor type"),
     }
 }
 
@@ -397,7 +397,7 @@ pub fn base64(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn base64_is_that_of_the_rfc() {
+fn base64_matches_the_rfc() {
     let pairs = [
         ("", ""),
         ("f", "Zg=="),

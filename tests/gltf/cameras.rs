@@ -7,7 +7,7 @@ use wgray::scene::{Overrides, Projection};
 
 use super::build::{Builder, Packing};
 use super::read::{assert_near, to_file, triangles};
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 /// Returns a quad and a camera on a rotated node below a scaled one.
 fn seen_by(camera: Value) -> Builder {
@@ -25,7 +25,7 @@ fn seen_by(camera: Value) -> Builder {
 }
 
 fn load(builder: &Builder, name: &str) -> Scene {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     let file = builder.write(place.folder(), name, Packing::Binary);
     Scene::load(&file).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -41,7 +41,7 @@ fn a_turntable_of_a_tilted_camera_is_level() {
     );
     let tilt = DQuat::from_rotation_x(-0.4).to_array();
     builder.root_node(json!({ "camera": camera, "rotation": tilt, "translation": [0, 2, 5] }));
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     let file = builder.write(place.folder(), "tilted", Packing::Binary);
     let overrides = Overrides {
         turntable: Some(5),

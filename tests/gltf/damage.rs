@@ -6,7 +6,7 @@ use serde_json::json;
 use wgray::scene::{Color, Overrides, Reflection, Scene, TextureKind, Value};
 
 use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES};
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 fn load(file: &Path, strict: bool) -> Result<Scene, String> {
     let overrides = Overrides {
@@ -24,7 +24,7 @@ fn triangles(scene: &Scene) -> usize {
 
 #[test]
 fn a_missing_texture_leaves_the_factor() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     std::fs::write(place.folder().join("broken.png"), b"\x89PNG\r\n\x1a\nno more").unwrap();
     for (uri, why) in [
         ("missing.png", "images[0].uri: \"missing.png\" cannot be read: "),
@@ -88,7 +88,7 @@ fn a_missing_texture_leaves_the_factor() {
 
 #[test]
 fn triangles_without_a_position_are_left_out() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     for (bad, left) in [(0, 0), (1, 1), (3, 1), (4, 2)] {
         for value in [f64::NAN, f64::INFINITY, -2e9] {
             let mut builder = Builder::new();
@@ -132,7 +132,7 @@ fn triangles_without_a_position_are_left_out() {
 
 #[test]
 fn a_node_may_have_any_scale() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     for scale in [1e-8, 1e-6, 1e6, 1e8] {
         let mut builder = Builder::new();
         let mesh = builder.quad(None);

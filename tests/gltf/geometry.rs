@@ -6,7 +6,7 @@ use wgray::Scene;
 
 use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES, QUAD_UVS};
 use super::read::{assert_all, assert_corners, corners, pixels, refusal, scene, scene_with, triangles};
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 /// Triangle corners of [`QUAD`].
 const QUAD_CORNERS: [[[f64; 3]; 3]; 2] = [[QUAD[0], QUAD[1], QUAD[2]], [QUAD[0], QUAD[2], QUAD[3]]];
@@ -20,7 +20,7 @@ fn quad() -> Builder {
 
 #[test]
 fn a_buffer_in_the_file_beside_it_and_in_a_data_uri_is_the_same() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     for packing in Packing::ALL {
         let file = quad().write(place.folder(), &format!("packing-{packing:?}"), packing);
         let scene = scene_with(&file, "");
@@ -395,7 +395,7 @@ fn morph_targets_are_added_by_their_weights() {
 
 #[test]
 fn a_file_by_itself_is_a_scene() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     for packing in Packing::ALL {
         let file = quad().write(place.folder(), &format!("whole-{packing:?}"), packing);
         let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));

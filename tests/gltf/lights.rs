@@ -7,7 +7,7 @@ use wgray::scene::Light;
 
 use super::build::{Builder, Packing};
 use super::read::{assert_near, pixels, scene, scene_by, to_file};
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 /// Returns a quad and a light on a rotated node below a scaled one.
 fn lit(light: Value) -> Builder {
@@ -111,7 +111,7 @@ fn a_rough_white_surface_under_lux_is_as_bright_as_the_formula_says() {
     // Far enough for an irradiance that is uniform to 1e-4.
     builder.root_node(json!({ "translation": [0, 0, 100], "extensions": { "KHR_lights_punctual": { "light": 1 } } }));
     builder.get("extensions")["KHR_lights_punctual"]["lights"][1]["intensity"] = json!(20_000);
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     let file = builder.write(place.folder(), "lux", Packing::Binary);
     // The environment is black.
     let mut scene = super::read::scene_with(&file, "");
@@ -138,7 +138,7 @@ fn a_rough_white_surface_under_lux_is_as_bright_as_the_formula_says() {
 
 #[test]
 fn a_file_with_lights_is_lit_by_these() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     let file = lit(json!({ "type": "point" })).write(place.folder(), "lights-alone", Packing::Binary);
     let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(scene.lights.len(), 1);

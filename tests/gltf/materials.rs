@@ -7,7 +7,7 @@ use super::build::{Builder, Packing};
 use super::read::{
     assert_all, assert_near, material, plain, plain_color, principled, refusal, scene, scene_by, scene_with,
 };
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 fn quad_of(material: Value) -> Builder {
     let mut builder = Builder::new();
@@ -29,7 +29,7 @@ fn extended(extension: &str, values: Value) -> Value {
 }
 
 #[test]
-fn what_a_file_does_not_say_is_as_the_specification_has_it() {
+fn defaults_match_the_specification() {
     let mut without = Builder::new();
     let mesh = without.quad(None);
     without.root_node(json!({ "mesh": mesh }));
@@ -315,7 +315,7 @@ fn a_variant_puts_other_materials_on_primitives() {
 }
 
 #[test]
-fn a_scene_may_put_a_material_in_place_of_one_of_the_file() {
+fn a_scene_may_replace_a_material_of_the_file() {
     let mut builder = Builder::new();
     let mut names = ["red", "blue"].into_iter();
     for x in [-1, 1] {
@@ -324,16 +324,16 @@ fn a_scene_may_put_a_material_in_place_of_one_of_the_file() {
         let mesh = builder.quad(Some(material));
         builder.root_node(json!({ "mesh": mesh, "translation": [x, 0, 0] }));
     }
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     let file = builder.write(place.folder(), "replaced", Packing::Binary);
-    let lamp = "[materials.lamp]\ntype = \"diffuse\"\ncolor = [0, 0, 0]\nemission = [0.125, 0.25, 0.5]";
-    let keys = format!("materials = {{ blue = \"lamp\" }}\n{lamp}");
+    let emitter = "[materials.emitter]\ntype = \"diffuse\"\ncolor = [0, 0, 0]\nemission = [0.125, 0.25, 0.5]";
+    let keys = format!("materials = {{ blue = \"emitter\" }}\n{emitter}");
     let pixels = super::read::pixels(&scene_with(&file, &keys));
     for row in pixels.chunks(6) {
         assert!(row[..3].iter().all(|pixel| *pixel == [0.5; 3]), "{row:?}");
         assert!(row[3..].iter().all(|pixel| *pixel == [0.125, 0.25, 0.5]), "{row:?}");
     }
-    let keys = format!("materials = {{ green = \"lamp\" }}\n{lamp}");
+    let keys = format!("materials = {{ green = \"emitter\" }}\n{emitter}");
     let message = super::read::try_scene(&file, &keys).expect_err("no such material");
     assert!(message.contains("green") && message.contains("red"), "{message}");
 }

@@ -9,10 +9,10 @@ use wgray::scene::{Geometry, GltfChoice, Orbit, Overrides, Presentation, Project
 
 use super::build::{Builder, Packing};
 use super::read::triangles;
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 /// A spike of length 3 along an axis of the file, from the origin.
-fn spike(place: &Place, axis: DVec3, has_camera: bool) -> PathBuf {
+fn spike(place: &TestFolder, axis: DVec3, has_camera: bool) -> PathBuf {
     let mut builder = Builder::new();
     let side = axis.any_orthonormal_vector() * 0.25;
     let points = [side, -side, axis * 3.0].map(|p| p.to_array());
@@ -42,7 +42,7 @@ fn load(file: &PathBuf, presentation: Presentation, view: Option<View>) -> Resul
 
 #[test]
 fn any_axis_can_point_up() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     for (name, axis) in [
         ("x", DVec3::X),
         ("-x", DVec3::NEG_X),
@@ -73,7 +73,7 @@ fn any_axis_can_point_up() {
 
 #[test]
 fn the_ground_lies_below_the_model() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     for (up, low) in [("y", 0.0), ("-y", -3.0), ("x", 0.0)] {
         let file = spike(&place, DVec3::Y, false);
         let presentation = Presentation {
@@ -108,7 +108,7 @@ fn the_ground_lies_below_the_model() {
 
 #[test]
 fn a_ground_that_hides_the_model_is_noted() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     let file = spike(&place, DVec3::Y, false);
     let notes = |ground, view| {
         let presentation = Presentation {
@@ -132,7 +132,7 @@ fn a_ground_that_hides_the_model_is_noted() {
 
 #[test]
 fn the_automatic_camera_is_adjusted() {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     let file = spike(&place, DVec3::Y, true);
     let fov = |fov| Presentation {
         fov: Some(fov),

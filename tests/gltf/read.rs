@@ -7,7 +7,7 @@ use wgray::scene::{Color, Geometry, Material, Principled, Reflection, Scene, Val
 use wgray::{Device, Options};
 
 use super::build::{Builder, Packing};
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 /// A camera at +z of the file (-y of the scene), whose image [`QUAD`](super::build::QUAD) fills; white environment.
 const SCENE: &str = r#"
@@ -66,22 +66,22 @@ pub fn try_scene(file: &Path, keys: &str) -> Result<Scene, String> {
 }
 
 pub fn scene(builder: &Builder, name: &str) -> Scene {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     scene_with(&builder.write(place.folder(), name, Packing::Binary), "")
 }
 
 /// Loads it as [`scene`] does, with additional keys.
 pub fn scene_by(builder: &Builder, name: &str, keys: &str) -> Scene {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     scene_with(&builder.write(place.folder(), name, Packing::Binary), keys)
 }
 
 /// Returns the error message of an invalid file or invalid keys.
 pub fn refusal(builder: &Builder, keys: &str) -> String {
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     let file = builder.write_unsound(place.folder(), "bad", Packing::Binary);
     match try_scene(&file, keys) {
-        Ok(_) => panic!("it was not refused"),
+        Ok(_) => panic!("it was not rejected"),
         Err(message) => message,
     }
 }
@@ -180,7 +180,7 @@ pub fn pixels(scene: &Scene) -> Vec<[f32; 3]> {
         device: Device::Cpu,
         ..Options::default()
     };
-    wgray::render(scene, &options).expect("a picture").pixels().colors
+    wgray::render(scene, &options).expect("an image").pixels().colors
 }
 
 /// Asserts one color for all pixels, within 1e-5.

@@ -5,7 +5,7 @@ use wgray::{Aov, Channel, Device, Options, Scene};
 
 use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES, QUAD_UVS, png};
 use super::read::{assert_all, pixels, scene, scene_with};
-use crate::place::Place;
+use crate::test_folder::TestFolder;
 
 const RED: [u8; 4] = [255, 0, 0, 255];
 const GREEN: [u8; 4] = [0, 255, 0, 255];
@@ -42,7 +42,7 @@ fn the_first_texel_is_at_the_upper_left() {
 #[test]
 fn images_may_lie_in_the_buffer_beside_the_file_or_in_a_data_uri() {
     let bytes = png(2, &[RED, GREEN, BLUE, WHITE]);
-    let place = Place::with_file("a", "");
+    let place = TestFolder::with_file("a", "");
     for uri in ["my%20picture.png", "data"] {
         let data = format!("data:image/png;base64,{}", super::build::base64(&bytes));
         let uri = if uri == "data" { data.as_str() } else { uri };
@@ -56,7 +56,7 @@ fn images_may_lie_in_the_buffer_beside_the_file_or_in_a_data_uri() {
             Some(place.folder().to_owned()),
             std::env::var_os("WGRAY_TEST_GLTF").map(Into::into),
         ] {
-            let write = |folder: std::path::PathBuf| std::fs::write(folder.join("my picture.png"), &bytes);
+            let write = |folder: std::path::PathBuf| std::fs::write(folder.join("my image.png"), &bytes);
             folder.map(write).transpose().expect("a file");
         }
         let file = builder.write(place.folder(), name, Packing::Embedded);
@@ -228,7 +228,7 @@ fn a_texture_may_have_another_set_of_coordinates() {
 }
 
 #[test]
-fn what_lacks_its_coordinates_is_told_of() {
+fn missing_texture_coordinates_are_noted() {
     let mut builder = Builder::new();
     let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
     let material = builder.unlit(json!({ "baseColorTexture": { "index": texture, "texCoord": 1 } }));
@@ -236,8 +236,8 @@ fn what_lacks_its_coordinates_is_told_of() {
     let mesh = builder.quad_with(attributes, Some(material));
     builder.root_node(json!({ "mesh": mesh }));
     let notes = scene(&builder, "no-coordinates").notes;
-    let told = "meshes[0].primitives[0] has no TEXCOORD_1, which its material needs";
-    assert!(notes.iter().any(|note| note.message.contains(told)), "{notes:?}");
+    let message = "meshes[0].primitives[0] has no TEXCOORD_1, which its material needs";
+    assert!(notes.iter().any(|note| note.message.contains(message)), "{notes:?}");
 }
 
 /// Returns a quad with a transformed texture of four colors.
@@ -476,7 +476,7 @@ fn leaning(name: &str, texel: [u8; 4], material: &Value) -> Scene {
 }
 
 #[test]
-fn a_texture_of_one_color_is_as_its_product_with_the_factor() {
+fn constant_textures_equal_plain_values() {
     for row in rows() {
         let name = format!("texture-{}", row.name);
         let textured = pixels(&leaning(&name, row.texel, &row.textured));
@@ -540,7 +540,7 @@ fn bent(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -
         aovs: vec![Aov::ShadingNormal],
         ..Options::default()
     };
-    let picture = wgray::render(&scene, &options).expect("a picture");
+    let picture = wgray::render(&scene, &options).expect("an image");
     let of = |axis: &str| match picture.channel(&format!("shading_normal.{axis}")) {
         Some(Channel::Floats(values)) => f64::from(values[14]),
         other => panic!("{other:?}"),
@@ -611,7 +611,7 @@ fn a_transformed_normal_map_keeps_its_tangents() {
 }
 
 #[test]
-fn samplers_without_filters_and_textures_without_sources_are_taken() {
+fn samplers_and_sources_are_optional() {
     let mut builder = Builder::new();
     let image = builder.image(&png(1, &[[255; 4]]), "image/png");
     let texture = builder.add("textures", json!({ "source": image }));

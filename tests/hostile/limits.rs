@@ -14,9 +14,14 @@ fn model(json: &Value, binary: &[u8]) -> Ran {
     render(folder.path(), "a.glb")
 }
 
-fn refused(json: &Value, binary: &[u8], told: &str) {
+fn refused(json: &Value, binary: &[u8], message: &str) {
     let ran = model(json, binary);
-    assert!(ran.code == 3 && ran.said.contains(told), "{}: {}", ran.code, ran.said);
+    assert!(
+        ran.code == 3 && ran.said.contains(message),
+        "{}: {}",
+        ran.code,
+        ran.said
+    );
 }
 
 fn zeros(count: u32, kind: &str) -> Value {
@@ -374,7 +379,7 @@ fn texts_that_go_deep_or_on_for_ever_are_told() {
     let dots = vec!["a"; deep].join(".");
     let rule = "max recursion depth";
     let json = "lists and objects must be nested at most 127 levels deep";
-    for (name, text, told) in [
+    for (name, text, message) in [
         ("a.toml", format!("x = {}{}", "[".repeat(deep), "]".repeat(deep)), rule),
         (
             "a.toml",
@@ -396,8 +401,8 @@ fn texts_that_go_deep_or_on_for_ever_are_told() {
         fs::write(folder.path().join(name), text).unwrap();
         let ran = run(folder.path(), &["check", name]);
         assert!(
-            ran.code == 3 && ran.said.contains(told),
-            "{name}: {told}: {}: {}",
+            ran.code == 3 && ran.said.contains(message),
+            "{name}: expected {message}: {}: {}",
             ran.code,
             ran.said
         );

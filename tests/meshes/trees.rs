@@ -12,12 +12,12 @@ use wgray_render::cpu::light::{segment, segments_to_light};
 use wgray_render::cpu::linear_primitives::{closest_primitive, occluded_by_primitives};
 use wgray_render::cpu::mesh::{highest, lowest, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
 use wgray_render::cpu::primitive::intersect;
-use wgray_render::cpu::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
+use wgray_render::cpu::ray::{Hit, Ray, nearer_hit, no_hit, standalone_prim};
 use wgray_render::cpu::shadow::{SampleBlock, block_sample, occlusion_mask};
 use wgray_render::cpu::slab::{box_interval, interval_hits, slabs};
 use wgray_render::cpu::surface::{Surface, largest};
 use wgray_render::records::{
-    CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Item, Light, NO_INDEX, NO_PRIMITIVE, NO_SHADOW, Packed, RANDOM,
+    BvhItem, CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Light, NO_INDEX, NO_PRIMITIVE, NO_SHADOW, Packed, RANDOM,
     SAMPLE_BLOCK,
 };
 
@@ -39,7 +39,7 @@ fn room(scene: &Packed, origin: Vec3) -> f32 {
 
 /// Returns the closest hit by brute force, without culling by distance.
 fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
-    let mut hit = closest_primitive(scene, ray, by_itself(left), by_itself(wall));
+    let mut hit = closest_primitive(scene, ray, standalone_prim(left), standalone_prim(wall));
     let world = slabs(ray.origin, ray.direction, room(scene, ray.origin));
     for item in &scene.bvh.items {
         let passage = box_interval(item.low, item.high, world);
@@ -48,9 +48,9 @@ fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
         }
         let kind = item.kind & 0xff;
         if kind != INSTANCE {
-            let wall = item.index == by_itself(wall);
+            let wall = item.index == standalone_prim(wall);
             let met = intersect(kind, &scene.primitives[item.index as usize], wall, ray, INFINITE_T);
-            if met < INFINITE_T && item.index != by_itself(left) {
+            if met < INFINITE_T && item.index != standalone_prim(left) {
                 let found = Hit {
                     t: met.max(passage.x),
                     primitive: item.index,
@@ -76,7 +76,7 @@ fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
                 barycentric: crossing.barycentric,
             };
             let own = left == UVec2::new(found.instance, found.primitive);
-            if crossing.met && found.t > 0.0 && !own {
+            if crossing.is_hit && found.t > 0.0 && !own {
                 hit = nearer_hit(hit, found);
             }
         }
@@ -100,7 +100,7 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) 
                 let i = &scene.bvh.instances[item.index as usize];
                 let start = point_to_mesh(i, origin);
                 let [towards, u, v] = [to.towards, to.u, to.v].map(|v| vector_to_mesh(i, v));
-                let direction = segment(wgray_render::cpu::light::Segments { towards, u, v }, at);
+                let direction = segment(wgray_render::cpu::light::LightSegments { towards, u, v }, at);
                 let s = slabs(start, direction, mesh_pad(i, start));
                 let mesh = &scene.bvh.meshes[i.mesh as usize];
                 mesh.triangles.iter().enumerate().any(|(slot, triangle)| {
@@ -109,12 +109,12 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) 
                     let [v0, v1, v2] = corners(scene, i, slot);
                     let crossing = triangle_crossing(v0, v1, v2, start, shear_of(direction), s);
                     let own = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);
-                    casts && !own && crossing.met && crossing.t > 0.0 && crossing.t < light.t_max
+                    casts && !own && crossing.is_hit && crossing.t > 0.0 && crossing.t < light.t_max
                 })
             } else {
                 let (own, wall) = (
-                    by_itself(surface.exclude_front),
-                    item.index == by_itself(surface.exclude_back),
+                    standalone_prim(surface.exclude_front),
+                    item.index == standalone_prim(surface.exclude_back),
                 );
                 let q = &scene.primitives[item.index as usize];
                 item.index != own && occlusion_mask(item.kind & 0xff, q, origin, wall, light, block) >> sample & 1 == 1
@@ -160,7 +160,7 @@ impl<'a> Aims<'a> {
     /// Returns a point and the triangle that it lies on, if any.
     fn target(&self) -> (Vec3, UVec2) {
         let (scene, random) = (self.scene, self.random);
-        let item: &Item = &scene.bvh.items[random.below(scene.bvh.items.len() as u32) as usize];
+        let item: &BvhItem = &scene.bvh.items[random.below(scene.bvh.items.len() as u32) as usize];
         if item.kind & 0xff != INSTANCE || random.once_in(8) {
             let corner = Vec3::select(
                 glam::BVec3::new(random.once_in(2), random.once_in(2), random.once_in(2)),
@@ -344,8 +344,8 @@ fn built(boxes: &[Aabb], most_in_leaf: u32) -> (Vec<bvh::Node>, Vec<u32>) {
 fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
     let empty: bvh::Node = bytemuck::Zeroable::zeroed();
     let (mut nodes, mut order) = (vec![empty], Vec::new());
-    let mut waiting = std::collections::VecDeque::from([(0, (0..boxes.len() as u32).collect::<Vec<_>>())]);
-    while let Some((number, items)) = waiting.pop_front() {
+    let mut pending = std::collections::VecDeque::from([(0, (0..boxes.len() as u32).collect::<Vec<_>>())]);
+    while let Some((number, items)) = pending.pop_front() {
         let around = |items: &[u32]| items.iter().fold(Aabb::EMPTY, |all, i| all.with(&boxes[*i as usize]));
         let whole = around(&items);
         let mut node = grid(&whole);
@@ -367,7 +367,7 @@ fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
                 order.extend(part);
             } else {
                 node.inner |= 1 << slot;
-                waiting.push_back((nodes.len(), part.clone()));
+                pending.push_back((nodes.len(), part.clone()));
                 nodes.push(empty);
             }
         }

@@ -188,7 +188,7 @@ fn no_ray_passes_a_closed_mesh() {
             assert_eq!(
                 scene.bvh.meshes[0].triangles.len(),
                 form.triangles.len(),
-                "{name}: all triangles are there"
+                "{name}: triangles are missing"
             );
             for inside in [false, true] {
                 let rays = 12_800;
@@ -201,12 +201,12 @@ fn no_ray_passes_a_closed_mesh() {
             }
         }
     }
-    println!("{total} rays at edges and corners, and as many shadow rays: none passes");
+    println!("{total} rays at edges and corners, and as many shadow rays: all hit");
     assert!(total > 1_000_000);
 }
 
 #[test]
-fn a_mesh_with_a_hole_is_found() {
+fn a_hole_in_a_mesh_is_found() {
     for (name, form) in convex() {
         let mut open = form.clone();
         open.triangles.pop();
@@ -220,7 +220,7 @@ fn a_mesh_with_a_hole_is_found() {
 
 /// The test of standalone triangles is not watertight.
 #[test]
-fn triangles_that_do_not_share_their_edges_are_found() {
+fn standalone_triangles_are_not_watertight() {
     let form = Form::icosphere(2);
     let mesh = placed(&form.obj(None, None), "rotate = [30, 40, 50]");
     let mut text = HEAD.to_string();
@@ -231,7 +231,7 @@ fn triangles_that_do_not_share_their_edges_are_found() {
     let mut apart = scene(&text, sources::path("scenes").as_path());
     (apart.bvh.instances, apart.bvh.meshes) = (mesh.bvh.instances.clone(), mesh.bvh.meshes.clone()); // the source of targets
     let count = [false, true].map(|inside| passing(&apart, 64_000, inside));
-    println!("{count:?} of 64000 rays from outside and inside pass triangles by themselves");
+    println!("{count:?} of 64000 rays from outside and inside pass standalone triangles");
     assert!(count[0] + count[1] > 0, "{count:?}");
     assert_eq!([false, true].map(|inside| passing(&mesh, 64_000, inside)), [0, 0]);
 }

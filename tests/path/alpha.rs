@@ -23,13 +23,13 @@ fn square(z: f64, size: f64, material: &str) -> String {
 }
 
 #[test]
-fn what_blends_lets_its_share_through() {
+fn blended_layers_transmit_one_minus_alpha() {
     for (alpha, layers) in [(0.5, 1), (0.3, 1), (0.5, 3), (0.0, 2), (1.0, 2)] {
         let head = format!(
-            "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.veil = {}\n",
+            "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.surface = {}\n",
             black(&format!("alpha = {alpha}, alpha_mode = 'blend'"))
         );
-        let text: String = (0..layers).map(|i| square(f64::from(i), 4.0, "veil")).collect();
+        let text: String = (0..layers).map(|i| square(f64::from(i), 4.0, "surface")).collect();
         let packed = scene(256, 4, &format!("{head}{text}"));
         // Each layer independently transmits 1 - alpha.
         let expected = (1.0f64 - alpha).powi(layers);
@@ -45,10 +45,10 @@ fn what_blends_lets_its_share_through() {
 }
 
 #[test]
-fn a_ball_that_blends_is_passed_twice() {
+fn a_blended_sphere_is_crossed_twice() {
     // Entry and exit decide independently.
     let text = format!(
-        "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.veil = {}\n[[shapes]]\ntype = 'sphere'\nmaterial = 'veil'\n\
+        "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.surface = {}\n[[shapes]]\ntype = 'sphere'\nmaterial = 'surface'\n\
          center = [0, 0, 0]\nradius = 3\n",
         black("alpha = 0.5, alpha_mode = 'blend'")
     );
@@ -60,15 +60,15 @@ fn a_ball_that_blends_is_passed_twice() {
 }
 
 #[test]
-fn shadows_are_as_dark_as_what_casts_them_is_there() {
+fn shadows_scale_with_alpha() {
     let lit = |alpha: f64, light: &str| {
-        let veil = black(&format!("alpha = {alpha}, alpha_mode = 'blend'"));
+        let material = black(&format!("alpha = {alpha}, alpha_mode = 'blend'"));
         // The camera is below the blended surface and sees its shadow on the floor.
         let text = format!(
             "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
-             materials.veil = {veil}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{}{light}",
+             materials.surface = {material}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{}{light}",
             square(0.0, 4.0, "floor"),
-            square(0.5, 4.0, "veil")
+            square(0.5, 4.0, "surface")
         );
         scene(256, 1, &text)
     };
@@ -87,13 +87,17 @@ fn shadows_are_as_dark_as_what_casts_them_is_there() {
 }
 
 #[test]
-fn what_is_seen_past_a_surface_is_weighed_as_if_there_were_none() {
+fn transparent_surfaces_do_not_change_mis_weights() {
     // A light that NEE and BSDF sampling find, with and without a fully transparent surface before it.
-    let with = |veil: bool| {
-        let veil = if veil { square(0.5, 4.0, "veil") } else { String::new() };
+    let with = |has_surface: bool| {
+        let shape = if has_surface {
+            square(0.5, 4.0, "surface")
+        } else {
+            String::new()
+        };
         let text = format!(
             "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
-             materials.veil = {}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{veil}\
+             materials.surface = {}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{shape}\
              [[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 1]\nsize = [3, 3]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [1, 1, 1]\n",
             black("alpha = 0, alpha_mode = 'blend'"),
             square(0.0, 4.0, "floor")
@@ -101,8 +105,8 @@ fn what_is_seen_past_a_surface_is_weighed_as_if_there_were_none() {
         scene(1024, 1, &text)
     };
     for way in both() {
-        let [bare, veiled] = [false, true].map(|veil| mean(&render(&with(veil), way))[0]);
-        assert!((veiled / bare - 1.0).abs() < 2e-3, "{way:?}: {bare} {veiled}");
+        let [bare, behind] = [false, true].map(|has_surface| mean(&render(&with(has_surface), way))[0]);
+        assert!((behind / bare - 1.0).abs() < 2e-3, "{way:?}: {bare} {behind}");
     }
 }
 
@@ -135,7 +139,7 @@ fn leaf(folder: &std::path::Path, mode: &str, way_in: &str) -> Packed {
 }
 
 #[test]
-fn a_leaf_casts_the_shadow_of_a_leaf() {
+fn a_mask_casts_its_shadow() {
     let place = tempfile::tempdir().unwrap();
     let under =
         "camera = { type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";

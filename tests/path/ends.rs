@@ -6,7 +6,7 @@ use crate::pictures::{both, differing, exact_ways, reference, render};
 const CAMERA: &str = "camera = { position = [0, -4, 0.5], look_at = [0, 0, 0], fov = 40 }\n";
 
 #[test]
-fn nothing_is_the_environment() {
+fn an_empty_scene_shows_the_environment() {
     for depth in [0, 1, 1024] {
         let packed = scene(
             4,
@@ -24,7 +24,7 @@ fn nothing_is_the_environment() {
 }
 
 #[test]
-fn without_bounces_only_what_shines_is_seen() {
+fn without_bounces_only_emission_is_visible() {
     let packed = scene(
         16,
         0,
@@ -39,13 +39,13 @@ fn without_bounces_only_what_shines_is_seen() {
     for way in both() {
         let film = render(&packed, way);
         let colors: Vec<[f32; 3]> = film.means().collect();
-        assert_eq!(colors[8 * 16 + 4], [0.0; 3], "{way:?}: the dark one");
-        assert_eq!(colors[8 * 16 + 12], [2.0, 3.0, 4.0], "{way:?}: the one that shines");
+        assert_eq!(colors[8 * 16 + 4], [0.0; 3], "{way:?}: the black sphere");
+        assert_eq!(colors[8 * 16 + 12], [2.0, 3.0, 4.0], "{way:?}: the emissive sphere");
     }
 }
 
 #[test]
-fn scenes_of_every_size_look_alike() {
+fn scaling_a_scene_does_not_change_radiance() {
     // Scaled by 1e-6 and 1e6, radiance differs only by rounded coordinates.
     let room = |s: f64| {
         format!(
@@ -78,7 +78,7 @@ fn scenes_of_every_size_look_alike() {
 }
 
 #[test]
-fn lights_that_touch_surfaces_and_graze_them_give_numbers() {
+fn touching_and_grazing_lights_give_finite_values() {
     let packed = scene(
         256,
         8,
@@ -121,7 +121,7 @@ fn long_paths_end() {
 }
 
 #[test]
-fn textures_that_are_too_bright_make_no_light() {
+fn reflectances_above_one_are_clamped() {
     for key in ["color", "roughness"] {
         let color = if key == "color" {
             ""
@@ -154,7 +154,7 @@ fn textures_that_are_too_bright_make_no_light() {
             assert_eq!(
                 mean(&render(&packed, way)),
                 [0.0; 3],
-                "{way:?}: nothing comes into a closed ball"
+                "{way:?}: light inside a closed sphere"
             );
             let found = mean(&render(&body, way));
             assert_eq!(found, expected, "{way:?}, {key}");
@@ -163,7 +163,7 @@ fn textures_that_are_too_bright_make_no_light() {
 }
 
 #[test]
-fn glass_makes_no_light_whatever_its_normals_are() {
+fn glass_with_shading_normals_creates_no_energy() {
     // White-furnace tests: a cube and a coarse sphere of glass with smooth normals, and spheres with normal maps.
     let folder = tempfile::tempdir().expect("a folder");
     let cube = crate::meshes::forms::Form::cube();
@@ -184,7 +184,7 @@ fn glass_makes_no_light_whatever_its_normals_are() {
             );
             let description = wgray::scene::Description::parse(&text, "test").expect("a scene");
             let beside = wgray::scene::Assets::beside(folder.path());
-            let packed = wgray_render::pack::pack(&description.validate_with(&beside).expect("a sound scene"));
+            let packed = wgray_render::pack::pack(&description.validate_with(&beside).expect("a valid scene"));
             for way in both() {
                 let film = render(&packed, way);
                 let found = mean(&film)[0];

@@ -140,7 +140,7 @@ fn given(packed: &Packed, material: &Material, wo: Vec3, side: f32, compensated:
 }
 
 #[test]
-fn streaks_stay_white() {
+fn anisotropic_metal_conserves_energy() {
     let kinds = [
         ("type = 'conductor'", 0.01, false),
         ("type = 'dielectric', thin = true, ior = 1.5", 0.01, false),
@@ -166,7 +166,7 @@ fn streaks_stay_white() {
             }
         }
     }
-    assert!(off.is_empty(), "{} are off: {off:#?}", off.len());
+    assert!(off.is_empty(), "{} are outside of the tolerance: {off:#?}", off.len());
     // Control: no compensation, as an argument and in the file.
     let packed = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7");
     let lost = 1.0 - given(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
@@ -178,7 +178,7 @@ fn streaks_stay_white() {
 }
 
 #[test]
-fn streaks_of_a_texture_stay_nearly_white() {
+fn textured_anisotropy_nearly_conserves_energy() {
     let textures = ["{ texture = 't' }", "0.45"];
     for rough in textures {
         for long in textures {
@@ -206,7 +206,7 @@ fn streaks_of_a_texture_stay_nearly_white() {
 }
 
 #[test]
-fn streaks_of_principled_metal_stay_white() {
+fn anisotropic_principled_metal_conserves_energy() {
     for roughness in [0.1, 0.3, 0.6, 1.0] {
         for anisotropy in [0.3, 0.7, 1.0] {
             let keys = format!("type = 'principled', roughness = {roughness}, anisotropy = {anisotropy}");
@@ -221,21 +221,21 @@ fn streaks_of_principled_metal_stay_white() {
 }
 
 #[test]
-fn principled_that_passes_all_light_is_the_material_dielectric() {
+fn fully_transmissive_principled_equals_dielectric() {
     for anisotropy in [0.0, 0.6] {
         for (ior, thin) in [(1.1, false), (1.5, false), (2.5, false), (1.5, true), (2.5, true)] {
             let all = [0.1, 0.3, 0.6, 1.0];
             for roughness in if anisotropy == 0.0 { &all[..] } else { &all[1..2] } {
-                let facets = format!("ior = {ior}, roughness = {roughness}, anisotropy = {anisotropy}");
-                let glass = scene_of(&format!("type = 'dielectric', thin = {thin}, {facets}"));
+                let options = format!("ior = {ior}, roughness = {roughness}, anisotropy = {anisotropy}");
+                let glass = scene_of(&format!("type = 'dielectric', thin = {thin}, {options}"));
                 let thickness = if thin { 0 } else { 1 };
                 let packed = scene_of(&format!(
-                    "type = 'principled', metallic = 0, transmission = 1, thickness = {thickness}, {facets}"
+                    "type = 'principled', metallic = 0, transmission = 1, thickness = {thickness}, {options}"
                 ));
                 let material = &packed.materials[0];
                 for wo in [Vec3::Z, direction(0.7, 0.3), direction(0.3, 1.2), direction(0.06, 0.8)] {
                     for side in [1.0, -1.0] {
-                        let name = format!("{facets}, thin {thin}, {wo}, {side}");
+                        let name = format!("{options}, thin {thin}, {wo}, {side}");
                         let m = mixture(&packed, material, wo, side);
                         let other = seen(&glass, &glass.materials[0], wo, side);
                         for k in 0..64 {
@@ -275,7 +275,7 @@ fn principled_that_passes_all_light_is_the_material_dielectric() {
 }
 
 #[test]
-fn mixtures_of_glass_with_others_are_white_from_both_sides() {
+fn mixed_principled_glass_conserves_energy() {
     for (metallic, transmission) in [(0.3, 1.0), (0.0, 0.5), (0.5, 0.5), (0.2, 0.05)] {
         for (roughness, anisotropy) in [(0.3, 0.0), (1.0, 0.0), (0.3, 0.8)] {
             let keys = format!(
@@ -285,10 +285,10 @@ fn mixtures_of_glass_with_others_are_white_from_both_sides() {
             let packed = scene_of(&keys);
             for (wo, side) in viewers().into_iter().flat_map(|wo| [(wo, 1.0), (wo, -1.0)]) {
                 let m = mixture(&packed, &packed.materials[0], wo, side);
-                let facets = furnace(m.alpha, Some(f64::from(1.0 / m.eta)), false, wo, |wi| {
+                let specular = furnace(m.alpha, Some(f64::from(1.0 / m.eta)), false, wo, |wi| {
                     (principled_eval(&m, wo, wi, ALL) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
                 });
-                let found = facets + f64::from(m.diffuse.x);
+                let found = specular + f64::from(m.diffuse.x);
                 assert!((found - 1.0).abs() < 0.02, "{keys}, {wo}, {side}: {found}");
             }
         }
@@ -296,7 +296,7 @@ fn mixtures_of_glass_with_others_are_white_from_both_sides() {
 }
 
 #[test]
-fn nothing_mirrors_where_the_index_is_that_of_air() {
+fn matched_indices_do_not_reflect() {
     for (transmission, thickness) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.5, 1.0)] {
         let keys = |ior: f64| {
             format!(
@@ -320,7 +320,7 @@ fn nothing_mirrors_where_the_index_is_that_of_air() {
 }
 
 #[test]
-fn glass_around_the_camera_absorbs_all_the_way() {
+fn glass_around_the_camera_absorbs_over_the_whole_path() {
     // From inside, through a transparent or camera-invisible surface, to the glass boundary and an emitter behind it:
     // exp(-a d) times the Fresnel transmittance at normal incidence times n^2.
     let (a, d) = (0.4_f64, 2.0);

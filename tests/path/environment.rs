@@ -120,7 +120,7 @@ fn one_bright(width: u32, height: u32, at: (u32, u32)) -> Image {
 }
 
 #[test]
-fn the_ground_gets_what_a_sum_over_all_directions_says() {
+fn irradiance_matches_a_sum_over_all_directions() {
     let images = [
         (image(1, 1, |_, _| [0.5, 1.0, 2.0]), 64),
         (image(2, 1, |x, _| [f32::from(x as u8), 1.0, 0.5]), 128),
@@ -162,7 +162,7 @@ fn the_ground_gets_what_a_sum_over_all_directions_says() {
 }
 
 #[test]
-fn six_colours_are_seen_where_they_lie() {
+fn the_map_has_the_documented_orientation() {
     // From left to right: -x, +y, +x, -y, -x. Top: +z.
     let picture = image(64, 32, |x, y| match (x, y) {
         (_, 0..8) => [0.0, 0.0, 1.0],
@@ -205,7 +205,7 @@ fn six_colours_are_seen_where_they_lie() {
 }
 
 #[test]
-fn a_white_image_is_the_constant_colour() {
+fn a_white_map_equals_a_constant_color() {
     let ball = "camera = { position = [0, -4, 0.3], look_at = [0, 0, 0], fov = 40 }\n\
                 materials.m = { type = 'phong', diffuse = [0.5, 0.5, 0.5], specular = [0.3, 0.3, 0.3], shininess = 20, ambient = [0, 0, 0] }\n\
                 materials.g = { type = 'dielectric', ior = 1.5 }\n\
@@ -222,16 +222,16 @@ fn a_white_image_is_the_constant_colour() {
 }
 
 /// An environment map with emitters and materials of several kinds.
-const LAMPS: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5], fov = 40 }\n\
-    materials.shine = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
+const EMITTERS: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5], fov = 40 }\n\
+    materials.source = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
     materials.gloss = { type = 'phong', diffuse = [0.4, 0.4, 0.4], specular = [0.5, 0.5, 0.5], shininess = 12, ambient = [0, 0, 0] }\n\
     materials.clay = { type = 'diffuse', color = [0.7, 0.6, 0.5] }\n\
     [[shapes]]\ntype = 'plane'\nmaterial = 'clay'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
     [[shapes]]\ntype = 'sphere'\nmaterial = 'gloss'\ncenter = [0.4, 0, 0.5]\nradius = 0.5\n\
-    [[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [-0.5, 0, 0.3]\nradius = 0.2\n";
+    [[shapes]]\ntype = 'sphere'\nmaterial = 'source'\ncenter = [-0.5, 0, 0.3]\nradius = 0.2\n";
 
 #[test]
-fn samples_of_the_image_alone_and_of_materials_alone_find_the_same() {
+fn light_and_bsdf_sampling_of_the_map_agree() {
     if adapter::device().is_none() {
         return;
     }
@@ -239,7 +239,7 @@ fn samples_of_the_image_alone_and_of_materials_alone_find_the_same() {
         let mut shaders = sources::shaders().clone();
         for (file, from, to) in changes {
             let text = shaders.text(file).to_owned();
-            assert!(text.contains(from), "{from} is not there to be changed");
+            assert!(text.contains(from), "{from} not found");
             shaders = sources::with(&shaders, file, &text.replace(from, to));
         }
         shaders
@@ -252,7 +252,7 @@ fn samples_of_the_image_alone_and_of_materials_alone_find_the_same() {
     let material_alone = with([(PATH, OF_LIGHT, "0.0"), (AFAR, OF_RAY, "1.0")]);
     let wrong = with([(PATH, OF_LIGHT, "1.1"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
     // Without the area light, which has its own MIS weights.
-    let text = LAMPS.replace(", emission = [5, 3, 1]", "");
+    let text = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for image in [
         noise(16, 8),
         one_bright(16, 8, (4, 1)),
@@ -264,25 +264,25 @@ fn samples_of_the_image_alone_and_of_materials_alone_find_the_same() {
         let [light, materials, wrong] = [&light_alone, &material_alone, &wrong].map(found);
         for i in 0..3 {
             let near = |x: f64| (x - both[i]).abs() < 1e-2 * both[i];
-            assert!(near(light[i]), "light alone: {light:?} for {both:?}");
-            assert!(near(materials[i]), "materials alone: {materials:?} for {both:?}");
+            assert!(near(light[i]), "light sampling only: {light:?} for {both:?}");
+            assert!(near(materials[i]), "BSDF sampling only: {materials:?} for {both:?}");
             assert!(!near(wrong[i]), "the control: {wrong:?} for {both:?}");
         }
     }
 }
 
 #[test]
-fn light_of_an_image_and_of_lamps_adds_up() {
+fn light_of_the_map_and_of_lights_adds_up() {
     let image = sunny();
-    let lamps = "[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n\
+    let lights = "[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n\
                  [[lights]]\ntype = 'directional'\ndirection = [1, 2, -3]\ncolor = [1, 1, 0.5]\n\
                  [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.5, 1.5]\nsize = [0.5, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [3, 3, 3]\n";
-    let text = format!("{LAMPS}{lamps}");
-    let dark = LAMPS.replace(", emission = [5, 3, 1]", "");
+    let text = format!("{EMITTERS}{lights}");
+    let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for way in both() {
         let sum = |packed: Packed| mean(&render(&packed, way));
         // The rectangle light occludes in all three images.
-        let hidden = lamps.split("[[lights]]").last().unwrap_or_default();
+        let hidden = lights.split("[[lights]]").last().unwrap_or_default();
         let plate = format!("[[lights]]{}", hidden.replace("color = [3, 3, 3]", "color = [0, 0, 0]"));
         let of_image = sum(around(&image, "", (1024, 3), &format!("{dark}{plate}")));
         let of_lamps = sum(described("color = [0, 0, 0]", None, (1024, 3), &text));
@@ -298,7 +298,7 @@ fn light_of_an_image_and_of_lamps_adds_up() {
 }
 
 #[test]
-fn light_from_below_does_not_pass_the_floor() {
+fn the_floor_occludes_light_from_below() {
     // The floor has nothing below it, so it would cast no shadow of area lights. The lower half of the ball is lit from
     // below only.
     let below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
@@ -325,7 +325,7 @@ fn light_from_below_does_not_pass_the_floor() {
 }
 
 #[test]
-fn a_hidden_image_lights_and_is_mirrored() {
+fn an_invisible_map_emits_and_is_reflected() {
     let balls = "camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }\n\
                  materials.m = { type = 'conductor', color = [1, 1, 1] }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
@@ -350,7 +350,7 @@ fn a_hidden_image_lights_and_is_mirrored() {
 }
 
 #[test]
-fn a_background_is_what_the_camera_sees_alone() {
+fn only_the_camera_sees_the_background() {
     let balls = "camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }\n\
                  materials.m = { type = 'conductor', color = [1, 1, 1] }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
@@ -367,7 +367,7 @@ fn a_background_is_what_the_camera_sees_alone() {
                 let [x, ..] = at(8 * 16 + 8);
                 assert!(
                     (x - lit).abs() < 1e-5,
-                    "the mirror shows what lights: {environment}, {way:?}: {x}"
+                    "the mirror shows the environment map: {environment}, {way:?}: {x}"
                 );
                 film
             })
@@ -396,8 +396,8 @@ fn a_factor_of_two_doubles_every_bit() {
 }
 
 #[test]
-fn every_way_gives_the_same_bits() {
-    let text = format!("{LAMPS}[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n");
+fn all_backends_give_the_same_bits() {
+    let text = format!("{EMITTERS}[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n");
     for image in [noise(33, 17), sunny(), image(1, 1, |_, _| [1.0; 3])] {
         for turn in ["", "\nrotate = [10, 20, 30]"] {
             let packed = around(&image, turn, (64, 5), &text);
@@ -416,7 +416,7 @@ fn samples(packed: &Packed, normal: Vec3, count: u32) -> impl Iterator<Item = Ve
         .lights
         .iter()
         .find(|light| light.kind == ENVIRONMENT)
-        .expect("an image around the scene");
+        .expect("an environment map");
     (0..count).map(move |i| {
         let u = sobol_sample(i, UVec2::new(5, 6));
         let sample = sample_environment(packed, light, normal, u);
@@ -470,7 +470,7 @@ fn directions_are_as_frequent_as_their_density_says() {
         }
         let size = (image.width, image.height, normal);
         let all: f64 = expected[0].iter().sum::<f64>() / f64::from(COUNT);
-        assert!((all - 1.0).abs() < 2e-3, "{size:?}: the density's sum is {all}");
+        assert!((all - 1.0).abs() < 2e-3, "{size:?}: the PDF integrates to {all}");
         let statistic = |expected: &[f64]| {
             let (mut sum, mut freedom) = (0.0, -1.0_f64);
             for (count, expected) in counts.iter().zip(expected) {
@@ -478,7 +478,7 @@ fn directions_are_as_frequent_as_their_density_says() {
                     sum += (count - expected) * (count - expected) / expected;
                     freedom += 1.0;
                 } else {
-                    assert!(*count < 60.0, "{size:?}: {count} samples where {expected} should be");
+                    assert!(*count < 60.0, "{size:?}: {count} samples; expected {expected}");
                 }
             }
             (sum, freedom)
@@ -488,10 +488,7 @@ fn directions_are_as_frequent_as_their_density_says() {
         let most = freedom + 6.0 * (2.0 * freedom).sqrt() + 20.0;
         assert!(freedom > 2.0 && sum < most, "{size:?}: {sum} of {freedom}");
         let (wrong, _) = statistic(&expected[1]);
-        assert!(
-            wrong > most,
-            "{size:?}: a wrong density is not seen: {wrong} of {freedom}"
-        );
+        assert!(wrong > most, "{size:?}: a wrong PDF passes: {wrong} of {freedom}");
     }
 }
 
@@ -534,7 +531,7 @@ fn an_unoccluded_wall_has_little_noise() {
 }
 
 #[test]
-fn a_direction_and_its_cell_are_each_others() {
+fn cells_of_directions_invert() {
     use wgray_render::cpu::equirect::{cell_towards, direction_in_cell};
     for (width, height) in [(1, 1), (2, 1), (3, 2), (16, 8), (8192, 4096)] {
         for column in [0, width / 3, width / 2, width - 1] {

@@ -23,7 +23,7 @@ fn near(found: f64, expected: f64, relative: f64) -> bool {
 }
 
 #[test]
-fn a_convex_body_in_a_furnace_has_its_albedo() {
+fn a_convex_body_in_a_furnace_shows_its_albedo() {
     // Each sample is the albedo: zero variance.
     for (material, albedo, tolerance) in [
         ("type = 'diffuse', color = [0.8, 0.5, 1]", [0.8, 0.5, 1.0], 1e-5),
@@ -67,9 +67,9 @@ fn a_convex_body_in_a_furnace_has_its_albedo() {
 }
 
 #[test]
-fn inside_of_what_shines_bounces_are_a_series() {
+fn bounces_in_a_closed_emitter_are_a_geometric_series() {
     // In a closed emitter of albedo a and radiance 1, n bounces give the sum of a^k up to k = n.
-    let (albedo, shine) = (0.6, 0.5);
+    let (albedo, emission) = (0.6, 0.5);
     let body = [
         "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 2\n".to_owned(),
         "[[shapes]]\ntype = 'ellipsoid'\nmaterial = 'm'\ncenter = [0, 0, 0]\na = [1.5, 0.2, 0]\nb = [0, 0.7, 0]\nc = [0, 0, 2]\n".to_owned(),
@@ -94,10 +94,10 @@ fn inside_of_what_shines_bounces_are_a_series() {
         for depth in [0, 1, 2, 5, 40] {
             let text = format!(
                 "{INSIDE}materials.m = {{ type = 'diffuse', color = [{albedo}, {albedo}, {albedo}], \
-                 emission = [{shine}, {shine}, {shine}] }}\n{body}"
+                 emission = [{emission}, {emission}, {emission}] }}\n{body}"
             );
             let packed = scene(256, depth, &text);
-            let expected = shine * (1.0 - f64::powi(albedo, depth as i32 + 1)) / (1.0 - albedo);
+            let expected = emission * (1.0 - f64::powi(albedo, depth as i32 + 1)) / (1.0 - albedo);
             for way in both() {
                 let found = mean(&render(&packed, way))[0];
                 assert!(
@@ -135,14 +135,14 @@ fn a_rectangle_lights_the_floor_by_its_form_factor() {
     let shape = format!(
         "materials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [3, 2, 1] }}\n[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\ncenter = [0, 0, {h}]\nsize = [{width}, {height}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n"
     );
-    for shining in [light, shape] {
+    for emitter in [light, shape] {
         // Below the light, beside it, and far from it.
         for (x, y) in [(0.0, 0.0), (0.6, 0.1), (2.0, 1.5)] {
             let camera = above(x, y, 0.4, 0.02);
             let packed = scene(
                 1024,
                 1,
-                &format!("{camera}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{shining}{FLOOR}"),
+                &format!("{camera}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{emitter}{FLOOR}"),
             );
             let expected = 0.5 * factor(x, y);
             for way in both() {
@@ -266,7 +266,7 @@ fn cylinders_light_the_floor_by_their_form_factors() {
 }
 
 #[test]
-fn points_fall_off_with_the_square_of_the_distance_and_suns_do_not() {
+fn point_lights_fall_off_and_directional_lights_do_not() {
     for (light, expected) in [
         (
             "type = 'point'\nposition = [0, 0, 2]\ncolor = [8, 8, 8]",
@@ -294,7 +294,7 @@ fn points_fall_off_with_the_square_of_the_distance_and_suns_do_not() {
 }
 
 #[test]
-fn a_slab_of_glass_passes_what_fresnel_and_beer_leave() {
+fn a_glass_slab_transmits_by_fresnel_and_beer() {
     // Normal incidence: r = ((n - 1) / (n + 1))^2 at each face; each pass attenuates by exp(-a d).
     let n = 1.5_f64;
     let r = ((n - 1.0) / (n + 1.0)).powi(2);

@@ -8,14 +8,14 @@ use crate::pictures::{both, differing, exact_ways, means, reference, render};
 use crate::scenes;
 
 /// Returns an emitter before a wall, and a mirror that shows it.
-fn room(integrator: &str, lamp: &str) -> Packed {
+fn room(integrator: &str, light: &str) -> Packed {
     let (wall, depth) = match integrator {
         "path" => ("type = 'diffuse', color = [0.5, 0.5, 0.5]", 4),
         _ => ("type = 'phong', color = [0.5, 0.5, 0.5]", 4),
     };
     scenes::parse(&format!(
         "image = {{ width = 24, height = 24 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 50 }}\n\
-         materials.wall = {{ {wall} }}\nmaterials.mirror = {{ type = 'mirror' }}\n{lamp}\n\
+         materials.wall = {{ {wall} }}\nmaterials.mirror = {{ type = 'mirror' }}\n{light}\n\
          [[shapes]]\ntype = 'rectangle'\nmaterial = 'wall'\ncenter = [0, 2, 0]\nsize = [6, 6]\nnormal = [0, -1, 0]\ntangent = [1, 0, 0]\n\
          [[shapes]]\ntype = 'rectangle'\nmaterial = 'mirror'\ncenter = [1.2, 1, 0]\nsize = [1, 1.2]\nnormal = [-1, -2, 0]\ntangent = [2, -1, 0]\n\
          [render]\nintegrator = '{integrator}'\nmax_depth = {depth}\npixel_samples = {{ count = 64 }}\n"
@@ -27,21 +27,21 @@ const RECTANGLE: &str = "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 0]\nsiz
 
 fn sphere(visible: bool) -> String {
     format!(
-        "materials.lamp = {{ type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4], visible = {visible} }}\n\
-         [[shapes]]\ntype = 'sphere'\nmaterial = 'lamp'\ncenter = [0, 0, 0]\nradius = 0.3\n"
+        "materials.light = {{ type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4], visible = {visible} }}\n\
+         [[shapes]]\ntype = 'sphere'\nmaterial = 'light'\ncenter = [0, 0, 0]\nradius = 0.3\n"
     )
 }
 
 #[test]
-fn the_camera_sees_what_is_behind_and_mirrors_see_the_lamp() {
+fn only_mirrors_show_camera_invisible_emitters() {
     let rectangle = |visible: bool| format!("{RECTANGLE}visible = {visible}\n");
     let cases = [
         ("path", rectangle as fn(bool) -> String),
         ("phong", rectangle),
         ("path", sphere),
     ];
-    for (integrator, lamp) in cases {
-        let (seen, hidden) = (room(integrator, &lamp(true)), room(integrator, &lamp(false)));
+    for (integrator, light) in cases {
+        let (seen, hidden) = (room(integrator, &light(true)), room(integrator, &light(false)));
         let without = room(integrator, "");
         let same = reference(&hidden);
         for way in exact_ways() {
@@ -56,7 +56,7 @@ fn the_camera_sees_what_is_behind_and_mirrors_see_the_lamp() {
             let bright = others().filter(|i| hidden[*i][0] > 3.0).count();
             assert!(
                 bright > 3,
-                "{way:?}, {integrator}: {bright} pixels of the mirror show the lamp"
+                "{way:?}, {integrator}: {bright} pixels of the mirror show the emitter"
             );
             // The wall.
             let middle = 12 * 24 + 12;
@@ -81,7 +81,7 @@ fn the_camera_sees_what_is_behind_and_mirrors_see_the_lamp() {
 }
 
 #[test]
-fn the_camera_sees_through_64_hidden_things_and_no_more() {
+fn the_camera_skips_at_most_64_surfaces() {
     let sheet = |i: u32| {
         format!(
             "[[shapes]]\ntype = 'rectangle'\nmaterial = 'h'\ncenter = [0, {}, 0]\nsize = [9, 9]\nnormal = [0, 1, 0]\ntangent = [1, 0, 0]\n",

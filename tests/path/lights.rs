@@ -15,7 +15,7 @@ const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
 #[test]
-fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
+fn selection_is_by_power_and_one_quarter_uniform() {
     // Powers 1 to 16 and a black one: too few for a light tree.
     let mut text = format!("{CAMERA}{FLOOR}");
     for i in 0..=16 {
@@ -25,7 +25,7 @@ fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
         );
     }
     let packed = scene(1, 1, &text);
-    assert_eq!(packed.lighting.emitters.len(), 16, "the dark one is none");
+    assert_eq!(packed.lighting.emitters.len(), 16, "the black light is an emitter");
     let mut counts = vec![0.0; packed.lighting.lights.len()];
     let calls = 400_000;
     for i in 0..calls {
@@ -39,7 +39,7 @@ fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
             let share = 0.75 * f64::from(light.color.x) / total + 0.25 / 16.0;
             assert!(
                 (f64::from(light.density) - share).abs() < 1e-6,
-                "its density is its share"
+                "the PDF is not the share of the power"
             );
             let expected = share * f64::from(calls);
             (count - expected) * (count - expected) / expected
@@ -51,12 +51,12 @@ fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
 /// A weak directional light, or a spot light a million times as strong that faces away, does not keep a point light
 /// from being sampled.
 #[test]
-fn what_lights_nothing_here_hides_no_lamp() {
-    let lamp = "[[lights]]\ntype = 'point'\nposition = [0, 0, 1]\ncolor = [1, 1, 1]\n";
+fn lights_without_local_effect_do_not_starve_others() {
+    let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 1]\ncolor = [1, 1, 1]\n";
     let pebble = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [1e5, 0, 0]\nradius = 1\n";
     let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [1e-6, 1e-6, 1e-6]\n";
     let spot = "[[lights]]\ntype = 'spot'\nposition = [0, 0, 1]\ndirection = [0, 0, 1]\ncone_angle = 40\ncolor = [1e6, 1e6, 1e6]\n";
-    let brightness = |rest: &str| mean(&reference(&scene(256, 1, &format!("{CAMERA}{FLOOR}{lamp}{rest}"))))[1];
+    let brightness = |rest: &str| mean(&reference(&scene(256, 1, &format!("{CAMERA}{FLOOR}{light}{rest}"))))[1];
     let alone = brightness("");
     for rest in [format!("{pebble}{sun}"), spot.to_owned()] {
         let found = brightness(&rest);
@@ -65,19 +65,19 @@ fn what_lights_nothing_here_hides_no_lamp() {
 }
 
 #[test]
-fn what_shines_lights_alike_whatever_it_is_made_of() {
+fn all_kinds_of_emitters_light_equally() {
     // The same square as a light, a rectangle, two triangles, a nearly flat box, and with a constant texture; alone and
     // among others.
     let square = "center = [0, 0, 1]\nsize = [1, 1]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n";
-    let shine = "materials.s = { type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4] }\n";
+    let emissive = "materials.s = { type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4] }\n";
     let textured = "textures.t = { type = 'checker', even = [4, 4, 4], odd = [4, 4, 4] }\n\
                     materials.s = { type = 'diffuse', color = [0, 0, 0], emission = { texture = 't' } }\n";
     let kinds = [
         format!("{CAMERA}[[lights]]\ntype = 'rectangle'\ncolor = [4, 4, 4]\n{square}{FLOOR}"),
-        format!("{CAMERA}{shine}[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\n{square}{FLOOR}"),
+        format!("{CAMERA}{emissive}[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\n{square}{FLOOR}"),
         format!("{CAMERA}{textured}[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\n{square}{FLOOR}"),
         format!(
-            "{CAMERA}{shine}[[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[-0.5, -0.5, 1], [0.5, -0.5, 1], [0.5, 0.5, 1]]\n\
+            "{CAMERA}{emissive}[[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[-0.5, -0.5, 1], [0.5, -0.5, 1], [0.5, 0.5, 1]]\n\
              [[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[-0.5, -0.5, 1], [0.5, 0.5, 1], [-0.5, 0.5, 1]]\n{FLOOR}"
         ),
     ];
@@ -98,7 +98,7 @@ fn what_shines_lights_alike_whatever_it_is_made_of() {
 }
 
 #[test]
-fn a_rectangle_light_hides_what_is_behind_it_and_shines_to_one_side() {
+fn a_rectangle_light_is_one_sided_and_occludes() {
     let light = "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 1]\nsize = [1, 1]\nnormal = [0, 0, NZ]\ntangent = [1, 0, 0]\ncolor = [4, 4, 4]\n";
     let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [2, 2, 2]\n";
     let camera = "camera = { type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
@@ -108,7 +108,7 @@ fn a_rectangle_light_hides_what_is_behind_it_and_shines_to_one_side() {
     for way in both() {
         let found = means(&render(&packed, way));
         let at = |x: usize, y: usize| found[y * 16 + x][0];
-        assert_eq!(at(8, 8), 0.0, "{way:?}: in its shade");
+        assert_eq!(at(8, 8), 0.0, "{way:?}: in the shadow");
         let lit = at(1, 1);
         assert!(
             (lit - 1.0 / std::f64::consts::PI).abs() < 5e-3,

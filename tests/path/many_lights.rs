@@ -20,7 +20,7 @@ const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
 /// Returns light `i` of a scene with all kinds.
-fn lamp(i: u32, random: &Random) -> String {
+fn light(i: u32, random: &Random) -> String {
     let coordinate = |scale: f64, from: f64| from + scale * random.unit();
     let (x, y, z) = (coordinate(2.0, -1.0), coordinate(2.0, -1.0), coordinate(0.8, 0.2));
     let c = 0.5 + random.unit();
@@ -42,9 +42,9 @@ fn lamp(i: u32, random: &Random) -> String {
     }
 }
 
-fn lamps(count: u32) -> Vec<String> {
+fn lights(count: u32) -> Vec<String> {
     let random = Random::new(5);
-    (0..count).map(|i| lamp(i, &random)).collect()
+    (0..count).map(|i| light(i, &random)).collect()
 }
 
 /// An emitter in the light tree.
@@ -69,10 +69,10 @@ fn leaves(packed: &Packed) -> Vec<Leaf> {
 }
 
 #[test]
-fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
+fn selection_frequencies_and_hit_pdfs_match_the_tree() {
     let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 1, -1]\ncolor = [1, 1, 1]\n";
     for far in ["", sun] {
-        let packed = scene(1, 1, &format!("{CAMERA}{FLOOR}{far}{}", lamps(60).concat()));
+        let packed = scene(1, 1, &format!("{CAMERA}{FLOOR}{far}{}", lights(60).concat()));
         let leaves = leaves(&packed);
         assert_eq!(leaves.len(), 60);
         let of_tree = packed.lighting.emitters[0];
@@ -132,22 +132,22 @@ fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
 }
 
 #[test]
-fn many_lamps_are_as_bright_as_one_by_one() {
+fn many_lights_are_the_sum_of_single_ones() {
     let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 1, -1]\ncolor = [1, 1, 1]\n".to_owned();
     for others in [vec![], vec![sun]] {
-        let all: Vec<String> = lamps(90)
+        let all: Vec<String> = lights(90)
             .into_iter()
-            .filter(|lamp| lamp.starts_with("[[lights]]"))
+            .filter(|light| light.starts_with("[[lights]]"))
             .chain(others)
             .collect();
         let camera = "camera = { type = 'orthographic', position = [0, 0, 0.05], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
                       materials.m = { type = 'diffuse', color = [0.7, 0.7, 0.7] }\n";
         // Rectangle lights occlude, so single-light images would not add up.
-        let all: Vec<String> = all.into_iter().filter(|lamp| !lamp.contains("rectangle")).collect();
-        let of = |samples: u32, lamps: &[String]| scene(samples, 1, &format!("{camera}{FLOOR}{}", lamps.concat()));
+        let all: Vec<String> = all.into_iter().filter(|light| !light.contains("rectangle")).collect();
+        let of = |samples: u32, lights: &[String]| scene(samples, 1, &format!("{camera}{FLOOR}{}", lights.concat()));
         let mut expected = [0.0; 3];
-        for lamp in &all {
-            let found = mean(&reference(&of(64, std::slice::from_ref(lamp))));
+        for light in &all {
+            let found = mean(&reference(&of(64, std::slice::from_ref(light))));
             expected = [0, 1, 2].map(|i| expected[i] + found[i]);
         }
         let packed = of(4096, &all);
@@ -165,9 +165,9 @@ fn many_lamps_are_as_bright_as_one_by_one() {
 }
 
 #[test]
-fn bits_are_the_same_whatever_shines() {
+fn many_lights_give_the_same_bits_on_all_backends() {
     for count in [16, 17, 30, 90] {
-        let text = format!("{CAMERA}{FLOOR}{}", lamps(count).concat());
+        let text = format!("{CAMERA}{FLOOR}{}", lights(count).concat());
         let packed = scene(16, 4, &text);
         assert_eq!(packed.specialization.light_tree, u32::from(count > 16), "{count}");
         let expected = reference(&packed);
@@ -178,7 +178,7 @@ fn bits_are_the_same_whatever_shines() {
 }
 
 #[test]
-fn the_ends_of_ranges_give_numbers() {
+fn limits_of_the_ranges_give_finite_values() {
     let mut text =
         format!("{CAMERA}materials.dark = {{ type = 'diffuse', color = [0, 0, 0], emission = [0, 0, 0] }}\n{FLOOR}");
     for i in 0..12 {
@@ -226,7 +226,7 @@ fn the_ends_of_ranges_give_numbers() {
 }
 
 #[test]
-fn a_hundred_thousand_lamps_render() {
+fn a_hundred_thousand_lights_render() {
     let text = format!(
         "image = {{ width = 16, height = 16 }}\n{CAMERA}{FLOOR}[render]\nintegrator = 'path'\nmax_depth = 2\npixel_samples = {{ count = 4 }}\n"
     );
@@ -241,8 +241,8 @@ fn a_hundred_thousand_lamps_render() {
         description = description.with_light(PointLightDescription::new(place, [1e-3; 3]));
     }
     let started = std::time::Instant::now();
-    let packed: Packed = wgray_render::pack::pack(&description.validate().expect("a sound scene"));
-    println!("100,000 lamps packed in {:?}", started.elapsed());
+    let packed: Packed = wgray_render::pack::pack(&description.validate().expect("a valid scene"));
+    println!("100,000 lights packed in {:?}", started.elapsed());
     assert_eq!(leaves(&packed).len(), 100_000);
     let expected = reference(&packed);
     assert!(mean(&expected)[0] > 0.0);
@@ -252,7 +252,7 @@ fn a_hundred_thousand_lamps_render() {
 }
 
 #[test]
-fn meshes_that_shine_are_in_the_tree() {
+fn emissive_meshes_are_in_the_light_tree() {
     let folder = tempfile::tempdir().expect("a folder");
     let ball = crate::meshes::forms::Form::icosphere(1);
     std::fs::write(folder.path().join("ball.obj"), ball.obj(None, None)).expect("a mesh");
@@ -265,7 +265,7 @@ fn meshes_that_shine_are_in_the_tree() {
     let load = |text: &str| {
         let description = Description::parse(text, "test").expect("a scene");
         let beside = wgray::scene::Assets::beside(folder.path());
-        wgray_render::pack::pack(&description.validate_with(&beside).expect("a sound scene"))
+        wgray_render::pack::pack(&description.validate_with(&beside).expect("a valid scene"))
     };
     let mesh = |material: &str, x: f64| {
         format!(

@@ -11,7 +11,7 @@ const FILE: &str = "integrators/path.wgsl";
 fn path_with(changes: &[(&str, &str)]) -> Shaders {
     let mut text = sources::shaders().text(FILE).to_owned();
     for (from, to) in changes {
-        assert!(text.contains(from), "{from} is not there to be changed");
+        assert!(text.contains(from), "{from} not found");
         text = text.replace(from, to);
     }
     sources::shaders_with(FILE, &text)
@@ -19,7 +19,7 @@ fn path_with(changes: &[(&str, &str)]) -> Shaders {
 
 /// Returns lights of every kind, enough for a light tree.
 fn many_lamps() -> String {
-    let lamp = |i: u32| {
+    let light = |i: u32| {
         let [x, y, z] = [
             f64::from(i % 6) * 0.45 - 1.1,
             f64::from(i / 6) * 0.45 - 0.7,
@@ -30,12 +30,12 @@ fn many_lamps() -> String {
                 "[[shapes]]\ntype = 'cylinder'\nmaterial = 'dim'\nstart = [{x}, {y}, {z}]\nend = [{}, {y}, {z}]\nradius = 0.1\n",
                 x + 0.2
             ),
-            0 => format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [{x}, {y}, {z}]\nradius = 0.15\n"),
+            0 => format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'source'\ncenter = [{x}, {y}, {z}]\nradius = 0.15\n"),
             1 => format!(
                 "[[shapes]]\ntype = 'disk'\nmaterial = 'dim'\ncenter = [{x}, {y}, {z}]\nradius = 0.2\nnormal = [{x}, 0.3, -1]\n"
             ),
             2 => format!(
-                "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'shine'\n\
+                "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'source'\n\
                  vertices = [[{x}, {y}, {z}], [{}, {y}, {z}], [{x}, {}, {z}], [{x}, {y}, {}]]\n",
                 x + 0.25,
                 y + 0.25,
@@ -47,11 +47,11 @@ fn many_lamps() -> String {
             ),
         }
     };
-    (0..24).map(lamp).collect()
+    (0..24).map(light).collect()
 }
 
 #[test]
-fn light_alone_and_materials_alone_find_the_same() {
+fn light_and_bsdf_sampling_agree() {
     if adapter::device().is_none() {
         return;
     }
@@ -64,18 +64,18 @@ fn light_alone_and_materials_alone_find_the_same() {
         "0.9 * (select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta))",
     )]);
     let camera = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5], fov = 40 }\n\
-                  materials.shine = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
+                  materials.source = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
                   materials.dim = { type = 'phong', diffuse = [0.3, 0.3, 0.3], specular = [0.3, 0.3, 0.3], shininess = 5, ambient = [0, 0, 0], emission = [1, 2, 1] }\n\
                   [[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
     let shapes = [
-        "[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [0.2, 0, 0.9]\nradius = 0.5\n",
-        "[[shapes]]\ntype = 'ellipsoid'\nmaterial = 'shine'\ncenter = [0, 0, 0.6]\na = [0.8, 0.1, 0]\nb = [0, 0.3, 0.1]\nc = [0, 0.1, 0.3]\n",
-        "[[shapes]]\ntype = 'disk'\nmaterial = 'shine'\ncenter = [0, 0.4, 0.8]\nradius = 0.6\nnormal = [0.3, -0.5, 0.4]\ntangent = [0.5, 0.3, 0]\n",
-        "[[shapes]]\ntype = 'cylinder'\nmaterial = 'shine'\nstart = [-0.6, 0.3, 0.5]\nend = [0.5, -0.1, 0.8]\nradius = 0.3\n",
-        "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'shine'\nvertices = [[-0.5, 0, 0.3], [0.5, 0, 0.3], [0, 0.6, 0.3], [0, 0.2, 0.9]]\n",
+        "[[shapes]]\ntype = 'sphere'\nmaterial = 'source'\ncenter = [0.2, 0, 0.9]\nradius = 0.5\n",
+        "[[shapes]]\ntype = 'ellipsoid'\nmaterial = 'source'\ncenter = [0, 0, 0.6]\na = [0.8, 0.1, 0]\nb = [0, 0.3, 0.1]\nc = [0, 0.1, 0.3]\n",
+        "[[shapes]]\ntype = 'disk'\nmaterial = 'source'\ncenter = [0, 0.4, 0.8]\nradius = 0.6\nnormal = [0.3, -0.5, 0.4]\ntangent = [0.5, 0.3, 0]\n",
+        "[[shapes]]\ntype = 'cylinder'\nmaterial = 'source'\nstart = [-0.6, 0.3, 0.5]\nend = [0.5, -0.1, 0.8]\nradius = 0.3\n",
+        "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'source'\nvertices = [[-0.5, 0, 0.3], [0.5, 0, 0.3], [0, 0.6, 0.3], [0, 0.2, 0.9]]\n",
         "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.1]\nsize = [1, 0.5]\nnormal = [0.1, -0.3, -1]\ntangent = [10, 0, 1]\ncolor = [5, 3, 1]\n",
         // several of different powers, one behind another
-        "[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [-0.6, 0, 0.7]\nradius = 0.3\n\
+        "[[shapes]]\ntype = 'sphere'\nmaterial = 'source'\ncenter = [-0.6, 0, 0.7]\nradius = 0.3\n\
          [[shapes]]\ntype = 'disk'\nmaterial = 'dim'\ncenter = [0.6, 0.4, 0.7]\nradius = 0.3\nnormal = [-1, -1, 0]\ntangent = [1, -1, 0]\n\
          [[shapes]]\ntype = 'triangle'\nmaterial = 'dim'\nvertices = [[-1, 1, 0.1], [1, 1, 0.1], [0, 1, 1.5]]\n\
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",

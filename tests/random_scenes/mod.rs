@@ -24,7 +24,7 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
     let packed = any_scene::packed(d);
     let cpu = reference(&packed);
     if !cpu.sums.iter().all(|sum| sum.is_finite()) {
-        return Err("a pixel is no number".into());
+        return Err("a pixel is NaN or infinite".into());
     }
     for way in [Way::Baked, Way::Buffers] {
         let differ = differing(&render_with(&packed, way, shaders), &cpu);
@@ -117,7 +117,7 @@ fn random_scenes_of_many_samples_are_the_same() {
 /// Without guaranteed bits, all scenes together are within the tolerances: plain WGSL, devices other than software
 /// Vulkan, imprecise quotients and square roots. Direct light only: after a bounce, one ulp may change the path.
 #[test]
-fn random_scenes_are_nearly_the_same_where_bits_are_not_promised() {
+fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     let Some(device) = adapter::device() else { return };
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::of_direct_light();
@@ -151,7 +151,7 @@ fn random_scenes_are_nearly_the_same_where_bits_are_not_promised() {
 
 /// One ulp in a constant is detected, and the reported scene is valid.
 #[test]
-fn shaders_that_differ_by_one_ulp_are_found_by_random_scenes() {
+fn random_scenes_detect_a_difference_of_one_ulp() {
     if !adapter::device().is_some_and(bit_exact) {
         return;
     }
@@ -165,7 +165,7 @@ fn shaders_that_differ_by_one_ulp_are_found_by_random_scenes() {
 
 /// Random scenes cover every type of the parser, except these.
 #[test]
-fn random_scenes_have_everything() {
+fn random_scenes_cover_every_type() {
     const NEVER: &[(&str, &str)] = &[
         ("image", "files; tests/textures compares images on both paths"),
         ("gltf", "files; tests/gltf compares what they are made of on both paths"),

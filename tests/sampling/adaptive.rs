@@ -7,7 +7,7 @@ use wgray_render::cpu::adaptive::{
     display_slope_squared, display_variance, moments_with, samples_wanted, variance_of_mean,
 };
 use wgray_render::cpu::pixel::pixel_radiance;
-use wgray_render::job::Cut;
+use wgray_render::job::WorkSplit;
 use wgray_render::records::Packed;
 
 use super::cornell;
@@ -23,7 +23,7 @@ fn adaptive(pattern: Pattern, error: f64, max_samples: u32) -> Packed {
 }
 
 #[test]
-fn pictures_are_the_same_on_both_paths_and_under_every_cut() {
+fn adaptive_images_do_not_depend_on_backend_or_work_split() {
     for pattern in GOING_ON {
         for kind in [PixelFilterKind::Box, PixelFilterKind::Mitchell] {
             let packed = cornell(pattern, 16, |description| {
@@ -42,17 +42,17 @@ fn pictures_are_the_same_on_both_paths_and_under_every_cut() {
                 "{pattern:?}, {kind:?}"
             );
             for way in exact_ways() {
-                for (band_pixels, samples_per_call, rows_per_call) in [
+                for (band_pixels, samples_per_dispatch, rows_per_dispatch) in [
                     (1 << 20, None, None),
                     (41 * 7, Some(5), Some(3)),
                     (1, Some(17), None),
                     (1, None, None),
                     (500, Some(1), Some(2)),
                 ] {
-                    let cut = Cut {
+                    let cut = WorkSplit {
                         band_pixels,
-                        samples_per_call,
-                        rows_per_call,
+                        samples_per_dispatch,
+                        rows_per_dispatch,
                     };
                     let found = film(&mut *backend(&packed, way), &packed, whole(&packed), &cut);
                     assert_eq!(
@@ -86,9 +86,9 @@ fn a_crop_is_a_part_of_the_whole() {
         ] {
             let part = Region { x0, y0, x1, y1 };
             for band_pixels in [1 << 20, 50] {
-                let cut = Cut {
+                let cut = WorkSplit {
                     band_pixels,
-                    ..Cut::default()
+                    ..WorkSplit::default()
                 };
                 let found = film(&mut *backend(&packed, way), &packed, part, &cut);
                 assert_eq!(differing(&found, &crop(&expected, part)), 0, "{way:?}, {part:?}");
@@ -139,7 +139,7 @@ fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> O
 }
 
 #[test]
-fn samples_double_as_far_as_the_neighbours_tell() {
+fn sample_counts_follow_the_pilot_samples_of_neighbors() {
     for (round, first, error, most) in [
         (16, 16, 0.01, 100),
         (4, 16, 0.02, 256),
@@ -151,26 +151,26 @@ fn samples_double_as_far_as_the_neighbours_tell() {
             description.render.adaptive = Some(AdaptiveDescription { error, max_samples });
         });
         let film = reference(&packed);
-        let (mut told, mut counts) = (0, Vec::new());
+        let (mut checked, mut counts) = (0, Vec::new());
         for (pixel, count) in film.sample_counts().enumerate() {
             let at = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
             if let Some(expected) = wanted(&packed, at, first, error, most) {
                 assert_eq!(count, expected, "{round}, {at}");
-                told += 1;
+                checked += 1;
             }
             counts.push(count);
         }
         counts.sort_unstable();
         counts.dedup();
         assert!(
-            told > 1300 && counts.len() > 2 && counts[0] == first,
-            "{told}, {counts:?}"
+            checked > 1300 && counts.len() > 2 && counts[0] == first,
+            "{checked}, {counts:?}"
         );
     }
 }
 
 #[test]
-fn extreme_errors_give_the_first_look_or_the_most_samples() {
+fn extreme_errors_give_the_minimum_or_maximum_samples() {
     let uniform = |count| {
         cornell(Pattern::Sobol, count, |description| {
             // Light samples continue across pixel samples.
@@ -185,7 +185,7 @@ fn extreme_errors_give_the_first_look_or_the_most_samples() {
 }
 
 #[test]
-fn the_smallest_pictures_and_rounds() {
+fn minimum_image_and_pilot_sizes() {
     let counts = |width, height, round, most| {
         let packed = cornell(Pattern::Random, round, |description| {
             (description.image.width, description.image.height) = (width, height);
@@ -211,7 +211,7 @@ fn the_smallest_pictures_and_rounds() {
 
 /// The arguments sum the variance, squared deviations, their squares, and pixels.
 #[test]
-fn a_look_allows_what_it_has_evidence_for() {
+fn effective_samples_limit_the_doublings() {
     let wanted = |looks: [f32; 4], error: f32, most| samples_wanted(Vec4::from(looks), 16, error * error, most);
     // 4 pixels with a standard error of 0.04: 4 times the samples halve it.
     let certain = [4.0 * 0.04 * 0.04, 1000.0, 1.0, 4.0];
@@ -282,7 +282,7 @@ fn errors_are_scaled_by_the_slope_of_the_displayed_value() {
 }
 
 #[test]
-fn weighted_moments_of_a_constant_are_nothing() {
+fn weighted_moments_of_a_constant_are_zero() {
     let (mut sum, mut moments) = (Vec4::ZERO, Vec4::ZERO);
     for weight in [1.0, 0.98, -1.02, 1.0, 1.0, -1.02, 1.0] {
         let sample = (glam::Vec3::new(0.3, 0.2, 0.7) * weight).extend(weight);
@@ -315,14 +315,14 @@ fn the_estimate_is_an_upper_bound_on_average() {
 }
 
 #[test]
-fn what_cannot_be_is_told() {
+fn invalid_adaptive_settings_are_rejected() {
     let text = |render: &str| {
         format!(
             "image = {{ width = 4, height = 3 }}\ncamera = {{ position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }}\n\
              [render]\n{render}\n"
         )
     };
-    let told = |render: &str, overrides: &Overrides| match Scene::parse_with(&text(render), "s.toml", overrides) {
+    let message = |render: &str, overrides: &Overrides| match Scene::parse_with(&text(render), "s.toml", overrides) {
         Ok(_) => "sound".to_string(),
         Err(error) => error.to_string(),
     };
@@ -373,9 +373,9 @@ fn what_cannot_be_is_told() {
         ("pixel_samples = { pattern = 'halton', count = 8 }", "sound"),
     ] {
         assert!(
-            told(render, &none).starts_with(expected),
+            message(render, &none).starts_with(expected),
             "{render}: {}",
-            told(render, &none)
+            message(render, &none)
         );
     }
     let option = |error, pattern| Overrides {
@@ -384,9 +384,9 @@ fn what_cannot_be_is_told() {
         ..Overrides::default()
     };
     let grid = "adaptive: the pattern of pixel_samples, \"grid\", cannot add samples";
-    assert!(told("", &option(0.1, None)).starts_with(grid));
-    assert!(told("", &option(-0.1, Some(Pattern::Sobol))).starts_with("adaptive: -0.1 must be from 0 to 1"));
-    let scene = Scene::parse_with(&text(""), "s.toml", &option(0.1, Some(Pattern::Sobol))).expect("a sound scene");
+    assert!(message("", &option(0.1, None)).starts_with(grid));
+    assert!(message("", &option(-0.1, Some(Pattern::Sobol))).starts_with("adaptive: -0.1 must be from 0 to 1"));
+    let scene = Scene::parse_with(&text(""), "s.toml", &option(0.1, Some(Pattern::Sobol))).expect("a valid scene");
     let adaptive = scene.render.adaptive.expect("adaptive sampling");
     assert_eq!((adaptive.error, adaptive.max_samples), (0.1, 256));
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use wgray_render::gpu::{Device, Gpu, Options, Rounding};
-use wgray_render::job::Cut;
+use wgray_render::job::WorkSplit;
 use wgray_render::records::Packed;
 
 use super::{cpu_picture, scene, write_exr, write_png};
@@ -156,16 +156,16 @@ fn pictures_are_the_same_on_the_device_and_on_the_cpu() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let odd = Cut {
+    let odd = WorkSplit {
         band_pixels: 700,
-        samples_per_call: Some(1),
-        rows_per_call: Some(3),
+        samples_per_dispatch: Some(1),
+        rows_per_dispatch: Some(3),
     };
     for (name, scene) in scenes(folder.path()) {
         let expected = reference(&scene);
         let colors: BTreeSet<_> = expected.means().map(|pixel| pixel.map(f32::to_bits)).collect();
         assert!(colors.len() > 100, "{name} shows nothing");
-        for (way, cut) in [(Way::Baked, Cut::default()), (Way::Buffers, odd)] {
+        for (way, cut) in [(Way::Baked, WorkSplit::default()), (Way::Buffers, odd)] {
             let found = film(&mut *backend(&scene, way), &scene, whole(&scene), &cut);
             let problem = compare(way, &scene, &found, &expected);
             assert!(problem.is_ok(), "{name}, {way:?}: {}", problem.unwrap_err());
@@ -205,7 +205,12 @@ fn texels_in_several_buffers_give_the_same_picture() {
     };
     let expected = reference(scene);
     for (way, baked) in [(Way::Baked, true), (Way::Buffers, false)] {
-        let found = film(&mut new(&small, baked).unwrap(), scene, whole(scene), &Cut::default());
+        let found = film(
+            &mut new(&small, baked).unwrap(),
+            scene,
+            whole(scene),
+            &WorkSplit::default(),
+        );
         let problem = compare(way, scene, &found, &expected);
         assert!(problem.is_ok(), "{way:?}: {}", problem.unwrap_err());
     }

@@ -81,13 +81,13 @@ fn crc32(bytes: &[u8]) -> u32 {
 }
 
 #[test]
-fn bad_images_are_told() {
+fn invalid_images_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     files(folder.path());
     for good in ["good.png", "good.exr", "inner/good.png", "inner/../good.png"] {
         load(folder.path(), &format!("[textures.t]\ntype = 'image'\nfile = '{good}'")).unwrap();
     }
-    for (file, told) in [
+    for (file, rule) in [
         ("none.png", "cannot be read: "),
         ("", "must be a file"),
         ("folder.png", "must be a file"),
@@ -116,14 +116,14 @@ fn bad_images_are_told() {
         ("../", "lies outside of "),
     ] {
         let message = load(folder.path(), &format!("[textures.t]\ntype = 'image'\nfile = '{file}'")).unwrap_err();
-        let start = format!("5: textures.t.file: {file:?} {told}");
+        let start = format!("5: textures.t.file: {file:?} {rule}");
         assert!(message.starts_with(&start), "{message}\n{start}");
     }
 }
 
 #[cfg(unix)]
 #[test]
-fn links_that_leave_the_folder_are_refused() {
+fn links_that_leave_the_folder_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let other = tempfile::tempdir().unwrap();
     write_png(&other.path().join("good.png"), 2, 2, |_, _| [1; 3]);
@@ -168,19 +168,19 @@ fn all_images_together_must_fit() {
     let texture = |name: &str, file: &str, filter: &str| {
         format!("[textures.{name}]\ntype = 'image'\nfilter = '{filter}'\nfile = '{file}'\n")
     };
-    let told = |text: &str| load(folder.path(), text).unwrap_err();
+    let error = |text: &str| load(folder.path(), text).unwrap_err();
     let small = texture("a", "a.png", "nearest");
     assert_eq!(
-        told(&(small.clone() + &texture("b", "huge.png", "nearest"))),
+        error(&(small.clone() + &texture("b", "huge.png", "nearest"))),
         "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the textures before it 1.0 MiB; \
          the limit is 1024.0 MiB"
     );
     // Decoded, as the size is within the limit.
-    assert!(told(&texture("b", "fits.png", "ewa")).contains("is damaged or truncated"));
+    assert!(error(&texture("b", "fits.png", "ewa")).contains("is damaged or truncated"));
 }
 
 #[test]
-fn a_file_is_kept_once_however_it_is_named() {
+fn files_are_loaded_once() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("inner")).unwrap();
     write_png(&folder.path().join("a.png"), 64, 32, |x, y| [x as u8, y as u8, 7]);
@@ -207,7 +207,7 @@ fn a_file_is_kept_once_however_it_is_named() {
 }
 
 #[test]
-fn gray_palettes_and_opacity_are_read_as_their_colours() {
+fn gray_palette_and_alpha_images_are_decoded() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     write_png(&path("rgb.png"), 4, 4, |x, y| [(60 * x + y) as u8; 3]);
@@ -259,7 +259,7 @@ fn gray_palettes_and_opacity_are_read_as_their_colours() {
 }
 
 #[test]
-fn bad_values_are_told() {
+fn invalid_values_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     files(folder.path());
     let image = "[textures.t]\ntype = 'image'\nfile = 'good.png'\n";
@@ -268,7 +268,7 @@ fn bad_values_are_told() {
     let linear = "[textures.t]\ntype = 'image'\nfile = 'good.png'\nencoding = 'linear'\n";
     let mapped = "[materials.m]\ntype = 'phong'\ncolor = [1, 1, 1]\nnormal_map = { texture = 't' }\n";
     let triangle = "[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n";
-    for (text, told) in [
+    for (text, expected) in [
         (
             format!("{image}filter = 'sharp'"),
             "6: textures.t.filter: \"sharp\" must be one of \"nearest\", \"bilinear\", \"trilinear\", \"ewa\"",
@@ -422,7 +422,7 @@ fn bad_values_are_told() {
         ),
     ] {
         let message = load(folder.path(), &text).expect_err(&text);
-        assert!(message.starts_with(told), "{message}\n{told}");
+        assert!(message.starts_with(expected), "{message}\n{expected}");
     }
     load(folder.path(), &format!("{linear}{mapped}")).unwrap();
 }
@@ -474,18 +474,18 @@ fn alpha_is_that_of_an_image() {
                 );
                 load(folder.path(), &text)
             };
-            let told = |rule: &str| format!("7: materials.m.{key}.channel: {rule}");
+            let expected = |rule: &str| format!("7: materials.m.{key}.channel: {rule}");
             for texture in [
                 "type = 'constant'\ncolor = [1, 1, 1]",
                 "type = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]",
                 "type = 'grid'\ncell = [0, 0, 0]\nline = [1, 1, 1]\nline_width = 0.1",
             ] {
                 let rule = "\"t\" must be a texture of type \"image\" to have an alpha channel";
-                assert_eq!(scene(texture).unwrap_err(), told(rule), "{kind}");
+                assert_eq!(scene(texture).unwrap_err(), expected(rule), "{kind}");
             }
             let rule = "\"opaque.png\" must have an alpha channel";
             let message = scene("type = 'image'\nfile = 'opaque.png'").unwrap_err();
-            assert_eq!(message, told(rule), "{kind}");
+            assert_eq!(message, expected(rule), "{kind}");
             let scene = scene("type = 'image'\nfile = 'a.png'").unwrap();
             let TextureKind::Image { image, .. } = &scene.textures[1].kind else {
                 panic!("{kind}.{key}: no image");

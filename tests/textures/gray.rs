@@ -50,14 +50,14 @@ fn one_channel_is_gray_whatever_its_name_and_type() {
     });
     assert_eq!(load(folder.path()), gray(0.0), "half precision");
     write(&path, &["A", "Y"], FlatSamples::F32);
-    assert_eq!(load(folder.path()), gray(2.5), "opacity is ignored");
+    assert_eq!(load(folder.path()), gray(2.5), "opacity is used");
 }
 
 #[test]
-fn two_channels_that_are_no_colour_are_refused_and_damage_is_told() {
+fn unsupported_channels_and_damage_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.exr");
-    for (names, told) in [
+    for (names, channels) in [
         (vec!["U", "V"], "\"U\", \"V\""),
         (vec!["G", "B"], "\"B\", \"G\""),
         (vec!["A"], "\"A\""),
@@ -71,7 +71,7 @@ fn two_channels_that_are_no_colour_are_refused_and_damage_is_told() {
         let message = load(folder.path()).unwrap_err();
         let rule = "\"t.exr\" must have the channels \"R\", \"G\" and \"B\", or one alone; it has";
         assert!(
-            message.ends_with(&format!(":5: textures.t.file: {rule} {told}")),
+            message.ends_with(&format!(":5: textures.t.file: {rule} {channels}")),
             "{message}"
         );
     }

@@ -37,7 +37,7 @@ pub struct Request {
 pub type Ready = (Box<Gpu>, Arc<Shaders>);
 
 /// The result of a request.
-pub struct Built {
+pub struct BuildResult {
     /// The id of the request.
     pub id: u64,
     /// The constants of the request.
@@ -64,7 +64,7 @@ impl Builder {
     pub fn start(
         choice: AdapterChoice,
         times: Times,
-        done: impl Fn(Built) + Send + 'static,
+        done: impl Fn(BuildResult) + Send + 'static,
     ) -> std::io::Result<Builder> {
         let (sender, receiver) = channel();
         let thread = std::thread::Builder::new()
@@ -93,7 +93,7 @@ impl Drop for Builder {
     }
 }
 
-fn run(choice: &AdapterChoice, times: &Times, requests: &Receiver<Request>, done: impl Fn(Built)) {
+fn run(choice: &AdapterChoice, times: &Times, requests: &Receiver<Request>, done: impl Fn(BuildResult)) {
     while let Ok(mut request) = requests.recv() {
         while let Ok(newer) = requests.try_recv() {
             request = newer;
@@ -102,7 +102,7 @@ fn run(choice: &AdapterChoice, times: &Times, requests: &Receiver<Request>, done
     }
 }
 
-fn build(choice: &AdapterChoice, times: &Times, request: Request) -> Built {
+fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult {
     let Request {
         id,
         device,
@@ -135,7 +135,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> Built {
             Ok((Box::new(gpu), shaders))
         })
     });
-    Built {
+    BuildResult {
         id,
         constants,
         noticed,

@@ -9,8 +9,8 @@ use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 use wgray_render::error::RenderError;
 use wgray_render::film::Film;
-use wgray_render::gpu::{Call, Gpu};
-use wgray_render::job::{Cut, Order, Steps};
+use wgray_render::gpu::{Dispatch, Gpu};
+use wgray_render::job::{Order, Steps, WorkSplit};
 use wgray_render::output::Aov;
 use wgray_render::records::{Camera, FirstHit, Packed};
 
@@ -19,7 +19,7 @@ use super::picture::{Content, View};
 use super::pixel_values::means;
 
 /// Target duration of a dispatch: a save or a move of the camera waits this long.
-const CALL: Duration = Duration::from_millis(30);
+const DISPATCH_DURATION: Duration = Duration::from_millis(30);
 /// Target duration of a coarse image: with the time to show it, 20 per second.
 const COARSE: Duration = Duration::from_millis(30);
 /// Pixels of a coarse image while the speed is unknown.
@@ -102,7 +102,7 @@ impl Canvas {
             finest: 1,
             compare: false,
             stage,
-            steps: Steps::new(&Cut::default(), CALL, Order::Pixels),
+            steps: Steps::new(&WorkSplit::default(), DISPATCH_DURATION, Order::Pixels),
             under: None,
             cpu: Film::new(Region::whole(0, 0)),
             hits: Vec::new(),
@@ -134,8 +134,8 @@ impl Canvas {
     }
 
     /// Returns the dispatches that have ended since the last call.
-    pub fn calls(&mut self) -> Vec<Call> {
-        self.gpu.calls()
+    pub fn dispatches(&mut self) -> Vec<Dispatch> {
+        self.gpu.dispatches()
     }
 
     /// Starts the image again, with a camera.
@@ -207,7 +207,7 @@ impl Canvas {
         self.gpu.set_camera(&self.scene.camera)?;
         self.gpu.begin(region)?;
         if self.compare {
-            self.cpu = Film::of(region, self.scene.form());
+            self.cpu = Film::of(region, self.scene.film_layout());
         }
         let samples = if scale > self.finest {
             1

@@ -84,8 +84,8 @@ mod tests {
     use ::exr::prelude::{ReadChannels as _, ReadLayers as _};
 
     use super::*;
+    use crate::display_settings::DisplaySettings;
     use crate::film_layer::FilmLayer;
-    use crate::look::DisplaySettings;
     use crate::picture::{Header, Names};
     use wgray_render::output::Aov;
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::look::DisplaySettings;
+use super::display_settings::DisplaySettings;
 use super::pixel_values::{bits, bytes, numbers, of_film};
 use wgray_image::{Pixels, to_8_bits};
 use wgray_render::film::{Film, Layer, variance_of_mean};
@@ -112,14 +112,14 @@ mod tests {
 
     use super::*;
     use wgray_image::Region;
-    use wgray_render::film::Form;
+    use wgray_render::film::FilmLayout;
 
     fn film() -> Film {
-        let form = Form {
+        let film_layout = FilmLayout {
             adaptive: true,
             layers: true,
         };
-        let mut film = Film::of(Region::whole(1, 2), form);
+        let mut film = Film::of(Region::whole(1, 2), film_layout);
         film.sums.fill(Vec4::new(4.0, 8.0, 12.0, 4.0));
         film.moments = vec![Vec4::new(3.0, 12.0, 0.0, 4.0), Vec4::new(0.0, 0.0, 0.0, 1.0)];
         for (number, list) in (1u8..).zip(&mut film.layers) {

@@ -7,18 +7,18 @@
 //!                                    └──> State, Frame, SceneView ──> server ──> page
 //! ```
 
+mod bad_pixels;
 mod build;
 mod camera;
 mod canvas;
 mod diagnostic;
+mod display_settings;
 mod download;
 mod edit;
-mod faults;
 mod film_layer;
 mod guard;
 mod histogram;
 mod history;
-mod look;
 mod messages;
 mod object;
 mod painter;
@@ -35,14 +35,14 @@ mod times;
 mod viewer;
 mod watch;
 
+pub use bad_pixels::BadPixels;
 pub use camera::{Move, Viewpoint};
 pub use diagnostic::Diagnostic;
-pub use faults::BadPixels;
+pub use display_settings::{DisplayOverrides, DisplaySettings, Legend};
 pub use film_layer::FilmLayer;
 pub use histogram::Histogram;
-pub use look::{DisplayOverrides, DisplaySettings, Legend};
 pub use messages::{Command, Notice, Preview, Report, Set, State};
-pub use object::{Group, Listed, Object, SceneView};
+pub use object::{Group, Object, ObjectList, SceneView};
 pub use picture::{Against, Content, Frame, Header, View};
 pub use reference::{Apart, Reference};
 pub use server::Listener;

@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::build::Built;
+use super::build::BuildResult;
 use super::camera::{Move, Viewpoint};
 use super::diagnostic::Diagnostic;
-use super::look::DisplayOverrides;
+use super::display_settings::DisplayOverrides;
 use super::picture::View;
 use super::reference::{Apart, Reference};
 use super::sliders::SliderState;
@@ -242,7 +242,7 @@ pub enum Event {
     /// Changed files of the scene are being read, or turned out to be unchanged.
     Reading(bool),
     /// A kernel has been compiled.
-    Built(Box<Built>),
+    BuildResult(Box<BuildResult>),
     /// A command of a viewer.
     Command(Command),
     /// A viewer gave an image to compare with.

@@ -72,7 +72,7 @@ pub struct Group {
 
 /// The objects whose names contain a text.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Listed {
+pub struct ObjectList {
     /// The text.
     pub part: String,
     /// Names, each with the type or material.
@@ -268,10 +268,10 @@ impl SceneView {
     }
 
     /// Returns the objects whose names contain a text, in the order of the file's sections.
-    pub fn objects(&self, part: &str) -> Listed {
+    pub fn objects(&self, part: &str) -> ObjectList {
         let all = &self.loaded.description;
         let wanted = part.to_lowercase();
-        let mut listed = Listed {
+        let mut listed = ObjectList {
             part: part.to_owned(),
             objects: Vec::new(),
             more: 0,

@@ -4,11 +4,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::faults::{BadPixels, Fault, faults, mark};
+use super::bad_pixels::{BadPixel, BadPixels, faults, mark};
+use super::display_settings::{DisplaySettings, Legend};
 use super::film_layer::FilmLayer;
 use super::histogram::Histogram;
-use super::look::{DisplaySettings, Legend};
-use super::pixel_values::{Scaled, bits, bytes, numbers};
+use super::pixel_values::{ScaledImage, bits, bytes, numbers};
 use wgray_image::{Pixels, difference};
 use wgray_render::output::{self as image, Aov, AovSource};
 use wgray_render::records::{FirstHit, NO_INDEX};
@@ -220,7 +220,7 @@ impl Frame {
     pub fn new(mut header: Header, content: Content, names: Names, look: DisplaySettings) -> Frame {
         let [width, height] = header.sent;
         let mut found = Vec::new();
-        let mut marked = |name, mut rgb: Vec<u8>, faults: Vec<Option<Fault>>| {
+        let mut marked = |name, mut rgb: Vec<u8>, faults: Vec<Option<BadPixel>>| {
             if look.marks {
                 mark(&mut rgb, &faults);
             }
@@ -296,7 +296,7 @@ impl Frame {
         let Header {
             width, height, sent, ..
         } = self.header;
-        let i = Scaled {
+        let i = ScaledImage {
             from: [width, height],
             to: sent,
         }

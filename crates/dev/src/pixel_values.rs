@@ -26,7 +26,7 @@ pub(super) fn of_film<T: Default + Send>(
     let pixels = (0..film.sums.len()).into_par_iter().with_min_len(1024);
     let of_pixel = |i: usize| match under {
         Some(under) if !has_samples(i as u32 / from[0]) => {
-            let at = Scaled { from, to: size(under) };
+            let at = ScaledImage { from, to: size(under) };
             at.index(i as u32 % from[0], i as u32 / from[0])
                 .map_or_else(T::default, |i| value(under, i))
         }
@@ -36,12 +36,12 @@ pub(super) fn of_film<T: Default + Send>(
 }
 
 /// A mapping from an image to the same image in another size.
-pub(super) struct Scaled {
+pub(super) struct ScaledImage {
     pub from: [u32; 2],
     pub to: [u32; 2],
 }
 
-impl Scaled {
+impl ScaledImage {
     /// Returns the index of the pixel that covers pixel (x, y); `None` outside the image.
     pub fn index(&self, x: u32, y: u32) -> Option<usize> {
         let scaled = |at: u32, i: usize| {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::pixel_values::Scaled;
+use super::pixel_values::ScaledImage;
 use wgray_image::Pixels;
 use wgray_image::color::srgb_to_linear;
 use wgray_image::compare::{self, Channel, Kind, PIXELS_PER_DEGREE, Picture, Plane};
@@ -65,7 +65,7 @@ impl Reference {
         if sent == whole {
             return Some((*self.pixels).clone());
         }
-        let scaled = Scaled { from: sent, to: whole };
+        let scaled = ScaledImage { from: sent, to: whole };
         let color = |i: u32| {
             let place = scaled.index(i % sent[0], i / sent[0])?;
             self.pixels.colors.get(place).copied()

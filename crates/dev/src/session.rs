@@ -132,7 +132,7 @@ impl Session {
         let builder = Builder::start(choice, times.clone(), {
             let events = events.clone();
             move |built| {
-                let _ = events.send(Event::Built(Box::new(built))); // fails only after the end of the session
+                let _ = events.send(Event::BuildResult(Box::new(built))); // fails only after the end of the session
             }
         })?;
         let (state_sender, state) = watch::channel(Arc::default());

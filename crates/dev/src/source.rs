@@ -13,8 +13,8 @@ use wgray_render::output::AovSource;
 use wgray_render::pack::pack;
 use wgray_render::records::{Packed, Specialization};
 use wgray_scene::{
-    CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_course, is_gltf,
-    is_mesh, is_model, read_bytes, read_text,
+    CameraDescription, Description, Integrator, Overrides, PendingScene, Pieces, Places, Scene, folder_of, is_course,
+    is_gltf, is_mesh, is_model, read_bytes, read_text,
 };
 
 /// The locations of the files.
@@ -232,7 +232,7 @@ impl Sources {
             true => Scene::load_and_list(&self.scene, &self.overrides, &mut named),
             false => read_text(&self.scene).and_then(|read| {
                 text = read;
-                let draft = Draft::read(&text, &origin, folder_of(&self.scene), &self.overrides)?;
+                let draft = PendingScene::read(&text, &origin, folder_of(&self.scene), &self.overrides)?;
                 let assets = self.named_files(&draft.description);
                 files.extend(assets.map(|path| (path.clone(), self.stamp(&path))));
                 draft.check(&mut named)

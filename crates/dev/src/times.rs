@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use wgray_render::gpu::Call;
+use wgray_render::gpu::Dispatch;
 
 /// Number of the last times of each kind that the median is taken over.
 const KEPT: usize = 33;
@@ -77,11 +77,11 @@ impl Times {
     }
 
     /// Records a dispatch that has just ended.
-    pub fn call(&self, call: &Call) {
+    pub fn call(&self, call: &Dispatch) {
         self.note(call.kernel, call.took, Some(call));
     }
 
-    fn note(&self, name: &'static str, took: Duration, call: Option<&Call>) {
+    fn note(&self, name: &'static str, took: Duration, call: Option<&Dispatch>) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let known = all
             .iter()
@@ -163,7 +163,7 @@ mod tests {
         times.part("upload", Duration::from_millis(3));
         times.part("read files", Duration::from_millis(1));
         for i in 1..=100 {
-            times.call(&Call {
+            times.call(&Dispatch {
                 kernel: "render",
                 took: Duration::from_millis(i),
                 by_device: true,

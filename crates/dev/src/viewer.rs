@@ -12,11 +12,11 @@ use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, sleep, timeout};
 
 use super::messages::{self, Command};
-use super::object::{Listed, Object, SceneView};
+use super::object::{Object, ObjectList, SceneView};
 use super::picture::Frame;
 use super::shared::Shared;
 use super::times::Time;
-use wgray_image::visible::visible;
+use wgray_image::sanitize::escape_control;
 use wgray_scene::cut;
 
 /// Maximum number of frames that are sent but not acknowledged: the page draws one while the next one arrives. More would
@@ -37,7 +37,7 @@ const PING_INTERVAL: Duration = Duration::from_secs(15);
 #[derive(Debug, PartialEq)]
 enum Request {
     /// Acknowledges the frame of this number and all before it. There is no answer.
-    Shown(u64),
+    ErrorImage(u64),
     Question(Question),
     Command(Command),
 }
@@ -76,7 +76,7 @@ struct Inspect {
 impl Request {
     /// Parses a message: the name of a command, or an object with that name as its only key.
     fn parse(message: &str) -> Result<Request, String> {
-        let plain = |error: serde_json::Error| visible(&cut(&error.to_string())).into_owned();
+        let plain = |error: serde_json::Error| escape_control(&cut(&error.to_string())).into_owned();
         let value: Json = serde_json::from_str(message).map_err(|error| format!("not JSON: {}", plain(error)))?;
         let name = match &value {
             Json::String(name) => Some(name),
@@ -87,12 +87,12 @@ impl Request {
             name.ok_or("a message must be the name of a command, or an object with that name as its only key")?;
         // From the text again: a JSON value hides that a key occurs twice.
         let parsed = match name.as_str() {
-            "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::Shown(shown)),
+            "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::ErrorImage(shown)),
             name if QUESTIONS.contains(&name) => serde_json::from_str(message).map(Request::Question),
             _ => serde_json::from_str(message).map(Request::Command),
         };
         parsed.map_err(|error| {
-            let shown = visible(&cut(name)).into_owned();
+            let shown = escape_control(&cut(name)).into_owned();
             match error.to_string().starts_with(&format!("unknown variant `{name}`")) {
                 true => format!("unknown command \"{shown}\""),
                 false => format!("invalid arguments of \"{shown}\": {}", plain(error)),
@@ -112,7 +112,7 @@ enum Reply<'a> {
         values: Vec<(&'static str, String)>,
     },
     Object(Box<Object>),
-    Objects(Listed),
+    Objects(ObjectList),
     /// The number of an accepted command; [`messages::State::heard`] reaches it once the command is executed.
     Asked(u64),
     #[serde(rename = "refused")]
@@ -147,7 +147,7 @@ async fn receive(
             Message::Ping(_) | Message::Pong(_) => continue,
         };
         let reply = match Request::parse(&text) {
-            Ok(Request::Shown(number)) => {
+            Ok(Request::ErrorImage(number)) => {
                 shown.send_replace(number);
                 continue;
             }
@@ -240,7 +240,7 @@ async fn answer(question: Question, shared: &Shared) -> Reply<'static> {
             Reply::Object(Box::new(found))
         }
         Question::Objects(part) => {
-            Reply::Objects(of_scene(shared, Listed::default, move |seen| seen.objects(&part)).await)
+            Reply::Objects(of_scene(shared, ObjectList::default, move |seen| seen.objects(&part)).await)
         }
     }
 }
@@ -277,7 +277,7 @@ mod tests {
     #[test]
     fn messages_are_parsed_and_errors_name_the_command() {
         assert_eq!(Request::parse("\"grab\""), Ok(Request::Command(Command::Grab)));
-        assert_eq!(Request::parse("{\"shown\":7}"), Ok(Request::Shown(7)));
+        assert_eq!(Request::parse("{\"shown\":7}"), Ok(Request::ErrorImage(7)));
         let pixel = Request::Question(Question::Pixel([1, 2]));
         assert_eq!(Request::parse("{\"pixel\":[1,2]}"), Ok(pixel));
         for (message, error) in [

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
-use crate::contain::catch_panic;
+use crate::panic_guard::catch_panic;
 
 /// The last chunk of a PNG file (PNG, third edition, 11.2.5).
 const PNG_END: &[u8] = b"\0\0\0\0IEND\xae\x42\x60\x82";

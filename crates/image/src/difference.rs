@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn no_number_is_never_within_the_tolerance() {
+    fn nan_is_never_within_the_tolerance() {
         let (a, b) = (picture(&[[0.0; 3]]), picture(&[[f32::NAN, 0.0, 0.0]]));
         let found = difference(&a, &b, f32::MAX).unwrap();
         assert_eq!((found.unequal, found.beyond), (1, 1));
@@ -79,12 +79,12 @@ mod tests {
         assert_eq!(
             difference(&b, &b, 0.0).unwrap().beyond,
             0,
-            "the same bits are no difference"
+            "equal bits count as a difference"
         );
     }
 
     #[test]
-    fn pictures_of_different_sizes_are_not_compared() {
+    fn images_of_different_sizes_are_not_compared() {
         assert_eq!(difference(&picture(&[[0.0; 3]]), &picture(&[]), 1.0), None);
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
-use super::output::{Output, Place, named, open};
+use super::output::{Destination, Output, named, open};
 use super::temporary;
 
 /// An unfinished output, deleted when dropped. Its errors name the output.
@@ -62,12 +62,12 @@ impl Pending {
     pub fn start(output: Output) -> io::Result<Pending> {
         let name = output.name().to_owned();
         let spool = match output.place {
-            Place::File { path, there } => {
+            Destination::File { path, there } => {
                 beside(&path).map(|file| Spool::Beside(file, path, there.map(|(_, permissions)| permissions)))
             }
-            Place::Through { file: Some(file), .. } => nameless(file),
-            Place::Through { path, file: None, .. } => open(&path).and_then(nameless),
-            Place::Standard(stream) => stream.file().and_then(nameless),
+            Destination::Through { file: Some(file), .. } => nameless(file),
+            Destination::Through { path, file: None, .. } => open(&path).and_then(nameless),
+            Destination::Standard(stream) => stream.file().and_then(nameless),
         };
         Ok(Pending {
             output: BufWriter::new(spool.map_err(|error| named(&name, &error))?),
@@ -157,7 +157,7 @@ fn nameless(to: File) -> io::Result<Spool> {
 }
 
 /// Maximum part of the target's name in a temporary name, in bytes.
-const LONGEST_NAME: usize = 120;
+const MAX_NAME_BYTES: usize = 120;
 
 /// Prefix and suffix of a temporary name: `.wgray-PID@HOST-` and `-NAME`, around a random part.
 struct Name {
@@ -168,7 +168,7 @@ struct Name {
 impl Name {
     fn of(path: &Path) -> Name {
         let mut name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        name.truncate(name.floor_char_boundary(LONGEST_NAME));
+        name.truncate(name.floor_char_boundary(MAX_NAME_BYTES));
         Name {
             host: host(),
             end: format!("-{name}"),
@@ -262,7 +262,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_names_of_this_program_this_machine_and_this_file_fit() {
+    fn temporary_names_match_program_machine_and_target() {
         let name = Name::of(Path::new("folder/out.png"));
         let host = host();
         assert!(name.fits(&format!("{}aB3dE6-out.png", name.start(123))));

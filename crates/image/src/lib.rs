@@ -2,20 +2,20 @@
 //! layer of wgray shares.
 
 mod agx;
+pub mod blocking_path;
 pub mod color;
 pub mod compare;
 mod complete;
-pub mod contain;
 mod difference;
 mod file;
 pub mod memory;
 mod output;
+pub mod panic_guard;
 mod pixels;
 mod region;
+pub mod sanitize;
 mod temporary;
 mod view;
-pub mod visible;
-pub mod waiting;
 
 pub use complete::is_complete;
 pub use difference::{Difference, difference};

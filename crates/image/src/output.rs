@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Output {
     name: String,
-    pub(super) place: Place,
+    pub(super) place: Destination,
 }
 
 #[derive(Debug)]
-pub(super) enum Place {
+pub(super) enum Destination {
     /// A regular file, which may not exist yet.
     File {
         /// Path without symbolic links.
@@ -80,7 +80,7 @@ impl Output {
     pub fn standard() -> Output {
         Output {
             name: "standard output".to_owned(),
-            place: Place::Standard(Stream::Output),
+            place: Destination::Standard(Stream::Output),
         }
     }
 
@@ -104,7 +104,7 @@ impl Output {
     ///
     /// The pipe or device cannot be opened.
     pub fn connect(&mut self) -> io::Result<()> {
-        if let Place::Through { path, file, .. } = &mut self.place {
+        if let Destination::Through { path, file, .. } = &mut self.place {
             *file = Some(open(path).map_err(|error| named(&self.name, &error))?);
         }
         Ok(())
@@ -117,11 +117,11 @@ impl Output {
     /// The errors of [`Output::find`], and anything that is not a regular file.
     pub fn again(&self) -> io::Result<Output> {
         let again = match &self.place {
-            Place::File { path, .. } => place(path),
+            Destination::File { path, .. } => place(path),
             _ => Err(io::ErrorKind::Unsupported.into()),
         };
         match again {
-            Ok(place @ Place::File { .. }) => Ok(Output {
+            Ok(place @ Destination::File { .. }) => Ok(Output {
                 name: self.name.clone(),
                 place,
             }),
@@ -137,13 +137,13 @@ impl Output {
 
     /// Returns true for a regular file, which may not exist yet.
     pub fn is_file(&self) -> bool {
-        matches!(self.place, Place::File { .. })
+        matches!(self.place, Destination::File { .. })
     }
 
     /// Returns the path of a regular file, without symbolic links.
     pub fn path(&self) -> Option<&Path> {
         match &self.place {
-            Place::File { path, .. } => Some(path),
+            Destination::File { path, .. } => Some(path),
             _ => None,
         }
     }
@@ -153,7 +153,7 @@ impl Output {
     pub fn is_same(&self, other: &Output) -> bool {
         let same_path = self.path().is_some() && self.path() == other.path();
         let same_stream = match (&self.place, &other.place) {
-            (Place::Standard(a), Place::Standard(b)) => a == b,
+            (Destination::Standard(a), Destination::Standard(b)) => a == b,
             _ => false,
         };
         let identities = self.identity().zip(other.identity());
@@ -169,9 +169,9 @@ impl Output {
 
     fn identity(&self) -> Option<Identity> {
         match &self.place {
-            Place::File { there, .. } => there.as_ref().map(|(identity, _)| identity.clone()),
-            Place::Through { identity, .. } => Some(identity.clone()),
-            Place::Standard(stream) => {
+            Destination::File { there, .. } => there.as_ref().map(|(identity, _)| identity.clone()),
+            Destination::Through { identity, .. } => Some(identity.clone()),
+            Destination::Standard(stream) => {
                 let data = stream.file().and_then(|file| file.metadata());
                 data.ok().map(|data| Identity::of(&data))
             }
@@ -212,7 +212,7 @@ pub(super) fn open(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).open(path)
 }
 
-fn place(path: &Path) -> io::Result<Place> {
+fn place(path: &Path) -> io::Result<Destination> {
     if path.as_os_str().as_encoded_bytes().ends_with(b"/") {
         return Err(folder());
     }
@@ -231,7 +231,7 @@ fn place(path: &Path) -> io::Result<Place> {
         })?;
         path = parent.join(file_name);
         if let Some(stream) = stream(&path) {
-            return Ok(Place::Standard(stream));
+            return Ok(Destination::Standard(stream));
         }
         match fs::symlink_metadata(&path) {
             Ok(data) if data.is_symlink() => {
@@ -253,14 +253,14 @@ fn place(path: &Path) -> io::Result<Place> {
             }
             open(&path)?;
             let there = Some((Identity::of(&data), data.permissions()));
-            Ok(Place::File { path, there })
+            Ok(Destination::File { path, there })
         }
-        Ok(data) => Ok(Place::Through {
+        Ok(data) => Ok(Destination::Through {
             identity: Identity::of(&data),
             path,
             file: None,
         }),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Place::File { path, there: None }),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Destination::File { path, there: None }),
         Err(error) => Err(error),
     }
 }

@@ -58,11 +58,11 @@ pub struct ViewSettings {
 
 impl ViewSettings {
     /// Maximum exposure in stops, up or down. It keeps light far from the limits of 64-bit floats.
-    pub const MOST_STOPS: f64 = 100.0;
+    pub const MAX_STOPS: f64 = 100.0;
 
     /// Returns the exposure, or the rule that it violates.
     pub fn check_exposure(stops: f64) -> Result<f64, String> {
-        match stops.abs() <= ViewSettings::MOST_STOPS {
+        match stops.abs() <= ViewSettings::MAX_STOPS {
             true => Ok(stops),
             false => Err("must be from -100 to 100 stops".to_owned()),
         }
@@ -103,8 +103,8 @@ impl ViewSettings {
     /// Returns the straight (not premultiplied) display values of a color that is premultiplied by alpha, black where
     /// alpha is 0, and the linear alpha.
     pub fn display_straight(&self, linear: [f32; 3], alpha: f32) -> [f64; 4] {
-        let by_itself = linear.map(|value| if alpha > 0.0 { value / alpha } else { 0.0 });
-        let [r, g, b] = self.display(by_itself);
+        let standalone_prim = linear.map(|value| if alpha > 0.0 { value / alpha } else { 0.0 });
+        let [r, g, b] = self.display(standalone_prim);
         [r, g, b, sane(alpha).min(1.0)]
     }
 
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn the_light_of_a_displayed_color_is_displayed_as_it() {
+    fn light_of_inverts_display() {
         for transform in ViewTransform::ALL {
             for exposure in [0.0, -2.0, 3.5] {
                 let view = ViewSettings { transform, exposure };
@@ -293,7 +293,7 @@ mod tests {
 
     /// Checks each branch of the curve and the point where they meet.
     #[test]
-    fn srgb_has_the_values_of_its_standard() {
+    fn srgb_matches_the_standard() {
         for (linear, shown) in [
             (0.0, 0.0),
             (0.001, 0.01292),
@@ -307,14 +307,14 @@ mod tests {
             assert!(apart(found, [shown; 3]) < 1e-6, "{linear}: {found:?}");
         }
         let gamma = view(ViewTransform::Gamma22).display([0.5; 3]);
-        assert!(apart(gamma, [0.735_356_98; 3]) > 1e-3, "another curve is seen");
+        assert!(apart(gamma, [0.735_356_98; 3]) > 1e-3, "another curve passes");
     }
 
     /// Checks the formulas of the specification: grays lose 0.04 up to 0.8, and grays up to 0.08 become x² / 0.16.
     /// Primaries up to 0.76 are kept. Above, the peak becomes 1 - 0.0576 / (x - 0.52) and the other channels move
     /// towards it.
     #[test]
-    fn neutral_keeps_colours_up_to_a_brightness() {
+    fn pbr_neutral_matches_the_specification() {
         let neutral = view(ViewTransform::KhronosPbrNeutral);
         let srgb = view(ViewTransform::Srgb);
         for (light, linear) in [
@@ -357,7 +357,7 @@ mod tests {
 
     /// Reference values of `benches/peers/view_check.py`: its numpy formula, and Blender's tables.
     #[test]
-    fn agx_is_that_of_blender() {
+    fn agx_matches_blender() {
         let agx = view(ViewTransform::Agx);
         for (light, formula, blender) in [
             ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
@@ -390,7 +390,7 @@ mod tests {
         let grey = agx.display([0.18; 3]);
         assert!(
             apart(grey, view(ViewTransform::Srgb).display([0.18; 3])) < 2e-4,
-            "middle grey stays"
+            "middle gray changes"
         );
         assert!(apart(agx.display([1.0; 3]), view(ViewTransform::Srgb).display([1.0; 3])) > 0.2);
     }
@@ -406,7 +406,11 @@ mod tests {
             assert_eq!(brighter.display(light), view(transform).display(light.map(|x| 2.0 * x)));
             assert_ne!(brighter.display(light), view(transform).display(light));
             let share = brighter.display_share(light);
-            assert_eq!(share, view(transform).display_share(light), "an albedo is no light");
+            assert_eq!(
+                share,
+                view(transform).display_share(light),
+                "the exposure changes an albedo"
+            );
         }
         for (stops, fits) in [
             (100.0, true),
@@ -421,7 +425,7 @@ mod tests {
 
     /// Any rendered value must map to 0 ... 1.
     #[test]
-    fn every_value_can_be_shown() {
+    fn every_value_has_a_display_value() {
         let values = [
             f32::NAN,
             f32::INFINITY,
@@ -462,7 +466,7 @@ mod tests {
 
     /// Brighter light must not be displayed darker.
     #[test]
-    fn greys_keep_their_order() {
+    fn grays_keep_their_order() {
         for transform in ViewTransform::ALL {
             let mut last = 0.0;
             for i in 0..4000 {
@@ -470,7 +474,7 @@ mod tests {
                 let [r, g, b] = view(transform).display([light; 3]);
                 assert!(
                     (r - g).abs() < 1e-6 && (g - b).abs() < 1e-6,
-                    "{transform:?}: {light} is grey: {r} {g} {b}"
+                    "{transform:?}: {light} is not gray: {r} {g} {b}"
                 );
                 assert!(r >= last - 1e-9, "{transform:?}: {light}: {r} after {last}");
                 last = r;

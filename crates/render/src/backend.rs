@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::error::RenderError;
-use crate::film::{Film, Form};
+use crate::film::{Film, FilmLayout};
 use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
 
@@ -16,7 +16,7 @@ use wgray_image::Region;
 /// - Initially no film exists. [`begin`](Backend::begin) creates an empty one. [`resume`](Backend::resume) continues
 ///   one that was read earlier, possibly from another backend. Both replace the current film.
 /// - A film covers a region of the image. It may have no pixels.
-/// - A film has the scene's [form](crate::film::Form): moments and pilot statistics under adaptive sampling, and layers
+/// - A film has the scene's [film_layout](crate::film::Form): moments and pilot statistics under adaptive sampling, and layers
 ///   if they were requested ([`Packed::with_layers`]). Layers do not change the bits of the other lists.
 /// - [`film`](Backend::film) copies the film. It can be called whenever nothing is pending, and changes nothing.
 ///
@@ -94,13 +94,13 @@ pub trait Backend {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rules {
     picture: Region,
-    form: Form,
-    first_look: u32,
+    film_layout: FilmLayout,
+    pilot_samples: u32,
 }
 
 /// The state of a film that the checks depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Started {
+pub(crate) struct FilmState {
     pub region: Region,
     /// Number of pilot samples so far, over all pixels.
     first_samples: u64,
@@ -110,15 +110,15 @@ impl Rules {
     pub fn of(scene: &Packed) -> Rules {
         Rules {
             picture: Region::whole(scene.camera.width, scene.camera.height),
-            form: scene.form(),
-            first_look: scene.specialization.pilot_samples,
+            film_layout: scene.film_layout(),
+            pilot_samples: scene.specialization.pilot_samples,
         }
     }
 
     /// The form of a film.
     #[cfg(feature = "gpu")]
-    pub fn form(&self) -> Form {
-        self.form
+    pub fn film_layout(&self) -> FilmLayout {
+        self.film_layout
     }
 
     #[cfg(feature = "gpu")]
@@ -133,40 +133,40 @@ impl Rules {
     }
 
     pub fn samples_of_all(&self) -> u32 {
-        match self.form.adaptive {
-            true => self.first_look,
+        match self.film_layout.adaptive {
+            true => self.pilot_samples,
             false => u32::MAX,
         }
     }
 
     pub fn around(&self, region: Region) -> Region {
-        match self.form.adaptive {
+        match self.film_layout.adaptive {
             true => region.with_neighbors().within(self.picture),
             false => region,
         }
     }
 
     pub fn empty_film(&self, region: Region) -> Film {
-        Film::of(region, self.form)
+        Film::of(region, self.film_layout)
     }
 
     pub fn in_picture(&self, region: Region) -> Result<(), RenderError> {
         inside("region", region, "picture", self.picture)
     }
 
-    pub fn begin(&self, region: Region) -> Result<Started, RenderError> {
+    pub fn begin(&self, region: Region) -> Result<FilmState, RenderError> {
         self.in_picture(region)?;
-        Ok(Started {
+        Ok(FilmState {
             region,
             first_samples: 0,
         })
     }
 
-    pub fn resume(&self, film: &Film) -> Result<Started, RenderError> {
+    pub fn resume(&self, film: &Film) -> Result<FilmState, RenderError> {
         self.in_picture(film.region)?;
         let pixels = film.region.pixels();
         let of = |there: bool| if there { pixels } else { 0 };
-        let Form { adaptive, layers } = self.form;
+        let FilmLayout { adaptive, layers } = self.film_layout;
         let with = |there: bool| if there { "with" } else { "without" };
         let sampling = format!("a scene {} adaptive sampling", with(adaptive));
         let asked = format!("a scene {} layers", with(layers));
@@ -184,26 +184,26 @@ impl Rules {
                 )));
             }
         }
-        let first = |count: u32| u64::from(count.min(self.first_look));
-        Ok(Started {
+        let first = |count: u32| u64::from(count.min(self.pilot_samples));
+        Ok(FilmState {
             region: film.region,
             first_samples: film.sample_counts().map(first).sum(),
         })
     }
 
     /// Checks a dispatch and counts its pilot samples. Returns false if it is empty.
-    pub fn call(&self, film: &mut Started, tile: Region, samples: &Range<u32>) -> Result<bool, RenderError> {
+    pub fn call(&self, film: &mut FilmState, tile: Region, samples: &Range<u32>) -> Result<bool, RenderError> {
         if tile.is_empty() || samples.is_empty() {
             return Ok(false);
         }
         inside("tile", tile, "film", film.region)?;
-        if self.form.adaptive {
-            let first = samples.end.min(self.first_look).saturating_sub(samples.start);
+        if self.film_layout.adaptive {
+            let first = samples.end.min(self.pilot_samples).saturating_sub(samples.start);
             let there = film.first_samples + tile.pixels() * u64::from(first);
-            if samples.end > self.first_look && there < film.region.pixels() * u64::from(self.first_look) {
+            if samples.end > self.pilot_samples && there < film.region.pixels() * u64::from(self.pilot_samples) {
                 return Err(RenderError::PilotIncomplete {
                     samples: samples.clone(),
-                    first: self.first_look,
+                    first: self.pilot_samples,
                 });
             }
             film.first_samples = there;
@@ -213,8 +213,8 @@ impl Rules {
 
     /// Returns the end of the samples that one kernel can process: either pilot samples or further ones.
     pub fn end_of_part(&self, samples: &Range<u32>) -> u32 {
-        match self.form.adaptive && samples.start < self.first_look {
-            true => samples.end.min(self.first_look),
+        match self.film_layout.adaptive && samples.start < self.pilot_samples {
+            true => samples.end.min(self.pilot_samples),
             false => samples.end,
         }
     }

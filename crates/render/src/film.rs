@@ -6,14 +6,14 @@ use wgray_image::Region;
 
 /// The optional lists of a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Form {
+pub struct FilmLayout {
     /// Moments and pilot statistics, for adaptive sampling.
     pub adaptive: bool,
     /// The sums of each [`Layer`].
     pub layers: bool,
 }
 
-impl Form {
+impl FilmLayout {
     /// Returns the number of lists.
     pub fn lists(self) -> usize {
         let (adaptive, layers) = (usize::from(self.adaptive), usize::from(self.layers));
@@ -62,7 +62,7 @@ pub struct Film {
     /// rgb: sum of squared deviations from the mean; a: number of samples. Empty without adaptive sampling.
     pub moments: Vec<Vec4>,
     /// Statistics of the pilot samples, for the neighbors. Empty without adaptive sampling.
-    pub looks: Vec<Vec4>,
+    pub pilot_sums: Vec<Vec4>,
     /// Weighted sums of each [`Layer`]. Empty unless layers were requested.
     pub layers: [Vec<Vec4>; Layer::ALL.len()],
 }
@@ -70,20 +70,20 @@ pub struct Film {
 impl Film {
     /// Returns an empty film without moments and layers.
     pub fn new(region: Region) -> Film {
-        Film::of(region, Form::default())
+        Film::of(region, FilmLayout::default())
     }
 
     /// Returns an empty film for adaptive sampling.
     pub fn adaptive(region: Region) -> Film {
-        let form = Form {
+        let film_layout = FilmLayout {
             adaptive: true,
-            ..Form::default()
+            ..FilmLayout::default()
         };
-        Film::of(region, form)
+        Film::of(region, film_layout)
     }
 
     /// Returns an empty film.
-    pub fn of(region: Region, form: Form) -> Film {
+    pub fn of(region: Region, film_layout: FilmLayout) -> Film {
         let list = |there: bool| match there {
             true => vec![Vec4::zeroed(); region.pixels() as usize],
             false => Vec::new(),
@@ -91,15 +91,15 @@ impl Film {
         Film {
             region,
             sums: list(true),
-            moments: list(form.adaptive),
-            looks: list(form.adaptive),
-            layers: std::array::from_fn(|_| list(form.layers)),
+            moments: list(film_layout.adaptive),
+            pilot_sums: list(film_layout.adaptive),
+            layers: std::array::from_fn(|_| list(film_layout.layers)),
         }
     }
 
     /// Returns the form; a film without pixels has the default one.
-    pub fn form(&self) -> Form {
-        Form {
+    pub fn film_layout(&self) -> FilmLayout {
+        FilmLayout {
             adaptive: !self.moments.is_empty(),
             layers: self.has_layers(),
         }
@@ -111,10 +111,10 @@ impl Film {
             region: _,
             sums,
             moments,
-            looks,
+            pilot_sums,
             layers,
         } = self;
-        [sums, moments, looks].into_iter().chain(layers)
+        [sums, moments, pilot_sums].into_iter().chain(layers)
     }
 
     /// Returns [`Film::lists`] mutably.
@@ -123,10 +123,10 @@ impl Film {
             region: _,
             sums,
             moments,
-            looks,
+            pilot_sums,
             layers,
         } = self;
-        [sums, moments, looks].into_iter().chain(layers)
+        [sums, moments, pilot_sums].into_iter().chain(layers)
     }
 
     /// Returns the part of the film in a region, which must lie inside it.
@@ -145,7 +145,7 @@ impl Film {
             region: part,
             sums: of_part(&self.sums),
             moments: of_part(&self.moments),
-            looks: of_part(&self.looks),
+            pilot_sums: of_part(&self.pilot_sums),
             layers: self.layers.each_ref().map(|list| of_part(list)),
         }
     }

@@ -102,15 +102,15 @@ pub fn asset_root(folder: &Path) -> PathBuf {
 
 pub fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Description, SceneError> {
     let course = read_json(text, defines).map_err(|broken| match broken {
-        Broken::Values(problems) => {
+        ReadFault::Values(problems) => {
             let error = |at, problem: Problem| syntax_error(origin, place(text, at), problem.to_string());
             match problems.of_define(defines) {
                 Some(error) => error,
                 None => problems.into_error(|problem| begin(text, &problem.key), error),
             }
         }
-        Broken::Text(error, key) => text_error(text, origin, error, key),
-        Broken::Large => {
+        ReadFault::Text(error, key) => text_error(text, origin, error, key),
+        ReadFault::Large => {
             let rule = format!("a JSON scene must not be larger than {} MiB", LARGEST >> 20);
             syntax_error(origin, (1, 1), rule)
         }
@@ -139,7 +139,7 @@ pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) 
 }
 
 /// Reason why a text cannot be read.
-enum Broken {
+enum ReadFault {
     Text(serde_json::Error, KeyPath),
     /// Invalid types or keys.
     Values(Problems),
@@ -177,24 +177,24 @@ fn syntax_error(origin: &str, (line, column): (usize, usize), message: String) -
     }
 }
 
-fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
+fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
     if text.len() > LARGEST {
-        return Err(Broken::Large);
+        return Err(ReadFault::Large);
     }
     let mut deserializer = serde_json::Deserializer::from_str(text);
     let value: Value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         let key = KeyPath(parse::segments(error.path()));
-        Broken::Text(error.into_inner(), key)
+        ReadFault::Text(error.into_inner(), key)
     })?;
     let end = deserializer.end();
-    end.map_err(|error| Broken::Text(error, KeyPath::default()))?;
+    end.map_err(|error| ReadFault::Text(error, KeyPath::default()))?;
     let Value::Table(mut table) = value else {
         let message = format!("{} must be an object: {{ \"spp\": ... }}", cut(&one_line(text)));
-        return Err(Broken::Values(Problem::new(message).into()));
+        return Err(ReadFault::Values(Problem::new(message).into()));
     };
     defines
         .put(&[], &mut table, |_| false)
-        .map_err(|problem| Broken::Values(problem.into()))?;
+        .map_err(|problem| ReadFault::Values(problem.into()))?;
     let in_json = |problem: Problem| {
         // It is worded for TOML.
         let shown = find(text, &problem.key).filter(|value| value.starts_with('{'));
@@ -209,7 +209,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
         let message = message.replace("must be a table", "must be an object");
         Problem { message, ..problem }
     };
-    parse::read_for(table, Integrator::Path).map_err(|problems| Broken::Values(problems.map(in_json)))
+    parse::read_for(table, Integrator::Path).map_err(|problems| ReadFault::Values(problems.map(in_json)))
 }
 
 /// Validates values whose errors must show the numbers of the file, which the conversion to +Z up changes.

@@ -14,7 +14,7 @@ use super::ktx2::{self, Ktx2};
 use super::texture::{Image, Texels};
 
 /// Maximum number of texels along a side.
-pub(super) const LONGEST_SIDE: u32 = 16_384;
+pub(super) const MAX_IMAGE_SIDE: u32 = 16_384;
 /// Memory limit of a decoder besides the image, in bytes: rows, tables and parts of a compressed file.
 const BESIDE: usize = 64 << 20;
 
@@ -91,7 +91,7 @@ impl Header {
 }
 
 /// Reason for rejecting an image.
-pub(super) enum Refused {
+pub(super) enum DecodeError {
     Image(ImageError),
     /// A violated rule of the caller.
     Rule(String),
@@ -110,15 +110,15 @@ pub(super) struct Channels {
     pub are_deep: bool,
 }
 
-impl From<ImageError> for Refused {
+impl From<ImageError> for DecodeError {
     fn from(error: ImageError) -> Self {
-        Refused::Image(error)
+        DecodeError::Image(error)
     }
 }
 
-impl From<png::DecodingError> for Refused {
+impl From<png::DecodingError> for DecodeError {
     fn from(error: png::DecodingError) -> Self {
-        Refused::Image(match error {
+        DecodeError::Image(match error {
             png::DecodingError::LimitsExceeded => LimitErrorKind::InsufficientMemory.into_error(),
             other => ImageError::Decoding(DecodingError::new(ImageFormat::Png.into(), other)),
         })
@@ -140,7 +140,7 @@ pub(super) fn decode(
     bytes: &[u8],
     format: Format,
     fits: impl Fn(Header) -> Result<(), String>,
-) -> Result<DynamicImage, Refused> {
+) -> Result<DynamicImage, DecodeError> {
     let format = match format {
         Format::Image(format) => format,
         Format::Ktx2 => return decode_ktx2(bytes, fits),
@@ -167,8 +167,8 @@ pub(super) fn decode(
     }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();
-    limits.max_image_width = Some(LONGEST_SIDE);
-    limits.max_image_height = Some(LONGEST_SIDE);
+    limits.max_image_width = Some(MAX_IMAGE_SIDE);
+    limits.max_image_height = Some(MAX_IMAGE_SIDE);
     reader.limits(limits);
     let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
@@ -183,55 +183,55 @@ pub(super) fn decode(
 }
 
 /// Rejects an image that is too large for the size of its file.
-fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Result<(), Refused> {
+fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Result<(), DecodeError> {
     let bytes = u64::from(width) * u64::from(height) * bytes_of_texel;
     let length = file.len() as u64;
     let most = LARGEST.0 + length * LARGEST.1;
     match bytes <= most {
         true => Ok(()),
-        false => Err(Refused::Large(format!(
+        false => Err(DecodeError::Large(format!(
             "has {width} x {height} texels and needs {bytes} bytes; the limit for a file of {length} bytes is {most} bytes"
         ))),
     }
 }
 
 /// Rejects an EXR file with too many texels that are not stored and do not add to its size.
-fn weigh_blank(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), Refused> {
+fn weigh_blank(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), DecodeError> {
     let blank = (u64::from(width) * u64::from(height)).saturating_sub(stored);
     let (bytes, length) = (blank * 3 * size_of::<f32>() as u64, file.len() as u64);
     let most = BLANK + length * LARGEST.1;
     match bytes <= most {
         true => Ok(()),
-        false => Err(Refused::Large(format!(
+        false => Err(DecodeError::Large(format!(
             "declares {width} x {height} texels and stores {stored}; the rest needs {bytes} bytes; the limit for a file of {length} bytes is {most} bytes"
         ))),
     }
 }
 
-fn sides((width, height): (u32, u32)) -> Result<(), Refused> {
-    match width.max(height) <= LONGEST_SIDE {
+fn sides((width, height): (u32, u32)) -> Result<(), DecodeError> {
+    match width.max(height) <= MAX_IMAGE_SIDE {
         true => Ok(()),
         false => Err(LimitErrorKind::DimensionError.into_error().into()),
     }
 }
 
-fn check(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), Refused> {
+fn check(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), DecodeError> {
     sides((header.width, header.height))?;
-    fits(header).map_err(Refused::Rule)
+    fits(header).map_err(DecodeError::Rule)
 }
 
-fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, Refused> {
-    let file = Ktx2::parse(bytes).map_err(Refused::Damaged)?;
+fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
+    let file = Ktx2::parse(bytes).map_err(DecodeError::Damaged)?;
     let (width, height) = (file.width, file.height);
     let is_deep = false;
     check(Header { width, height, is_deep }, fits)?;
     weigh(bytes, (width, height), 4)?;
-    file.decode().map_err(Refused::Damaged)
+    file.decode().map_err(DecodeError::Damaged)
 }
 
 /// Uses the PNG crate directly: it can skip color profiles and texts, whose decompressed size is unknown before
 /// decoding.
-fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, Refused> {
+fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);
     options.set_ignore_iccp_chunk(true);

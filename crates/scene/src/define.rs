@@ -217,7 +217,7 @@ radius = 0.5
         Scene::parse_with(text, "s.toml", &overrides)
     }
 
-    fn told(define: &str) -> String {
+    fn error_of(define: &str) -> String {
         parse(SCENE, &[define]).unwrap_err().to_string()
     }
 
@@ -227,7 +227,7 @@ radius = 0.5
     }
 
     #[test]
-    fn a_defined_scene_is_that_of_an_edited_file() {
+    fn a_define_equals_an_edit_of_the_file() {
         for (define, from, to) in [
             ("image.width=7", "width = 4", "width = 7"),
             ("camera.fov=50.5", "fov = 40", "fov = 50.5"),
@@ -273,7 +273,7 @@ radius = 0.5
     }
 
     #[test]
-    fn later_ones_go_before_and_options_before_all() {
+    fn later_defines_and_options_take_precedence() {
         let scene = parse(SCENE, &["render.seed=3", "image.width=9", "render={}", "render.seed=5"]).unwrap();
         assert_eq!((scene.render.seed, scene.width), (5, 9));
         let overrides = Overrides {
@@ -287,7 +287,7 @@ radius = 0.5
     }
 
     #[test]
-    fn a_bad_value_is_told_as_the_options_own() {
+    fn invalid_values_name_the_define() {
         for (define, message) in [
             ("camera.fov=x", "camera.fov: \"x\" must be a number"),
             ("camera.fov=180", "camera.fov: 180 must be from 0.001 to 179.999"),
@@ -340,9 +340,9 @@ radius = 0.5
             ("image={width=4}", "image.height is missing"),
         ] {
             assert!(
-                told(define).starts_with(&format!("define.{message}")),
+                error_of(define).starts_with(&format!("define.{message}")),
                 "{define}: {}",
-                told(define)
+                error_of(define)
             );
         }
         // Errors in values of the file name the file.
@@ -358,7 +358,7 @@ radius = 0.5
     }
 
     #[test]
-    fn what_is_no_key_or_no_value_is_told() {
+    fn invalid_keys_and_values_are_errors() {
         let rule = "must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5";
         for text in [
             "",
@@ -397,13 +397,13 @@ radius = 0.5
             ("a=[1] x", "a: [1] x must be TOML: "),
             ("a=1\nb=2", "a: 1 b=2 must be TOML: there is text after the value"),
         ] {
-            let told = text.parse::<Define>().unwrap_err().to_string();
-            assert!(told.starts_with(message), "{text}: {told}");
+            let error = text.parse::<Define>().unwrap_err().to_string();
+            assert!(error.starts_with(message), "{text}: {error}");
         }
     }
 
     #[test]
-    fn what_is_no_value_of_toml_is_a_text() {
+    fn text_that_is_not_toml_is_a_string() {
         for (text, wanted) in [
             ("3", Value::Integer(3)),
             ("-0.5", Value::Float(-0.5)),
@@ -427,20 +427,20 @@ radius = 0.5
     }
 
     #[test]
-    fn a_path_is_no_deeper_than_a_file() {
+    fn path_depth_is_limited() {
         let path = |steps: usize| format!("{}=1", vec!["a"; steps].join("."));
         assert!(path(MAX_SEGMENTS).parse::<Define>().is_ok());
         for steps in [MAX_SEGMENTS + 1, 100_000] {
-            let told = path(steps).parse::<Define>().unwrap_err().to_string();
-            assert!(told.ends_with(".a=1 must have at most 80 steps"), "{told}");
-            assert!(told.len() < 100, "{told}");
+            let error = path(steps).parse::<Define>().unwrap_err().to_string();
+            assert!(error.ends_with(".a=1 must have at most 80 steps"), "{error}");
+            assert!(error.len() < 100, "{error}");
         }
         let numbers = format!("a{}=1", "[0]".repeat(MAX_SEGMENTS));
         assert!(numbers.parse::<Define>().is_err());
     }
 
     #[test]
-    fn a_large_file_takes_values_part_by_part() {
+    fn defines_apply_to_large_files() {
         let shape = "[[shapes]]\ntype = 'sphere'\nmaterial = 'red'\ncenter = [0, 0, 9]\nradius = 0.125\n";
         let large = format!("{SCENE}{}", shape.repeat((5 << 20) / shape.len()));
         assert!(large.len() > 4 << 20);
@@ -472,8 +472,8 @@ radius = 0.5
             ("shapes[3].radius=-1", "define.shapes[3].radius: -1 must be"),
             ("shapes[3].size=-1", "define.shapes[3].size: unknown key"),
         ] {
-            let told = parse(&large, &[define]).unwrap_err().to_string();
-            assert!(told.starts_with(message), "{define}: {told}");
+            let error = parse(&large, &[define]).unwrap_err().to_string();
+            assert!(error.starts_with(message), "{define}: {error}");
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::gltf_shape::Expanded;
+use crate::gltf_shape::ExpandedScene;
 use crate::problem::{Problem, Problems};
 use crate::validate::integrator_note;
 use crate::{Assets, Description, Note, Scene, ShapeDescription};
@@ -38,7 +38,7 @@ impl Description {
             .iter()
             .any(|shape| matches!(shape, ShapeDescription::Gltf(_)));
         let expanded = match &settings {
-            Ok(_) if has_gltf => Some(Expanded::of(self, assets, files)),
+            Ok(_) if has_gltf => Some(ExpandedScene::of(self, assets, files)),
             _ => None,
         };
         let mut scene = match expanded {

@@ -11,15 +11,15 @@ use image::error::LimitErrorKind;
 use image::{DynamicImage, ImageError, ImageFormat};
 
 use super::Problem;
-use super::decode::{Channels, Format, Header, LONGEST_SIDE, Refused, decode};
-use super::halves::halved;
+use super::decode::{Channels, DecodeError, Format, Header, MAX_IMAGE_SIDE, decode};
+use super::downsample::halved;
 use super::key_path::list;
 use super::texture::{Encoding, Image, Texels};
 use crate::mesh::{Mesh, in_other_case};
 use wgray_image::color::srgb_to_linear;
 
 /// Maximum size of a file in bytes.
-const LARGEST_FILE: u64 = 512 << 20;
+const MAX_FILE_BYTES: u64 = 512 << 20;
 /// Maximum component of a texel, as of all colors.
 const BRIGHTEST: f32 = 1e6;
 
@@ -47,7 +47,7 @@ pub struct Assets {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Place {
+pub(super) enum AssetKey {
     /// A canonical path.
     File(PathBuf),
     /// An image of [`Assets::images`].
@@ -111,8 +111,10 @@ impl Assets {
             Texels::Bytes(encoding, texels) => (texels.len(), *encoding),
             Texels::Floats(texels) => (texels.len(), Encoding::Linear),
         };
-        if *width.max(height) > LONGEST_SIDE {
-            return Err(format!("{name:?} must have at most {LONGEST_SIDE} texels along a side"));
+        if *width.max(height) > MAX_IMAGE_SIDE {
+            return Err(format!(
+                "{name:?} must have at most {MAX_IMAGE_SIDE} texels along a side"
+            ));
         }
         has_texels(name, *width, *height)?;
         if count as u64 != u64::from(*width) * u64::from(*height) {
@@ -140,22 +142,22 @@ impl Assets {
     pub(super) fn image(
         &self,
         file: &str,
-        place: &Place,
+        place: &AssetKey,
         part: Part,
         fits: impl Fn(Header) -> Result<(), String>,
     ) -> Result<File, Problem> {
         let encoding = part.encoding();
         let bytes = match place {
-            Place::Memory(_) if part == Part::Alpha => {
+            AssetKey::Memory(_) if part == Part::Alpha => {
                 return Err(Problem::new(format!(
                     "{file:?} is an image in memory, which has no alpha channel"
                 )));
             }
-            Place::Memory(_) => return Ok(self.image_in_memory(file, encoding, fits)?),
-            Place::File(path) => Cow::Owned(read(file, path)?),
-            Place::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
+            AssetKey::Memory(_) => return Ok(self.image_in_memory(file, encoding, fits)?),
+            AssetKey::File(path) => Cow::Owned(read(file, path)?),
+            AssetKey::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
         };
-        let is_named = matches!(place, Place::File(_));
+        let is_named = matches!(place, AssetKey::File(_));
         let format = Format::of(&bytes).ok_or_else(|| {
             Problem::damage(match is_named {
                 true => format!("{file:?} must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
@@ -172,7 +174,7 @@ impl Assets {
                 format.name()
             )));
         }
-        let longest = self.longest_side.filter(|_| matches!(place, Place::Encoded(_)));
+        let longest = self.longest_side.filter(|_| matches!(place, AssetKey::Encoded(_)));
         let halvings = |width: u32, height: u32| {
             let sizes = (0..).map(|i| width.max(height) >> i);
             longest.map_or(0, |longest| sizes.take_while(|size| *size > longest.max(1)).count())
@@ -186,11 +188,11 @@ impl Assets {
             })
         };
         let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
-            Refused::Rule(rule) => Problem::new(rule),
-            Refused::Large(rule) => Problem::new(format!("{file:?} {rule}")),
-            Refused::Damaged(rule) => Problem::damage(format!("{file:?} {rule}")),
-            Refused::Channels(channels) => Problem::new(format!("{file:?} {}", refused_channels(&channels))),
-            Refused::Image(error) => Problem {
+            DecodeError::Rule(rule) => Problem::new(rule),
+            DecodeError::Large(rule) => Problem::new(format!("{file:?} {rule}")),
+            DecodeError::Damaged(rule) => Problem::damage(format!("{file:?} {rule}")),
+            DecodeError::Channels(channels) => Problem::new(format!("{file:?} {}", refused_channels(&channels))),
+            DecodeError::Image(error) => Problem {
                 is_damage: !matches!(error, ImageError::Limits(_)),
                 ..Problem::new(format!("{file:?} {}", refused_image(&error)))
             },
@@ -227,15 +229,15 @@ impl Assets {
     }
 
     /// Returns the location of an image.
-    pub(super) fn find(&self, file: &str) -> Result<Place, Problem> {
+    pub(super) fn find(&self, file: &str) -> Result<AssetKey, Problem> {
         if let Some(why) = self.absent.get(file) {
             return Err(Problem::damage(why));
         }
         if self.images.contains_key(file) {
-            return Ok(Place::Memory(file.to_owned()));
+            return Ok(AssetKey::Memory(file.to_owned()));
         }
         if self.encoded.contains_key(file) {
-            return Ok(Place::Encoded(file.to_owned()));
+            return Ok(AssetKey::Encoded(file.to_owned()));
         }
         let path = self.folder.join(file).canonicalize();
         let path = path.map_err(|error| {
@@ -265,7 +267,7 @@ impl Assets {
         if !path.is_file() {
             return Err(Problem::new(format!("{file:?} must be a file")));
         }
-        Ok(Place::File(path))
+        Ok(AssetKey::File(path))
     }
 }
 
@@ -370,15 +372,15 @@ fn check_name(file: &str, format: Format) -> Result<(), String> {
 
 fn read(file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
     let mut bytes = Vec::new();
-    let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
+    let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20));
     // Most large files are rejected without reading them.
-    if fs::metadata(path).is_ok_and(|data| data.len() > LARGEST_FILE) {
+    if fs::metadata(path).is_ok_and(|data| data.len() > MAX_FILE_BYTES) {
         return Err(too_large());
     }
     fs::File::open(path)
-        .and_then(|opened| opened.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
+        .and_then(|opened| opened.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|error| Problem::damage(unreadable(file, &error)))?;
-    if bytes.len() as u64 > LARGEST_FILE {
+    if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(too_large());
     }
     Ok(bytes)
@@ -392,7 +394,7 @@ fn unreadable(file: &str, error: &io::Error) -> String {
 fn refused_image(error: &ImageError) -> String {
     match error {
         ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
-            format!("must have at most {LONGEST_SIDE} texels along a side")
+            format!("must have at most {MAX_IMAGE_SIDE} texels along a side")
         }
         ImageError::Limits(_) => "requires more memory than its header declares".to_string(),
         ImageError::Unsupported(_) => format!("must be of a kind that can be read: {error}"),

@@ -9,7 +9,7 @@ use basisu::{DecodeFlags, TargetFormat, Transcoder};
 use image::{DynamicImage, ImageBuffer, RgbaImage};
 use ruzstd::decoding::StreamingDecoder;
 
-use wgray_image::contain::catch_panic;
+use wgray_image::panic_guard::catch_panic;
 
 /// First bytes of a file (section 3.1).
 pub(super) const IDENTIFIER: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";

@@ -3,7 +3,6 @@
 //! Text is parsed into a [`Description`], the contents of the file field for field; [`Description::validate`] makes a [`Scene`] of it, with every
 //! name resolved and every value in range. Nothing behind a `Scene` checks again.
 
-mod around;
 mod camera_at;
 mod camera_path;
 mod course;
@@ -11,13 +10,14 @@ mod decode;
 mod define;
 mod defines;
 mod description;
+pub mod downsample;
+mod environment_override;
 mod error;
 mod expand;
 pub mod framing;
 mod geometry;
 pub mod gltf;
 mod gltf_shape;
-pub mod halves;
 pub mod image_file;
 mod key_path;
 pub mod ktx2;
@@ -44,10 +44,10 @@ mod validate;
 mod visibility;
 mod write;
 
-pub use around::Background;
 pub use camera_path::CameraPath;
 pub use define::Define;
 pub use description::*;
+pub use environment_override::Background;
 pub use error::SceneError;
 pub use framing::{Framing, Orbit, View, framed};
 pub use geometry::{Bounds, Geometry, Parallelogram, Shape};
@@ -55,8 +55,8 @@ pub use gltf::ModelContents;
 pub use image_file::Assets;
 pub use key_path::KeyPath;
 pub use key_path::{Segment, cut};
-pub use load::{Draft, folder_of, read_bytes, read_text};
 pub use load::{GltfChoice, Overrides, is_gltf, is_mesh, is_model};
+pub use load::{PendingScene, folder_of, read_bytes, read_text};
 pub use material::{Facets, Material, Principled, Reflection};
 pub use metals::MetalIndex;
 pub use note::Note;

@@ -18,7 +18,7 @@ pub(super) const TURNS: (f64, f64) = (-360.0, 360.0);
 /// Maximum number of pixels along a side of the image, and of samples.
 pub(super) const MOST: u32 = 65_536;
 /// Minimum number of samples from which adaptive sampling can estimate an error.
-pub(super) const LEAST_ADAPTIVE: u32 = 2;
+pub(super) const MIN_ADAPTIVE_SAMPLES: u32 = 2;
 /// Maximum number of bounces of a path.
 pub(super) const DEEPEST: u32 = 1024;
 /// Maximum contributions of a sample.

@@ -18,16 +18,16 @@ struct Key {
 }
 
 /// Length and modification time.
-type Stamp = Option<(u64, SystemTime)>;
+type FileStamp = Option<(u64, SystemTime)>;
 
 /// A mesh, and the stamps of its MTL files.
-struct Known {
+struct CachedMesh {
     mesh: Weak<Mesh>,
-    libraries: Vec<Stamp>,
+    libraries: Vec<FileStamp>,
 }
 
 /// Scenes that are reloaded in development mode reuse BVHs.
-static IN_USE: Mutex<Option<HashMap<Key, Known>>> = Mutex::new(None);
+static IN_USE: Mutex<Option<HashMap<Key, CachedMesh>>> = Mutex::new(None);
 
 /// Reads a mesh, unless it is in use and its files have not changed.
 pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
@@ -45,7 +45,9 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
     }
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     let mesh = Arc::downgrade(&read);
-    in_use.get_or_insert_default().insert(key, Known { mesh, libraries });
+    in_use
+        .get_or_insert_default()
+        .insert(key, CachedMesh { mesh, libraries });
     Ok(read)
 }
 
@@ -69,12 +71,12 @@ fn key(path: &Path, normals: Option<Normals>) -> Option<Key> {
     })
 }
 
-fn stamp(path: &Path) -> Stamp {
+fn stamp(path: &Path) -> FileStamp {
     let data = fs::metadata(path).ok()?;
     Some((data.len(), data.modified().ok()?))
 }
 
-fn libraries(mesh: &Mesh) -> Vec<Stamp> {
+fn libraries(mesh: &Mesh) -> Vec<FileStamp> {
     mesh.libraries.iter().map(|library| stamp(&library.file)).collect()
 }
 
@@ -104,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn threads_that_read_for_each_other_do_not_wait_for_ever() {
+    fn nested_reads_do_not_deadlock() {
         use rayon::prelude::*;
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<PathBuf> = (0..32).map(|i| folder.path().join(format!("{i}.obj"))).collect();
@@ -118,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_that_nobody_has_is_forgotten() {
+    fn unused_meshes_are_dropped() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.obj");
         fs::write(&path, SMALL).unwrap();
@@ -133,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_changed_file_is_read_anew() {
+    fn changed_files_are_read_again() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.obj");
         fs::write(&path, SMALL).unwrap();
@@ -154,7 +156,7 @@ mod tests {
         fs::write(&path, "v 0 0 0\n").unwrap();
         assert!(load(&path, None).is_err());
         fs::remove_file(&path).unwrap();
-        let told = load(&path, None).unwrap_err().to_string();
-        assert!(told.contains("cannot be read"), "{told}");
+        let message = load(&path, None).unwrap_err().to_string();
+        assert!(message.contains("cannot be read"), "{message}");
     }
 }

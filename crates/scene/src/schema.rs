@@ -82,11 +82,11 @@ fn finish(schema: &mut Value) {
         Value::Object(_) => {
             without_null(schema);
             names(schema);
-            tell_kind(schema);
+            append_kind(schema);
             if let Some(Value::Object(properties)) = schema.get_mut("properties") {
                 for property in properties.values_mut() {
                     finish(property);
-                    tell_default(property);
+                    append_default(property);
                 }
             }
             let Some(all) = schema.as_object_mut() else { return };
@@ -145,58 +145,58 @@ fn names(schema: &mut Value) {
     let Some(parts) = parts.collect::<Option<Vec<_>>>() else {
         return;
     };
-    let (names, told): (Vec<Value>, Vec<Value>) = parts.into_iter().unzip();
+    let (names, descriptions): (Vec<Value>, Vec<Value>) = parts.into_iter().unzip();
     all.remove("oneOf");
     all.insert("type".to_owned(), json!("string"));
     all.insert("enum".to_owned(), Value::Array(names));
-    all.insert("enumDescriptions".to_owned(), Value::Array(told));
+    all.insert("enumDescriptions".to_owned(), Value::Array(descriptions));
 }
 
 /// Appends the kind of a value to its description.
-fn tell_kind(schema: &mut Value) {
+fn append_kind(schema: &mut Value) {
     let Some(all) = schema.as_object_mut() else { return };
-    let mut told = match all.get("description") {
-        Some(Value::String(told)) => told.split_whitespace().collect::<Vec<_>>().join(" "),
+    let mut text = match all.get("description") {
+        Some(Value::String(text)) => text.split_whitespace().collect::<Vec<_>>().join(" "),
         _ => String::new(),
     };
     if let Some(Value::String(kind)) = all.get("title") {
         let (words, range) = kind.split_once(SPLIT).unwrap_or((kind, ""));
-        let is_told = words.is_empty() || told.to_lowercase().contains(words);
+        let has_words = words.is_empty() || text.to_lowercase().contains(words);
         let more = [words, range]
             .into_iter()
-            .filter(|part| !part.is_empty() && (*part != words || !is_told));
+            .filter(|part| !part.is_empty() && (*part != words || !has_words));
         let more = more.collect::<Vec<_>>().join(", ");
-        let end = if told.is_empty() || told.ends_with('.') {
+        let end = if text.is_empty() || text.ends_with('.') {
             ""
         } else {
             "."
         };
         if let Some(first) = more.get(..1) {
-            told = format!("{told}{end} {}{}.", first.to_uppercase(), &more[1..]);
+            text = format!("{text}{end} {}{}.", first.to_uppercase(), &more[1..]);
         }
     }
-    if !told.is_empty() {
-        all.insert("description".to_owned(), Value::String(told.trim().to_owned()));
+    if !text.is_empty() {
+        all.insert("description".to_owned(), Value::String(text.trim().to_owned()));
     }
 }
 
 /// Maximum number of keys of a table that is shown as a default.
-const MOST_SAID: usize = 3;
+const MAX_SHOWN_KEYS: usize = 3;
 
 /// Appends the default to a description.
-fn tell_default(property: &mut Value) {
+fn append_default(property: &mut Value) {
     let Some(all) = property.as_object_mut() else { return };
     match (all.get("default"), all.get("description")) {
         // A section, whose keys have their own defaults.
-        (Some(Value::Object(table)), _) if table.is_empty() || table.len() > MOST_SAID => {
+        (Some(Value::Object(table)), _) if table.is_empty() || table.len() > MAX_SHOWN_KEYS => {
             all.remove("default");
         }
         (Some(Value::Array(list)), _) if list.is_empty() => {
             all.remove("default");
         }
-        (Some(default), Some(Value::String(told))) => {
-            let told = format!("{told} Default: {}.", toml_of(default));
-            all.insert("description".to_owned(), Value::String(told));
+        (Some(default), Some(Value::String(text))) => {
+            let text = format!("{text} Default: {}.", toml_of(default));
+            all.insert("description".to_owned(), Value::String(text));
         }
         _ => {}
     }

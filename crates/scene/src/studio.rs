@@ -71,7 +71,7 @@ pub fn studio() -> Image {
     }
 }
 
-fn radiance(lamps: &[Facing], direction: DVec3) -> f64 {
+fn radiance(lamps: &[AreaLight], direction: DVec3) -> f64 {
     let z = direction.z;
     // The floor blends smoothly into the walls.
     let room = match z < 0.0 {
@@ -82,7 +82,7 @@ fn radiance(lamps: &[Facing], direction: DVec3) -> f64 {
     lamps.fold(room, f64::max)
 }
 
-struct Facing {
+struct AreaLight {
     axis: DVec3,
     sides: [DVec3; 2],
     half: [f64; 2],
@@ -90,13 +90,13 @@ struct Facing {
 }
 
 impl Lamp {
-    fn facing(&self) -> Facing {
+    fn facing(&self) -> AreaLight {
         let axis = self.towards.normalize();
         let right = match axis.z.abs() < 0.99 {
             true => axis.cross(DVec3::Z).normalize(),
             false => DVec3::X,
         };
-        Facing {
+        AreaLight {
             axis,
             sides: [right, right.cross(axis)],
             half: self.half,
@@ -105,7 +105,7 @@ impl Lamp {
     }
 }
 
-impl Facing {
+impl AreaLight {
     /// Returns the coverage: 1 inside the emitter, 0 outside.
     fn share(&self, direction: DVec3) -> f64 {
         let ahead = direction.dot(self.axis);

@@ -8,14 +8,14 @@ use super::problem::Problem;
 use super::{CameraDescription, CameraKeyDescription, CameraPathDescription, Interpolation};
 
 /// Maximum number of frames.
-pub(super) const MOST_FRAMES: u32 = 100_000;
+pub(super) const MAX_FRAMES: u32 = 100_000;
 
 /// Replaces the path of a camera by an orbit around its target point, counter-clockwise as seen from `up`. Frame 1 is
 /// the original position; a frame after the last would equal it. Each frame has its own key, to be exactly on the
 /// circle.
 pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraDescription, Problem> {
-    if !(1..=MOST_FRAMES).contains(&frames) {
-        return Err(Problem::new(format!("{frames} must be from 1 to {MOST_FRAMES}")));
+    if !(1..=MAX_FRAMES).contains(&frames) {
+        return Err(Problem::new(format!("{frames} must be from 1 to {MAX_FRAMES}")));
     }
     let (position, look_at, up) = match camera {
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, camera.up),
@@ -73,7 +73,7 @@ mod tests {
                     assert_eq!(
                         at(1),
                         camera.validate().unwrap(),
-                        "the first is the picture without a turn"
+                        "the first frame differs from the original view"
                     );
                     let axis = up.normalize();
                     let around = |p: DVec3| (p - look_at) - axis * (p - look_at).dot(axis);
@@ -96,13 +96,13 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_turn_is_told() {
-        let told = |camera: CameraDescription, frames| turning(&camera, frames).unwrap_err().to_string();
+    fn invalid_turntables_are_rejected() {
+        let error = |camera: CameraDescription, frames| turning(&camera, frames).unwrap_err().to_string();
         let camera = || PerspectiveDescription::new([0.0, -1.0, 0.0], [0.0; 3], 40.0).into();
-        assert_eq!(told(camera(), 0), "0 must be from 1 to 100000");
-        assert_eq!(told(camera(), 100_001), "100001 must be from 1 to 100000");
+        assert_eq!(error(camera(), 0), "0 must be from 1 to 100000");
+        assert_eq!(error(camera(), 100_001), "100001 must be from 1 to 100000");
         turning(&camera(), 100_000).unwrap();
         let panorama = PanoramaDescription::new([0.0, -1.0, 0.0], [0.0; 3]).into();
-        assert!(told(panorama, 4).starts_with("does not apply to a panorama camera"));
+        assert!(error(panorama, 4).starts_with("does not apply to a panorama camera"));
     }
 }

@@ -13,7 +13,7 @@ use crate::image::{Output, Pending};
 use anyhow::Context as _;
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError};
 use wgray_image::compare::{self, COLOR, Flip, Kind, Layer, Picture, layer_of};
-use wgray_image::visible::visible_lines;
+use wgray_image::sanitize::escape_control_in_lines;
 
 use super::Usage;
 use measure::measure;
@@ -161,7 +161,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let text = match args.json {
         true => serde_json::to_string_pretty(&report)? + "\n",
-        false => visible_lines(&report.to_string()).into_owned(),
+        false => escape_control_in_lines(&report.to_string()).into_owned(),
     };
     let printed = io::stdout().lock().write_all(text.as_bytes());
     if let Some((output, layer, flip)) = shown {

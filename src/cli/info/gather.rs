@@ -10,7 +10,7 @@ use crate::scene::{
 };
 use serde::Serialize;
 use wgray_image::Region;
-use wgray_render::job::{Cut, bands};
+use wgray_render::job::{WorkSplit, bands};
 use wgray_render::records::Packed;
 
 use super::kernel::features;
@@ -28,7 +28,7 @@ pub struct Info {
     pub shapes: Shapes,
     pub materials: Kinds,
     pub material_names: Vec<String>,
-    pub textures: Vec<Textured>,
+    pub textures: Vec<TextureInfo>,
     pub lights: Lights,
     /// The contents of glTF files.
     pub models: Vec<ModelContents>,
@@ -117,7 +117,7 @@ pub struct Shapes {
 }
 
 #[derive(Debug, Serialize)]
-pub struct Textured {
+pub struct TextureInfo {
     #[serde(rename = "type")]
     pub kind: &'static str,
     /// Size of an image.
@@ -181,9 +181,9 @@ impl Info {
     /// Gathers information about a scene and the device that would render it.
     pub fn of(path: &Path, scene: &Scene, packed: &Packed, plan: &DevicePlan) -> Info {
         let whole = Region::whole(scene.width, scene.height);
-        let cut = Cut::of(packed.form());
-        let films: Vec<u64> = bands(whole, &cut, u64::MAX).map(|band| band.pixels()).collect();
-        let film = films.iter().max().unwrap_or(&0) * packed.form().bytes() as u64;
+        let split = WorkSplit::of(packed.film_layout());
+        let films: Vec<u64> = bands(whole, &split, u64::MAX).map(|band| band.pixels()).collect();
+        let film = films.iter().max().unwrap_or(&0) * packed.film_layout().bytes() as u64;
         let kernel = kernel(packed, plan);
         Info {
             scene: path.display().to_string(),
@@ -291,8 +291,8 @@ fn reflection(reflection: &Reflection) -> &'static str {
     }
 }
 
-fn textured(kind: &TextureKind) -> Textured {
-    let plain = |kind| Textured {
+fn textured(kind: &TextureKind) -> TextureInfo {
+    let plain = |kind| TextureInfo {
         kind,
         size: None,
         texels: None,
@@ -301,7 +301,7 @@ fn textured(kind: &TextureKind) -> Textured {
         TextureKind::Constant(_) => plain("constant"),
         TextureKind::Checker { .. } => plain("checker"),
         TextureKind::Lines { .. } => plain("grid"),
-        TextureKind::Image { image, .. } => Textured {
+        TextureKind::Image { image, .. } => TextureInfo {
             size: Some([image.width, image.height]),
             texels: Some(match image.texels {
                 Texels::Bytes(..) => "8 bits",

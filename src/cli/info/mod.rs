@@ -13,7 +13,7 @@ use crate::device_plan::plan_device;
 use crate::scene::{Define, Overrides};
 use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
-use wgray_image::visible::visible_lines;
+use wgray_image::sanitize::escape_control_in_lines;
 use wgray_render::pack::pack;
 
 use super::numbers::samples;
@@ -73,7 +73,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let info = Info::of(&args.scene, &scene, &packed, &plan);
     let text = match args.json {
         true => format!("{}\n", serde_json::to_string_pretty(&info)?),
-        false => visible_lines(&show::table(&info, args.verbose)).into_owned(),
+        false => escape_control_in_lines(&show::table(&info, args.verbose)).into_owned(),
     };
     Ok(super::ended(
         io::stdout().lock().write_all(text.as_bytes()),

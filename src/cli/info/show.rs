@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use crate::scene::ModelContents;
 
-use super::gather::{Info, Kinds, Textured};
+use super::gather::{Info, Kinds, TextureInfo};
 
 /// Maximum number of images, names and notes in a list.
 const MAX_LISTED: usize = 20;
@@ -240,7 +240,7 @@ fn kinds(kinds: &Kinds) -> String {
     }
 }
 
-fn textures(textures: &[Textured]) -> String {
+fn textures(textures: &[TextureInfo]) -> String {
     let mut by_kind: BTreeMap<String, u64> = BTreeMap::new();
     for texture in textures {
         let name = match (texture.size, texture.texels) {

@@ -15,7 +15,7 @@ use wgray_render::job::Tile;
 use crate::cli::Usage;
 use crate::cli::frames::{Frame, Frames};
 use crate::cli::numbers::{bounces, samples, whole};
-use crate::cli::outputs::{Layered, Outputs};
+use crate::cli::outputs::{LayerPolicy, Outputs};
 use crate::cli::picture_options::{PictureOptions, named};
 use crate::cli::progress::Mode;
 use crate::cli::scene_options::SceneOptions;
@@ -224,7 +224,7 @@ impl Args {
             None => Outputs::find(
                 &pictures,
                 &self.default_name(frame)?,
-                (&self.aovs(), Layered::Requested),
+                (&self.aovs(), LayerPolicy::Requested),
                 stats.as_deref(),
             ),
         }

@@ -11,7 +11,7 @@ use crate::renderer::{FaultHandler, Recovery, Renderer};
 use crate::scene::{Scene, ViewSettings};
 use tracing::info;
 use wgray_image::Region;
-use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, Opening};
+use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, CheckpointOptions};
 use wgray_render::job::{self, Identity, PartHeader, Tile};
 use wgray_render::records::Packed;
 
@@ -124,7 +124,7 @@ impl<'a> Plan<'a> {
         };
         // Without deferred signals a signal ends the program at once.
         let signal = move || stop.and_then(Stop::signal);
-        let opening = Opening {
+        let opening = CheckpointOptions {
             path: path.clone(),
             resume: self.resume,
             interval: self.checkpoint_interval,
@@ -132,7 +132,7 @@ impl<'a> Plan<'a> {
             tell: Box::new(|what| self.log.log(Level::Warning, what)),
         };
         let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
-        match Checkpoint::open(opening, identity, self.scene.form()) {
+        match Checkpoint::open(opening, identity, self.scene.film_layout()) {
             Ok(checkpoint) => Ok(Some(checkpoint)),
             Err(error @ CheckpointError::Busy(_)) => Err(match signal() {
                 Some(signal) => Interrupted(signal).into(),

@@ -8,7 +8,7 @@ use crate::render::{middle_depth, needs_first_hits};
 use crate::renderer::Renderer;
 use wgray_image::Region;
 use wgray_render::backend::Backend;
-use wgray_render::job::{self, Bands, CheckpointStore, Cut, Finished, Flow, Order, PartHeader};
+use wgray_render::job::{self, Bands, CheckpointStore, FinishedBand, Flow, Order, PartHeader, WorkSplit};
 
 use super::plan::Plan;
 use super::preview::Previews;
@@ -108,16 +108,16 @@ fn render(
 ) -> Result<(), RenderError> {
     let mut progress = Progress::new(plan.progress, plan.frame.label(), plan.frame.number);
     let (scene, samples) = (&plan.scene, plan.scene.sampling.pixel_samples);
-    let (cut, most) = (Cut::of(scene.form()), renderer.largest_film());
+    let (split, most) = (WorkSplit::of(scene.film_layout()), renderer.largest_film());
     let order = match plan.deadline.is_some() || previews.is_some() {
         true => Order::Pixels,
         false => Order::Rows,
     };
-    let mut bands = Bands::new(plan.region(), samples, &cut, order, most, store);
+    let mut bands = Bands::new(plan.region(), samples, &split, order, most, store);
     if previews.is_some() {
-        bands = bands.in_passes(scene.form())?;
+        bands = bands.in_passes(scene.film_layout())?;
     } else if plan.deadline.is_some() {
-        bands = bands.as_a_whole(scene.form())?;
+        bands = bands.as_a_whole(scene.film_layout())?;
     }
     let begin = Instant::now();
     let mut watch = |_: &mut dyn Backend, _: Region, fraction: f64| {
@@ -177,7 +177,7 @@ fn render(
 fn put(
     plan: &Plan,
     renderer: &mut Renderer,
-    band: Finished,
+    band: FinishedBand,
     totals: &mut RenderTotals,
     sink: &mut Sink,
 ) -> Result<(), RenderError> {

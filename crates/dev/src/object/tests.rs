@@ -5,11 +5,11 @@ use serde_json::{Value as Json, json};
 use super::*;
 use crate::edit::edited;
 use wgray_render::pack::pack;
-use wgray_scene::{Draft, Overrides, Scene};
+use wgray_scene::{Overrides, PendingScene, Scene};
 
 fn seen(text: &str, name: &Path, overrides: Overrides) -> SceneView {
     let origin = name.display().to_string();
-    let draft = Draft::read(text, &origin, wgray_scene::folder_of(name), &overrides).unwrap();
+    let draft = PendingScene::read(text, &origin, wgray_scene::folder_of(name), &overrides).unwrap();
     let (scene, description) = draft.check(&mut Default::default()).unwrap();
     let loaded = Loaded::new(text.to_owned(), scene, description);
     SceneView {
@@ -240,7 +240,7 @@ fn other_layouts_can_be_set_too() {
 }
 
 #[test]
-fn what_is_hit_is_named_with_its_lines_and_what_it_names() {
+fn picks_have_names_lines_and_references() {
     let seen = small();
     let ball = seen.at([20, 15]);
     assert_eq!(
@@ -293,7 +293,7 @@ fn what_is_hit_is_named_with_its_lines_and_what_it_names() {
 }
 
 #[test]
-fn what_is_hit_is_what_the_first_hits_say() {
+fn picks_equal_the_first_hits() {
     let seen = small();
     let moved = Scene::parse(&SCENE.replace("[0, -4, 0.5]", "[1, -4, 2]"), "s.toml").unwrap();
     let looked = SceneView {
@@ -317,7 +317,7 @@ fn what_is_hit_is_what_the_first_hits_say() {
 }
 
 #[test]
-fn names_and_files_are_shown_and_stay() {
+fn names_and_files_are_read_only() {
     let seen = seen(
         &std::fs::read_to_string("../../scenes/twisted-tube.toml").unwrap(),
         Path::new("../../scenes/twisted-tube.toml"),
@@ -341,7 +341,7 @@ fn names_and_files_are_shown_and_stay() {
 }
 
 #[test]
-fn what_stands_in_for_values_makes_them_fixed() {
+fn overridden_values_are_read_only() {
     let overrides = Overrides {
         size: Some((20, 20)),
         define: vec![

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::{ATTEMPTS, Painter, Running};
-use crate::build::{Built, guarded};
+use crate::build::{BuildResult, guarded};
 use crate::canvas::Canvas;
 use crate::diagnostic::Diagnostic;
 use crate::source::{Constants, are_of_one_scene, shown};
@@ -13,7 +13,7 @@ use wgray_render::gpu::Gpu;
 use wgray_render::gpu::compose::Shaders;
 
 impl Painter {
-    pub(super) fn take_built(&mut self, built: Built) {
+    pub(super) fn take_built(&mut self, built: BuildResult) {
         let Some(pending) = self.pending.take_if(|pending| pending.id == built.id) else {
             return self.take_overtaken(built);
         };
@@ -57,7 +57,7 @@ impl Painter {
 
     /// Takes a kernel that was compiled while a newer one was asked for. It is newer than what is on screen, and is shown until
     /// the newer one is compiled, if it fits the scene.
-    fn take_overtaken(&mut self, built: Built) {
+    fn take_overtaken(&mut self, built: BuildResult) {
         let constants = self.loaded.as_ref().map(|loaded| self.constants(loaded));
         let is_useful = self.pending.is_some() && built.id >= self.oldest && constants == Some(built.constants);
         match built.result {

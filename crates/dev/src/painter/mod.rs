@@ -24,8 +24,8 @@ use super::build::{Builder, Request, guarded};
 use super::camera::merged;
 use super::canvas::{Canvas, Limits};
 use super::diagnostic::Diagnostic;
+use super::display_settings::DisplayOverrides;
 use super::history::History;
-use super::look::DisplayOverrides;
 use super::messages::{Event, Report, State};
 use super::object::SceneView;
 use super::picture::{Frame, View};
@@ -246,7 +246,7 @@ impl Painter {
     pub fn take(&mut self, event: Event) {
         match event {
             Event::Files(snapshot, noticed, writes) => self.take_files(*snapshot, noticed, writes),
-            Event::Built(built) => self.take_built(*built),
+            Event::BuildResult(built) => self.take_built(*built),
             Event::Command(command) => {
                 self.take_command(command);
                 self.heard += 1;
@@ -471,7 +471,11 @@ impl Painter {
             return;
         }
         let stepped = guarded(|| self.times.of("render", || running.canvas.step(view)));
-        running.canvas.calls().iter().for_each(|call| self.times.call(call));
+        running
+            .canvas
+            .dispatches()
+            .iter()
+            .for_each(|call| self.times.call(call));
         match stepped {
             Ok(show) => {
                 let due = self.last_frame.elapsed() > BETWEEN_FRAMES.max(10 * self.frame_cost);

@@ -8,7 +8,7 @@ use super::Painter;
 use crate::build::guarded;
 use crate::camera::{Viewpoint, text};
 use crate::diagnostic::Diagnostic;
-use crate::look::DisplaySettings;
+use crate::display_settings::DisplaySettings;
 use crate::messages::{Preview, Report};
 use crate::object::SceneView;
 use crate::picture::{Content, Frame, Header, Names, View, png_of};

@@ -16,21 +16,21 @@ use crate::messages::{Report, Set};
 use crate::object::{SceneView, object_of};
 use crate::save::{replace_known, wait_settled, with_camera};
 use crate::source::{FileStamp, Loaded};
-use wgray_image::visible::visible;
-use wgray_scene::{Draft, Field, KeyPath, Segment, cut, folder_of, read_text};
+use wgray_image::sanitize::escape_control;
+use wgray_scene::{Field, KeyPath, PendingScene, Segment, cut, folder_of, read_text};
 
 impl Painter {
     /// Sets a value in the scene file.
     pub(super) fn set(&mut self, set: &Set) {
         // A viewer may send any text, and the terminal prints the error.
-        let result = self.try_set(set).map_err(|why| visible(&why).into_owned());
+        let result = self.try_set(set).map_err(|why| escape_control(&why).into_owned());
         match &result {
             Ok(()) => self.taken(),
             Err(_) => self.notice(&result, String::new()),
         }
         // A slider writes many times while it is dragged: only errors are reported.
         if result.is_err() || set.gesture.is_none() {
-            (self.report)(Report::Wrote(visible(&cut(&set.path)).into_owned(), result));
+            (self.report)(Report::Wrote(escape_control(&cut(&set.path)).into_owned(), result));
         }
     }
 
@@ -158,7 +158,7 @@ impl Painter {
         }
         let origin = self.sources.scene.display().to_string();
         let folder = folder_of(&self.sources.scene);
-        let read = Draft::read(text, &origin, folder, &self.sources.overrides);
+        let read = PendingScene::read(text, &origin, folder, &self.sources.overrides);
         let read = read.and_then(|draft| draft.check(&mut BTreeSet::new()));
         let (scene, description) = read.map_err(|error| {
             let (errors, _) = error.each();
@@ -172,7 +172,7 @@ impl Painter {
         let origin = self.sources.scene.display().to_string();
         let folder = folder_of(&self.sources.scene);
         let known = (&known.description, at);
-        let read = Draft::change(&text, &origin, folder, &self.sources.overrides, known);
+        let read = PendingScene::change(&text, &origin, folder, &self.sources.overrides, known);
         let read = read.and_then(|(draft, places)| Ok((draft.check(&mut BTreeSet::new())?, places)));
         let ((scene, description), places) = read.map_err(|error| error.to_string())?;
         Ok(Arc::new(Loaded::new(text, scene, description).with_places(places)))

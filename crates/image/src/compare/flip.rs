@@ -307,7 +307,7 @@ impl Tile {
             Lines::across(b, self.width, filters),
         );
         let greatest = greatest();
-        let (mut seen_a, mut seen_b) = (Seen::new(self.width), Seen::new(self.width));
+        let (mut seen_a, mut seen_b) = (EdgesAndPoints::new(self.width), EdgesAndPoints::new(self.width));
         for (y, errors) in errors.chunks_mut(self.width).enumerate() {
             seen_a.down(&lines_a, y, filters);
             seen_b.down(&lines_b, y, filters);
@@ -440,13 +440,13 @@ impl Lines {
 }
 
 /// A row filtered in both directions: four color results; the first and second derivatives in x, then in y.
-struct Seen {
+struct EdgesAndPoints {
     values: [Vec<f32>; 8],
 }
 
-impl Seen {
-    fn new(width: usize) -> Seen {
-        Seen {
+impl EdgesAndPoints {
+    fn new(width: usize) -> EdgesAndPoints {
+        EdgesAndPoints {
             values: std::array::from_fn(|_| vec![0.0; width]),
         }
     }

@@ -138,7 +138,7 @@ pub fn layer_of(channel: &str) -> &str {
 }
 
 #[derive(Clone, Debug, Default)]
-struct Found {
+struct DifferenceSums {
     different: u64,
     first: Option<usize>,
     beyond: u64,
@@ -152,8 +152,8 @@ struct Found {
     odd: Option<usize>,
 }
 
-impl Found {
-    fn join(&mut self, next: &Found) {
+impl DifferenceSums {
+    fn join(&mut self, next: &DifferenceSums) {
         self.different += next.different;
         self.first = self.first.or(next.first);
         self.beyond += next.beyond;
@@ -177,7 +177,7 @@ impl<'a> Layer<'a> {
         let pixels = width as usize * height as usize;
         let chunks = (0..pixels.div_ceil(CHUNK)).into_par_iter();
         let found = chunks.map(|i| self.chunk(i * CHUNK, pixels.min((i + 1) * CHUNK), threshold));
-        let mut all = Found::default();
+        let mut all = DifferenceSums::default();
         for found in found.collect::<Vec<_>>() {
             all.join(&found);
         }
@@ -259,11 +259,11 @@ impl<'a> Layer<'a> {
         channels.map(range).collect()
     }
 
-    fn chunk(&self, start: usize, end: usize, threshold: f64) -> Found {
+    fn chunk(&self, start: usize, end: usize, threshold: f64) -> DifferenceSums {
         let count = end - start;
         let (mut a, mut b) = (vec![0.0; count], vec![0.0; count]);
         let (mut unlike, mut beyond) = (vec![false; count], vec![false; count]);
-        let mut found = Found::default();
+        let mut found = DifferenceSums::default();
         for (channel, (_, plane_a, plane_b)) in self.channels.iter().enumerate() {
             if plane_a.is_plainly(plane_b, start..end) {
                 continue;

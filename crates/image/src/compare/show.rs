@@ -26,7 +26,7 @@ const INK: [u8; 3] = [230, 230, 230];
 const LINE: [u8; 3] = [0, 220, 220];
 
 /// A visualization that is computed row by row.
-pub struct Shown<'a> {
+pub struct ErrorImage<'a> {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
@@ -58,7 +58,7 @@ pub fn step(picture: &Picture) -> usize {
 
 /// Lays out a layer of two images. `error` is the map of [`flip`](super::flip()) with the step of [`step`]. Without it,
 /// the panel shows differences relative to the largest one.
-pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option<Map>) -> Shown<'a> {
+pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option<Map>) -> ErrorImage<'a> {
     let step = step(b);
     let (differing, apart) = layer.maps(b, step);
     let names = match error {
@@ -94,7 +94,7 @@ pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option
         Some(colors) if layer.name == COLOR => Source::Colors(colors),
         _ => Source::Numbers(layer.ranges(b)),
     };
-    Shown {
+    ErrorImage {
         width: width + 2 * GAP,
         height: height + SCALE + LABEL + GAP,
         source,
@@ -110,7 +110,7 @@ pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option
     }
 }
 
-impl Shown<'_> {
+impl ErrorImage<'_> {
     /// Returns a row of pixels as RGB bytes.
     pub fn row(&self, y: usize) -> Vec<u8> {
         let mut row = vec![GROUND; self.width];

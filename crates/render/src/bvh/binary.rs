@@ -24,13 +24,13 @@ const BINS: usize = 16;
 /// A box and its index. The index is stored as the bits of `low.w`, which takes no part in arithmetic; `high.w` is 1.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub struct Item {
+pub struct BuildItem {
     low: Vec4,
     high: Vec4,
 }
 
-impl Item {
-    fn new(number: usize, bounds: &Aabb) -> Item {
+impl BuildItem {
+    fn new(number: usize, bounds: &Aabb) -> BuildItem {
         let whole = bounds.low.cmple(bounds.high).all(); // false if any bound is NaN
         let Aabb { low, high } = if whole {
             *bounds
@@ -42,7 +42,7 @@ impl Item {
         };
         // Adding 0 turns -0 into 0: otherwise the bits of a minimum would depend on the order of its operands.
         let finite = |v: Vec3| v.clamp(Vec3::MIN, Vec3::MAX) + Vec3::ZERO;
-        Item {
+        BuildItem {
             low: finite(low).extend(f32::from_bits(number as u32)),
             high: finite(high).extend(1.0),
         }
@@ -80,7 +80,7 @@ pub struct Inner {
 /// A binary BVH in depth-first order. A node of n items owns n - 1 consecutive inner nodes: itself, those of its first
 /// half, those of its second half.
 pub struct Binary {
-    pub items: Vec<Item>,
+    pub items: Vec<BuildItem>,
     pub inner: Vec<Inner>,
 }
 
@@ -88,14 +88,14 @@ impl Binary {
     /// Builds a tree of at most `levels` levels of inner nodes, provided that there are at most 2^`levels` boxes.
     pub fn build(boxes: &[Aabb], levels: u32, most_in_leaf: usize) -> Binary {
         let items = boxes.par_iter().enumerate().with_min_len(CHUNK);
-        let mut items: Vec<Item> = items.map(|(i, bounds)| Item::new(i, bounds)).collect();
+        let mut items: Vec<BuildItem> = items.map(|(i, bounds)| BuildItem::new(i, bounds)).collect();
         let mut inner = bytemuck::zeroed_vec(boxes.len().saturating_sub(1));
         build(&mut items, &mut inner, levels, most_in_leaf);
         Binary { items, inner }
     }
 }
 
-fn build(items: &mut [Item], inner: &mut [Inner], levels: u32, most_in_leaf: usize) {
+fn build(items: &mut [BuildItem], inner: &mut [Inner], levels: u32, most_in_leaf: usize) {
     let Some((node, below)) = inner.split_first_mut() else {
         return;
     };
@@ -122,7 +122,7 @@ fn build(items: &mut [Item], inner: &mut [Inner], levels: u32, most_in_leaf: usi
     };
 }
 
-fn costs_of(items: &[Item], inner: &[Inner]) -> [f32; SLOTS - 1] {
+fn costs_of(items: &[BuildItem], inner: &[Inner]) -> [f32; SLOTS - 1] {
     match inner.first() {
         Some(node) => node.costs,
         None => [super::wide::leaf_cost(area(items[0].low, items[0].high), 1); SLOTS - 1],
@@ -146,7 +146,7 @@ impl Bounds {
         high_middle: Vec4::NEG_INFINITY,
     };
 
-    fn of(items: &[Item]) -> Bounds {
+    fn of(items: &[BuildItem]) -> Bounds {
         items.iter().fold(Bounds::EMPTY, |bounds, item| Bounds {
             low: bounds.low.min(item.low),
             high: bounds.high.max(item.high),
@@ -155,7 +155,7 @@ impl Bounds {
         })
     }
 
-    fn over(items: &[Item]) -> Bounds {
+    fn over(items: &[BuildItem]) -> Bounds {
         if items.len() < PARALLEL {
             return Bounds::of(items);
         }
@@ -179,23 +179,23 @@ impl Bounds {
 }
 
 /// Area added to every box, so that the number of nodes counts even among boxes without a surface.
-const LEAST_AREA: f32 = 1e-30;
+const MIN_AREA: f32 = 1e-30;
 
 /// Returns half the surface area. Sizes are clamped, so that costs are finite.
 pub fn area(low: Vec4, high: Vec4) -> f32 {
     let size = (high - low).min(Vec4::splat(1e15));
-    size.x * size.y + size.y * size.z + size.z * size.x + LEAST_AREA
+    size.x * size.y + size.y * size.z + size.z * size.x + MIN_AREA
 }
 
 /// Partitions the items into two nonempty parts and returns the size of the first.
-fn split(items: &mut [Item], bounds: &Bounds, levels: u32) -> usize {
+fn split(items: &mut [BuildItem], bounds: &Bounds, levels: u32) -> usize {
     let count = items.len();
     if count == 2 {
         return 1;
     }
     let needed = usize::BITS - (count - 1).leading_zeros(); // levels of a balanced tree
     let found = match () {
-        _ if levels <= needed || area(bounds.low, bounds.high) < 2.0 * LEAST_AREA => None,
+        _ if levels <= needed || area(bounds.low, bounds.high) < 2.0 * MIN_AREA => None,
         _ if count <= SMALL => split_small(items),
         _ => split_by_bins(items, bounds),
     };
@@ -203,12 +203,12 @@ fn split(items: &mut [Item], bounds: &Bounds, levels: u32) -> usize {
 }
 
 /// Splits at the median centroid along the axis of largest centroid extent.
-fn split_in_half(items: &mut [Item], bounds: &Bounds) -> usize {
+fn split_in_half(items: &mut [BuildItem], bounds: &Bounds) -> usize {
     let half = items.len() / 2;
     let reach = (bounds.high_middle - bounds.low_middle).xyz();
     if reach.max_element() > 0.0 {
         let axis = reach.max_position();
-        let key = |item: &Item| (item.middle()[axis], item.number());
+        let key = |item: &BuildItem| (item.middle()[axis], item.number());
         items.select_nth_unstable_by(half, |a, b| {
             let (a, b) = (key(a), key(b));
             a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
@@ -218,9 +218,9 @@ fn split_in_half(items: &mut [Item], bounds: &Bounds) -> usize {
 }
 
 /// Returns the split of lowest SAH cost among all splits in the order of centroids along an axis.
-fn split_small(items: &mut [Item]) -> Option<usize> {
+fn split_small(items: &mut [BuildItem]) -> Option<usize> {
     let count = items.len();
-    let mut best: Option<(f32, usize, [Item; SMALL])> = None;
+    let mut best: Option<(f32, usize, [BuildItem; SMALL])> = None;
     for axis in 0..3 {
         let mut sorted = [items[0]; SMALL];
         sorted[..count].copy_from_slice(items);
@@ -269,15 +269,15 @@ const EMPTY_BINS: Bins = [[Bin {
 }; BINS]; 3];
 
 /// Returns the split of lowest SAH cost between bins, or `None` if all items share a bin.
-fn split_by_bins(items: &mut [Item], bounds: &Bounds) -> Option<usize> {
+fn split_by_bins(items: &mut [BuildItem], bounds: &Bounds) -> Option<usize> {
     let low = bounds.low_middle;
     let per_unit = (BINS - 1) as f32 / (bounds.high_middle - low);
     // Adding 2^23 rounds to an integer, which the low mantissa bits hold.
-    let bins_of = |item: &Item| {
+    let bins_of = |item: &BuildItem| {
         let place = (item.middle() - low) * per_unit + 8_388_608.0;
         [place.x, place.y, place.z].map(|x| x.to_bits() as usize % BINS)
     };
-    let fill = |items: &[Item]| {
+    let fill = |items: &[BuildItem]| {
         let mut bins = EMPTY_BINS;
         for item in items {
             for (bins, i) in bins.iter_mut().zip(bins_of(item)) {
@@ -329,7 +329,7 @@ fn together(mut a: Bins, b: Bins) -> Bins {
 }
 
 /// Moves items that satisfy the predicate to the front and returns their number.
-fn partition(items: &mut [Item], is_first: impl Fn(&Item) -> bool) -> usize {
+fn partition(items: &mut [BuildItem], is_first: impl Fn(&BuildItem) -> bool) -> usize {
     let mut end = 0;
     for i in 0..items.len() {
         // Branchless: the branch would be mispredicted half the time.

@@ -60,19 +60,19 @@ pub struct Tree {
 }
 
 /// Maximum number of levels of nodes.
-pub const MOST_LEVELS: u32 = 32;
+pub const BUILD_MAX_DEPTH: u32 = 32;
 
 /// Maximum number of items per leaf: the items of 8 leaves must be addressable by an offset of 5 bits.
-pub const MOST_IN_LEAF: u32 = 4;
+pub const MAX_LEAF_SIZE: u32 = 4;
 
 /// Builds the BVH over boxes. The result does not depend on the number of threads.
 ///
-/// `most_in_leaf` is the maximum number of items per leaf, from 1 to [`MOST_IN_LEAF`]. Bounds are clamped to finite
+/// `most_in_leaf` is the maximum number of items per leaf, from 1 to [`MAX_LEAF_SIZE`]. Bounds are clamped to finite
 /// numbers. Boxes that are empty or contain NaN are replaced by the point 0.
 pub fn build(boxes: &[Aabb], most_in_leaf: u32) -> Tree {
-    let most_in_leaf = most_in_leaf.clamp(1, MOST_IN_LEAF) as usize;
+    let most_in_leaf = most_in_leaf.clamp(1, MAX_LEAF_SIZE) as usize;
     // The wide BVH has at most as many levels as the binary one, in practice a third.
-    wide::collapse(&Binary::build(boxes, MOST_LEVELS, most_in_leaf), most_in_leaf)
+    wide::collapse(&Binary::build(boxes, BUILD_MAX_DEPTH, most_in_leaf), most_in_leaf)
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
+//! Tests of the BVH builder: invariants of the nodes for random, degenerate and extreme boxes.
+
 use glam::Vec3;
 
 use super::binary::{Binary, Inner};
-use super::{Aabb, MOST_IN_LEAF, MOST_LEVELS, Node, Tree, build};
+use super::{Aabb, BUILD_MAX_DEPTH, MAX_LEAF_SIZE, Node, Tree, build};
 
 /// A generator of numbers from 0 to 1.
 struct Random(u64);
@@ -44,8 +46,8 @@ fn check(tree: &Tree, boxes: &[Aabb], most_in_leaf: u32) -> u32 {
     let mut items = vec![0; boxes.len()];
     let mut levels = 0;
     // Index, level, and the boxes of all ancestors.
-    let mut waiting: Vec<(u32, u32, Vec<Aabb>)> = vec![(0, 1, Vec::new())];
-    while let Some((number, level, outer)) = waiting.pop() {
+    let mut pending: Vec<(u32, u32, Vec<Aabb>)> = vec![(0, 1, Vec::new())];
+    while let Some((number, level, outer)) = pending.pop() {
         levels = levels.max(level);
         nodes[number as usize] += 1;
         let node = &tree.nodes[number as usize];
@@ -58,7 +60,7 @@ fn check(tree: &Tree, boxes: &[Aabb], most_in_leaf: u32) -> u32 {
             let range = node.items(c);
             if let Some(child) = node.child(c) {
                 assert_eq!(node.leaves[c], 0);
-                waiting.push((child, level + 1, outer.clone()));
+                pending.push((child, level + 1, outer.clone()));
             } else if range.is_empty() {
                 assert_eq!(node.leaves[c], 0);
                 assert_eq!((node.low.map(|q| q[c]), node.high.map(|q| q[c])), ([255; 3], [0; 3]));
@@ -77,12 +79,12 @@ fn check(tree: &Tree, boxes: &[Aabb], most_in_leaf: u32) -> u32 {
     assert!(nodes.iter().all(|count| *count == 1));
     assert!(items.iter().all(|count| *count == 1));
     assert_eq!(tree.order.len(), boxes.len());
-    assert!(levels <= MOST_LEVELS);
+    assert!(levels <= BUILD_MAX_DEPTH);
     levels
 }
 
 fn check_builds(boxes: &[Aabb]) -> u32 {
-    let levels = [1, 2, 3, MOST_IN_LEAF].map(|most| check(&build(boxes, most), boxes, most));
+    let levels = [1, 2, 3, MAX_LEAF_SIZE].map(|most| check(&build(boxes, most), boxes, most));
     levels.into_iter().max().unwrap()
 }
 
@@ -107,7 +109,7 @@ fn many_items() {
 }
 
 #[test]
-fn a_wrong_tree_is_found() {
+fn an_invalid_bvh_is_found() {
     let boxes = soup(100);
     let tree = build(&boxes, 4);
     let fails = |change: &dyn Fn(&mut Tree)| {
@@ -126,7 +128,7 @@ fn a_wrong_tree_is_found() {
 }
 
 #[test]
-fn the_same_for_any_number_of_threads() {
+fn the_bvh_does_not_depend_on_the_number_of_threads() {
     for boxes in [soup(200_000), vec![around(Vec3::ONE, Vec3::ONE); 100_000]] {
         let [one, two, five] = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -197,14 +199,14 @@ fn binary_levels(inner: &[Inner]) -> u32 {
 }
 
 #[test]
-fn the_bound_of_levels_is_kept() {
+fn the_depth_is_limited() {
     // Each box is twice as large as the next one, with distinct centroids.
     let boxes: Vec<Aabb> = (0..240)
         .map(|i| around(Vec3::splat(2f32.powi(120 - i)), Vec3::splat(2f32.powi(120 - i))))
         .collect();
     let levels = |levels| binary_levels(&Binary::build(&boxes, levels, 4).inner);
-    assert!(levels(200) > MOST_LEVELS, "too easy: {}", levels(200));
-    assert_eq!(levels(MOST_LEVELS), MOST_LEVELS);
+    assert!(levels(200) > BUILD_MAX_DEPTH, "too easy: {}", levels(200));
+    assert_eq!(levels(BUILD_MAX_DEPTH), BUILD_MAX_DEPTH);
     assert_eq!(levels(8), 8);
     check_builds(&boxes);
     let many: Vec<Aabb> = (0..1000).flat_map(|_| boxes.iter().copied()).collect();
@@ -242,7 +244,7 @@ fn huge_tiny_and_infinite_boxes() {
 }
 
 #[test]
-fn empty_boxes_and_nan_do_no_harm() {
+fn empty_and_nan_boxes_are_replaced() {
     let mut boxes = soup(100);
     boxes.push(Aabb::EMPTY);
     boxes.push(around(Vec3::NAN, Vec3::ONE));

@@ -5,7 +5,7 @@ use bytemuck::Zeroable as _;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::binary::{Binary, Inner, Item};
+use super::binary::{Binary, BuildItem, Inner};
 use super::{Aabb, Node, Tree};
 
 /// Maximum number of children per node.
@@ -51,7 +51,7 @@ fn share(slots: usize, first: impl Fn(usize) -> f32, second: impl Fn(usize) -> f
 
 #[derive(Clone, Copy)]
 struct Part<'a> {
-    items: &'a [Item],
+    items: &'a [BuildItem],
     inner: &'a [Inner],
 }
 
@@ -164,7 +164,7 @@ impl Below {
             if child.is_leaf(self.most_in_leaf) {
                 let offset = self.tree.order.len() as u32 - node.first_item;
                 node.leaves[slot] = (child.items.len() << 5) as u8 | offset as u8;
-                self.tree.order.extend(child.items.iter().map(Item::number));
+                self.tree.order.extend(child.items.iter().map(BuildItem::number));
             } else {
                 node.inner |= 1 << slot;
                 inner.push(child);
@@ -222,10 +222,10 @@ fn slots_of(bounds: &Aabb, children: &[Part]) -> [Option<usize>; SLOTS] {
         }
     }
     let mut slots = [None; SLOTS];
-    let mut waiting: u32 = (1 << children.len()) - 1;
-    while waiting != 0 {
+    let mut unassigned: u32 = (1 << children.len()) - 1;
+    while unassigned != 0 {
         let mut best: Option<(f32, usize, usize)> = None;
-        for child in (0..children.len()).filter(|child| waiting >> child & 1 == 1) {
+        for child in (0..children.len()).filter(|child| unassigned >> child & 1 == 1) {
             for slot in (0..SLOTS).filter(|slot| slots[*slot].is_none()) {
                 let far = towards[child][slot];
                 if best.is_none_or(|best| far > best.0) {
@@ -237,7 +237,7 @@ fn slots_of(bounds: &Aabb, children: &[Part]) -> [Option<usize>; SLOTS] {
             break;
         };
         slots[slot] = Some(child);
-        waiting &= !(1 << child);
+        unassigned &= !(1 << child);
     }
     slots
 }

@@ -54,17 +54,17 @@ pub fn pilot_finish(pilot: Vec4, sum: Vec4, moments: Vec4) -> Vec4 {
     Vec4::new(display_variance(sum, moments), pilot.y, pilot.z, 1.0)
 }
 
-pub fn samples_wanted(looks: Vec4, first: u32, squared_error: f32, most: u32) -> u32 {
+pub fn samples_wanted(pilot_sum: Vec4, first: u32, squared_error: f32, most: u32) -> u32 {
     // Not `<=`, which is false for NaN.
-    if !(looks.w > 0.0) | !(squared_error > 0.0) {
+    if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
         return most;
     }
-    let variance = looks.x / looks.w * first as f32;
+    let variance = pilot_sum.x / pilot_sum.w * first as f32;
     let mut count = first;
     while count < most {
         let enough = variance <= squared_error * count as f32;
-        let evident =
-            looks.y * looks.y >= looks.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * ((2 * count / first) as f32 - 1.0));
+        let evident = pilot_sum.y * pilot_sum.y
+            >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * ((2 * count / first) as f32 - 1.0));
         if enough | !evident {
             break;
         }

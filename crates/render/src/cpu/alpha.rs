@@ -36,8 +36,8 @@ pub fn alpha_accepts(
     let key = hash4(UVec4::new(pixel.x, pixel.y, scene.camera.seed, sample));
     let face = u32::from(side > 0.0);
     let decision = key.y.wrapping_add(2 * bounce).wrapping_add(purpose);
-    let place = hit.primitive.wrapping_mul(2).wrapping_add(face);
-    let bits = hash4(UVec4::new(key.x, decision, hit.instance, place));
+    let set_uv = hit.primitive.wrapping_mul(2).wrapping_add(face);
+    let bits = hash4(UVec4::new(key.x, decision, hit.instance, set_uv));
     unit_float(bits.x) < material.opacity
 }
 
@@ -86,44 +86,44 @@ pub fn is_occluded_alpha(
     if before {
         return true;
     }
-    let way = dot(to, to).sqrt();
+    let distance = dot(to, to).sqrt();
     let mut ray = Ray {
         origin: surface.ray_origin,
-        direction: to * (1.0 / way),
+        direction: to * (1.0 / distance),
     };
     let mut origin_prim = surface.exclude_front;
     let mut inside_prim = surface.exclude_back;
-    let mut rest = way * t_max;
+    let mut remaining = distance * t_max;
     for _ in 0..=MAX_ALPHA_SKIPS {
         let hit = closest_hit(scene, ray, origin_prim, inside_prim);
-        if (hit.primitive == NO_INDEX) | !matches!(hit.t.partial_cmp(&rest), Some(std::cmp::Ordering::Less)) {
+        if (hit.primitive == NO_INDEX) | !matches!(hit.t.partial_cmp(&remaining), Some(std::cmp::Ordering::Less)) {
             return false;
         }
         let prim = fetch_hit_primitive(scene, hit);
-        let met = surface_of(scene, &prim, hit, ray);
-        let material = with_opacity_at(scene, material_of(scene, &prim), &prim, hit, met.uv);
-        let is_goal = (hit.instance == 0) & (hit.primitive == target_prim);
-        if !is_goal & alpha_accepts(scene, &material, pixel, sample, bounce, RAY_SHADOW, hit, met.side) {
+        let skipped = surface_of(scene, &prim, hit, ray);
+        let material = with_opacity_at(scene, material_of(scene, &prim), &prim, hit, skipped.uv);
+        let is_target = (hit.instance == 0) & (hit.primitive == target_prim);
+        if !is_target & alpha_accepts(scene, &material, pixel, sample, bounce, RAY_SHADOW, hit, skipped.side) {
             return true;
         }
-        rest -= hit.t;
-        ray.origin = met.position - (met.ray_origin - met.position);
-        origin_prim = met.exclude_back;
-        inside_prim = met.exclude_front;
+        remaining -= hit.t;
+        ray.origin = skipped.position - (skipped.ray_origin - skipped.position);
+        origin_prim = skipped.exclude_back;
+        inside_prim = skipped.exclude_front;
     }
     true
 }
 
-pub fn first_seen(scene: &Packed, ray: Ray, met: Hit) -> Hit {
-    let mut hit = met;
-    let mut onward = ray;
-    let mut way = 0.0;
+pub fn skip_transparent(scene: &Packed, ray: Ray, first: Hit) -> Hit {
+    let mut hit = first;
+    let mut continued = ray;
+    let mut distance = 0.0;
     for _ in 0..MAX_ALPHA_SKIPS {
         if hit.primitive == NO_INDEX {
             break;
         }
         let prim = fetch_hit_primitive(scene, hit);
-        let surface = surface_of(scene, &prim, hit, onward);
+        let surface = surface_of(scene, &prim, hit, continued);
         let material = with_opacity_at(scene, material_of(scene, &prim), &prim, hit, surface.uv);
         let least = if material.alpha_mode == MASK {
             material.cutoff
@@ -133,10 +133,10 @@ pub fn first_seen(scene: &Packed, ray: Ray, met: Hit) -> Hit {
         if (material.alpha_mode == OPAQUE) | (material.opacity >= least) {
             break;
         }
-        way += hit.t;
-        onward.origin = surface.position - (surface.ray_origin - surface.position);
-        hit = closest_hit(scene, onward, surface.exclude_back, surface.exclude_front);
+        distance += hit.t;
+        continued.origin = surface.position - (surface.ray_origin - surface.position);
+        hit = closest_hit(scene, continued, surface.exclude_back, surface.exclude_front);
     }
-    hit.t += way;
+    hit.t += distance;
     hit
 }

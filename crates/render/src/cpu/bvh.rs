@@ -5,12 +5,12 @@ use bytemuck::cast_slice;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
 
 use super::geometry::triangle_casts;
-use super::light::{Segments, segments_to_light};
+use super::light::{LightSegments, segments_to_light};
 use super::linear_primitives::is_occluded_by_primitive;
 use super::math::max;
 use super::mesh::{Crossing, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
 use super::primitive::intersect;
-use super::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
+use super::ray::{Hit, Ray, nearer_hit, no_hit, standalone_prim};
 use super::samples::{LEVEL, Samples};
 use super::shadow::{SampleBlock, occlusion_mask};
 use super::slab::{Slabs, box_interval, interval_hits, slabs};
@@ -18,7 +18,7 @@ use super::surface::{Surface, largest};
 use super::traversal::{self, Line, Nearest};
 use crate::bvh::{Aabb, Node};
 use crate::records::{
-    CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Item, Light, NO_INDEX, Packed, PackedMesh, SOME_SHADOWS,
+    BvhItem, CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Light, NO_INDEX, Packed, PackedMesh, SOME_SHADOWS,
     with_primitive_kind,
 };
 
@@ -54,20 +54,20 @@ pub fn closest_in_tree(scene: &Packed, before: Hit, ray: Ray, origin_prim: UVec2
 fn closest_of_item(
     scene: &Packed,
     before: Hit,
-    item: &Item,
+    item: &BvhItem,
     ray: Ray,
     s: Slabs,
     origin_prim: UVec2,
     inside_prim: UVec2,
 ) -> Hit {
-    let passage = box_interval(item.low, item.high, s);
-    if !interval_hits(passage, before.t) {
+    let interval = box_interval(item.low, item.high, s);
+    if !interval_hits(interval, before.t) {
         return before;
     }
     let i = item.index;
-    let is_inside = i == by_itself(inside_prim);
+    let is_inside = i == standalone_prim(inside_prim);
     let t = match item.kind & 0xff {
-        INSTANCE => return closest_of_mesh(scene, before, i, ray, max(passage.x, 0.0), origin_prim),
+        INSTANCE => return closest_of_mesh(scene, before, i, ray, max(interval.x, 0.0), origin_prim),
         kind => with_primitive_kind!(kind, |kind| intersect(
             kind,
             &scene.primitives[i as usize],
@@ -77,10 +77,10 @@ fn closest_of_item(
         )),
     };
     let found = Hit {
-        t: if i == by_itself(origin_prim) {
+        t: if i == standalone_prim(origin_prim) {
             INFINITE_T
         } else {
-            max(t, passage.x)
+            max(t, interval.x)
         },
         primitive: i,
         ..no_hit()
@@ -140,7 +140,7 @@ struct Rays<'a> {
     surface: &'a Surface,
     light: &'a Light,
     block: SampleBlock,
-    to: Segments,
+    to: LightSegments,
     samples: Samples,
 }
 
@@ -175,7 +175,7 @@ pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &L
         skip: NO_INDEX,
     };
     let bounds = |i: usize| {
-        let Item { low, high, kind, .. } = scene.bvh.items[i];
+        let BvhItem { low, high, kind, .. } = scene.bvh.items[i];
         (kind & CASTS_SHADOW != 0).then_some(Aabb { low, high })
     };
     let visit = |i: usize, passing| occluded_by_item(scene, &scene.bvh.items[i], passing, &rays);
@@ -183,13 +183,13 @@ pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &L
 }
 
 /// Returns the mask of the samples in `wanted` that an item occludes.
-fn occluded_by_item(scene: &Packed, item: &Item, wanted: u32, rays: &Rays) -> u32 {
+fn occluded_by_item(scene: &Packed, item: &BvhItem, wanted: u32, rays: &Rays) -> u32 {
     let i = item.index;
     let kind = item.kind & 0xff;
-    if kind != INSTANCE && i == by_itself(rays.surface.exclude_front) {
+    if kind != INSTANCE && i == standalone_prim(rays.surface.exclude_front) {
         return 0;
     }
-    let is_inside = i == by_itself(rays.surface.exclude_back);
+    let is_inside = i == standalone_prim(rays.surface.exclude_back);
     let q = scene.primitives.get(i as usize);
     wanted
         & match kind {
@@ -205,7 +205,7 @@ fn occluded_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u3
     let i = &scene.bvh.instances[number as usize];
     let mesh = &*scene.bvh.meshes[i.mesh as usize];
     let origin = point_to_mesh(i, rays.surface.ray_origin);
-    let to = Segments {
+    let to = LightSegments {
         towards: vector_to_mesh(i, rays.to.towards),
         u: vector_to_mesh(i, rays.to.u),
         v: vector_to_mesh(i, rays.to.v),
@@ -249,7 +249,7 @@ fn occluded_by_groups(
                 let d = segments.directions.get(sample as usize);
                 let s = slabs(segments.o, d, segments.pad);
                 let found = triangle_crossing(v0, v1, v2, segments.o, shear_of(d), s);
-                if found.met & (found.t > 0.0) & (found.t < segments.t_max) {
+                if found.is_hit & (found.t > 0.0) & (found.t < segments.t_max) {
                     occluded |= 1 << sample;
                 }
             }
@@ -263,25 +263,32 @@ fn occluded_by_groups(
 pub fn is_occluded_by_bvh(scene: &Packed, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
     let pad = item_pad(scene, surface.ray_origin);
     let s = slabs(surface.ray_origin, to, pad);
-    let cuts = |item: &Item| {
+    let occludes = |item: &BvhItem| {
         let casts = item.kind & CASTS_SHADOW != 0;
         casts
             && interval_hits(box_interval(item.low, item.high, s), t_max)
             && is_occluded_by_item(scene, item, surface, to, t_max, target_prim)
     };
     if scene.bvh.items.len() <= FEW_ITEMS {
-        return scene.bvh.items.iter().any(cuts);
+        return scene.bvh.items.iter().any(occludes);
     }
     let line = Line::new(surface.ray_origin, to, pad);
     let mut occluded = false;
     traversal::leaves(*LEVEL, cast_slice(&scene.bvh.nodes), &line, t_max, |items, limit| {
-        occluded |= scene.bvh.items[items].iter().any(cuts);
+        occluded |= scene.bvh.items[items].iter().any(occludes);
         if occluded { f32::NEG_INFINITY } else { limit }
     });
     occluded
 }
 
-fn is_occluded_by_item(scene: &Packed, item: &Item, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
+fn is_occluded_by_item(
+    scene: &Packed,
+    item: &BvhItem,
+    surface: &Surface,
+    to: Vec3,
+    t_max: f32,
+    target_prim: u32,
+) -> bool {
     let i = item.index;
     match item.kind & 0xff {
         INSTANCE => is_occluded_by_mesh(scene, i, surface, to, t_max),

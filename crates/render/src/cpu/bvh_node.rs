@@ -21,19 +21,19 @@ pub fn smaller(a: Vec4, b: Vec4) -> Vec4 {
     Vec4::select(a.cmplt(b), a, b)
 }
 
-pub fn passed_bits(near: Vec4, far: Vec4, limit: f32) -> u32 {
+pub fn hit_bits(near: Vec4, far: Vec4, limit: f32) -> u32 {
     (near.cmple(far) & far.cmpge(Vec4::ZERO) & near.cmple(Vec4::splat(limit))).bitmask()
 }
 
 pub fn children_hit(node: &Node, s: Slabs, limit: f32) -> u32 {
-    let first = four_passed(
+    let first = four_hit(
         node,
         UVec3::new(node.low_x.x, node.low_y.x, node.low_z.x),
         UVec3::new(node.high_x.x, node.high_y.x, node.high_z.x),
         s,
         limit,
     );
-    let second = four_passed(
+    let second = four_hit(
         node,
         UVec3::new(node.low_x.y, node.low_y.y, node.low_z.y),
         UVec3::new(node.high_x.y, node.high_y.y, node.high_z.y),
@@ -43,7 +43,7 @@ pub fn children_hit(node: &Node, s: Slabs, limit: f32) -> u32 {
     first | (second << 4)
 }
 
-pub fn four_passed(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -> u32 {
+pub fn four_hit(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -> u32 {
     let x = step_length(node, 0);
     let y = step_length(node, 1);
     let z = step_length(node, 2);
@@ -61,18 +61,18 @@ pub fn four_passed(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -
         smaller(larger(low_x, high_x), larger(low_y, high_y)),
         larger(low_z, high_z),
     );
-    passed_bits(near, far, limit)
+    hit_bits(near, far, limit)
 }
 
 pub fn children_in_interval(node: &Node, f: RayInterval, limit: f32) -> u32 {
-    let first = four_in_fan(
+    let first = four_in_interval(
         node,
         UVec3::new(node.low_x.x, node.low_y.x, node.low_z.x),
         UVec3::new(node.high_x.x, node.high_y.x, node.high_z.x),
         f,
         limit,
     );
-    let second = four_in_fan(
+    let second = four_in_interval(
         node,
         UVec3::new(node.low_x.y, node.low_y.y, node.low_z.y),
         UVec3::new(node.high_x.y, node.high_y.y, node.high_z.y),
@@ -82,7 +82,7 @@ pub fn children_in_interval(node: &Node, f: RayInterval, limit: f32) -> u32 {
     first | (second << 4)
 }
 
-pub fn four_in_fan(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: f32) -> u32 {
+pub fn four_in_interval(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: f32) -> u32 {
     let x = step_length(node, 0);
     let y = step_length(node, 1);
     let z = step_length(node, 2);
@@ -98,7 +98,7 @@ pub fn four_in_fan(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: 
     let far_x = far_side(low_x, high_x, f.far_low.x, f.far_high.x);
     let far_y = far_side(low_y, high_y, f.far_low.y, f.far_high.y);
     let far_z = far_side(low_z, high_z, f.far_low.z, f.far_high.z);
-    passed_bits(
+    hit_bits(
         larger(larger(near_x, near_y), near_z),
         smaller(smaller(far_x, far_y), far_z),
         limit,

@@ -33,14 +33,14 @@ pub fn rough_diffuse_eval(material: &Material, angles: Angles) -> Vec3 {
     let r = material.roughness;
     let whole = 1.0 / (1.0 + r * 0.287_793_4);
     let s = angles.between - wi * wo;
-    let once = whole * (1.0 + r * s / if s > 0.0 { max(max(wi, wo), 1e-6) } else { 1.0 });
+    let single = whole * (1.0 + r * s / if s > 0.0 { max(max(wi, wo), 1e-6) } else { 1.0 });
     let lost_i = max(1.0 - whole * (1.0 + r * rough_share(wi)), 1e-6);
     let lost_o = max(1.0 - whole * (1.0 + r * rough_share(wo)), 1e-6);
     let mean = whole * (1.0 + r * 0.072_488_21);
     let lost = max(1.0 - mean, 1e-6);
     let color = material.diffuse;
-    let often = color * color * (mean * lost_i * lost_o / lost) / (Vec3::ONE - color * (1.0 - mean));
-    (color * once + often) * (wi * FRAC_1_PI)
+    let multiple = color * color * (mean * lost_i * lost_o / lost) / (Vec3::ONE - color * (1.0 - mean));
+    (color * single + multiple) * (wi * FRAC_1_PI)
 }
 
 pub fn rough_share(cosine: f32) -> f32 {

@@ -183,7 +183,7 @@ mod tests {
         assert!(occludes([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.5), "into");
         assert!(
             occludes([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.7),
-            "into, past the middle"
+            "into, continue_through the middle"
         );
         assert!(
             occludes([-1.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.2),

@@ -2,9 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
-use super::lobe::{facet_alpha, streak_place};
+use super::lobe::{aniso_table_position, facet_alpha};
 use super::math::{floor, max, min};
-use crate::records::{ENERGY_SIZE, Material, Packed, ROUGH_GLASS, STREAK_COLUMNS, STREAK_LINES};
+use crate::records::{ANISO_COLUMNS, ANISO_LINES, ENERGY_SIZE, Material, Packed, ROUGH_GLASS};
 
 pub fn single_scatter_albedo(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
     let last = (ENERGY_SIZE - 1) as f32;
@@ -28,22 +28,22 @@ pub fn single_scatter_albedo_aniso(scene: &Packed, material: &Material, alpha: V
     let rows = [word(start), word(start + 1)];
     let rough = min(max(material.roughness, 0.0), 1.0) * (rows[0] - 1) as f32;
     let long = min(max(material.anisotropy, 0.0), 1.0) * (rows[1] - 1) as f32;
-    let place = streak_place(alpha, wo);
-    let line = place.x * (STREAK_LINES - 1) as f32;
-    let column = place.y * (STREAK_COLUMNS - 1) as f32;
+    let position = aniso_table_position(alpha, wo);
+    let line = position.x * (ANISO_LINES - 1) as f32;
+    let column = position.y * (ANISO_COLUMNS - 1) as f32;
     let r = max(min(floor(rough), rows[0] as f32 - 2.0), 0.0);
     let s = max(min(floor(long), rows[1] as f32 - 2.0), 0.0);
-    let i = min(floor(line), STREAK_LINES as f32 - 2.0);
-    let j = min(floor(column), STREAK_COLUMNS as f32 - 2.0);
-    let first = start + 2 + part * rows[0] * rows[1] * (STREAK_LINES * STREAK_COLUMNS);
+    let i = min(floor(line), ANISO_LINES as f32 - 2.0);
+    let j = min(floor(column), ANISO_COLUMNS as f32 - 2.0);
+    let first = start + 2 + part * rows[0] * rows[1] * (ANISO_LINES * ANISO_COLUMNS);
     let value = |i: u32| f32::from_bits(word(i));
     let mut sum = 0.0;
     for k in 0..if rows[0] > 1 { 2 } else { 1 } {
         for l in 0..if rows[1] > 1 { 2 } else { 1 } {
             let row = (r as u32 + k) * rows[1] + s as u32 + l;
-            let at = first + (row * STREAK_LINES + i as u32) * STREAK_COLUMNS + j as u32;
+            let at = first + (row * ANISO_LINES + i as u32) * ANISO_COLUMNS + j as u32;
             let across = Vec2::new(value(at), value(at + 1));
-            let along = Vec2::new(value(at + STREAK_COLUMNS), value(at + STREAK_COLUMNS + 1));
+            let along = Vec2::new(value(at + ANISO_COLUMNS), value(at + ANISO_COLUMNS + 1));
             let both = across + (along - across) * (line - i);
             let rougher = if k == 1 { rough - r } else { 1.0 - (rough - r) };
             let longer = if l == 1 { long - s } else { 1.0 - (long - s) };

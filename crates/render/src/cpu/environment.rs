@@ -93,13 +93,9 @@ pub fn environment_eval(scene: &Packed, direction: Vec3, normal: Vec3) -> Enviro
 }
 
 pub fn environment_mis(scene: &Packed, direction: Vec3, pdf: f32, normal: Vec3) -> Vec3 {
-    let arriving = environment_eval(scene, direction, normal);
-    let weight = if pdf > 0.0 {
-        power_heuristic(pdf, arriving.pdf)
-    } else {
-        1.0
-    };
-    arriving.radiance * weight
+    let eval = environment_eval(scene, direction, normal);
+    let weight = if pdf > 0.0 { power_heuristic(pdf, eval.pdf) } else { 1.0 };
+    eval.radiance * weight
 }
 
 pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) -> LightSample {
@@ -112,8 +108,8 @@ pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) 
     let (width, height) = (around.width, around.height);
     let down = around.shifts >> 8;
     let along = around.shifts & 255;
-    let left = UVec2::new(width - (column.index << along), height + 1 - (row.index << down));
-    let size = left.min(UVec2::new(1 << along, 1 << down));
+    let remaining = UVec2::new(width - (column.index << along), height + 1 - (row.index << down));
+    let size = remaining.min(UVec2::new(1 << along, 1 << down));
     let x = column.position * size.x as f32;
     let y = row.position * size.y as f32;
     let cell = UVec2::new(x as u32, y as u32);
@@ -128,11 +124,11 @@ pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) 
     let inside = Vec2::new(x - cell.x as f32, y - cell.y as f32);
     let d = direction_in_cell(chosen & 65_535, chosen >> 16, inside, width, height);
     let to = normalize(around.x * d.x + around.y * d.y + around.z * d.z);
-    let arriving = environment_eval(scene, to, normal);
+    let eval = environment_eval(scene, to, normal);
     LightSample {
         to,
-        radiance: arriving.radiance,
-        pdf: arriving.pdf,
+        radiance: eval.radiance,
+        pdf: eval.pdf,
         is_delta: false,
         t_max: light.t_max,
         primitive: NO_INDEX,

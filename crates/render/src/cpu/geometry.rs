@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4Swizzles as _};
 
-use super::alpha::first_seen;
+use super::alpha::skip_transparent;
 use super::bvh::{closest_in_tree, is_occluded_by_bvh, occluded_by_bvh};
 use super::camera::camera_ray;
 use super::differential::{Differential, HitDifferential, arrival};
@@ -17,7 +17,7 @@ use super::mesh::{
 use super::panorama::panorama_ray;
 use super::path::{Path, pass_through_path};
 use super::primitive::Tangents;
-use super::ray::{Hit, Ray, by_itself};
+use super::ray::{Hit, Ray, standalone_prim};
 use super::shadow::SampleBlock;
 use super::surface::{Surface, first_hit, surface_at, with_coordinates};
 use crate::records::{
@@ -29,7 +29,7 @@ pub fn closest_hit(scene: &Packed, ray: Ray, origin_prim: UVec2, inside_prim: UV
     if scene.specialization.tlas_kinds == 0 {
         return closest_primitive(scene, ray, origin_prim.y, inside_prim.y);
     }
-    let hit = closest_primitive(scene, ray, by_itself(origin_prim), by_itself(inside_prim));
+    let hit = closest_primitive(scene, ray, standalone_prim(origin_prim), standalone_prim(inside_prim));
     closest_in_tree(scene, hit, ray, origin_prim, inside_prim)
 }
 
@@ -90,7 +90,7 @@ fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> HitPrimitive {
         tangents_1: Tangents::default(),
         tangents_2: Tangents::default(),
         anchor: i.anchor,
-        condition: i.condition,
+        condition_number: i.condition_number,
     };
     if i.attributes != NO_INDEX {
         let [n0, n1, n2] = corners.map(|vertex| mesh.attributes[vertex]);
@@ -126,8 +126,8 @@ pub fn surface_of(scene: &Packed, prim: &HitPrimitive, hit: Hit, ray: Ray) -> Su
     let s = &scene.specialization;
     let epsilon = scene.environment.shadow_epsilon;
     if is_on_mesh(hit) {
-        let place = UVec2::new(hit.instance, hit.primitive);
-        return face_surface(prim, place, hit.barycentric, ray.direction, epsilon);
+        let prim_id = UVec2::new(hit.instance, hit.primitive);
+        return face_surface(prim, prim_id, hit.barycentric, ray.direction, epsilon);
     }
     let q = &prim.primitive;
     let surface = surface_at(q, hit.primitive, ray, hit.t, epsilon);
@@ -165,11 +165,11 @@ pub fn footprint_of(prim: &HitPrimitive, hit: Hit, surface: Surface, at: HitDiff
     surface_footprint(&prim.primitive, surface, at.x.position, at.y.position)
 }
 
-pub fn view_ray(scene: &Packed, place: Vec2) -> Ray {
+pub fn view_ray(scene: &Packed, raster: Vec2) -> Ray {
     if scene.specialization.panoramic != 0 {
-        return panorama_ray(&scene.camera, place);
+        return panorama_ray(&scene.camera, raster);
     }
-    camera_ray(&scene.camera, place)
+    camera_ray(&scene.camera, raster)
 }
 
 pub fn skip_camera_invisible(scene: &Packed, start: Path) -> Path {
@@ -205,12 +205,12 @@ pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
         origin_prim: NO_PRIMITIVE,
         inside_prim: NO_PRIMITIVE,
     };
-    let is_occluded = scene.specialization.camera_invisible != 0;
-    if is_occluded {
+    let has_invisible = scene.specialization.camera_invisible != 0;
+    if has_invisible {
         path = skip_camera_invisible(scene, path);
     }
     let mut found = path_first_hit(scene, path);
-    if is_occluded && found.shape != NO_INDEX {
+    if has_invisible && found.shape != NO_INDEX {
         found.depth += dot(path.ray.origin - start.origin, start.direction);
     }
     found
@@ -220,7 +220,7 @@ pub fn path_first_hit(scene: &Packed, path: Path) -> FirstHit {
     let ray = path.ray;
     let mut hit = closest_hit(scene, ray, path.origin_prim, path.inside_prim);
     if scene.specialization.alpha_surfaces != 0 {
-        hit = first_seen(scene, ray, hit);
+        hit = skip_transparent(scene, ray, hit);
     }
     if hit.primitive == NO_INDEX {
         return FirstHit {

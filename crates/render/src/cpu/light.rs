@@ -7,29 +7,29 @@ use super::ray::vector_to_local;
 use crate::records::{Light, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segments {
+pub struct LightSegments {
     pub towards: Vec3,
     pub u: Vec3,
     pub v: Vec3,
 }
 
-pub fn segments_to_light(light: &Light, p: Vec3) -> Segments {
-    Segments {
+pub fn segments_to_light(light: &Light, p: Vec3) -> LightSegments {
+    LightSegments {
         towards: light.center - p * light.finite,
         u: light.u,
         v: light.v,
     }
 }
 
-pub fn segments_to_local(q: &Primitive, to: Segments) -> Segments {
-    Segments {
+pub fn segments_to_local(q: &Primitive, to: LightSegments) -> LightSegments {
+    LightSegments {
         towards: vector_to_local(q, to.towards),
         u: vector_to_local(q, to.u),
         v: vector_to_local(q, to.v),
     }
 }
 
-pub fn segment(to: Segments, at: Vec2) -> Vec3 {
+pub fn segment(to: LightSegments, at: Vec2) -> Vec3 {
     to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0)
 }
 

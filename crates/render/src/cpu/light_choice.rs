@@ -69,13 +69,13 @@ pub fn light_tree_pdf(scene: &Packed, hit: Hit, wanted: bool, p: Vec3, n: Vec3) 
 }
 
 pub fn light_leaf(scene: &Packed, hit: Hit) -> u32 {
-    let mut place = hit.primitive;
+    let mut position_in_tree = hit.primitive;
     if hit.instance != 0 {
         let leaves = scene.bvh.instances[hit.instance as usize - 1].leaves;
         if leaves == NO_INDEX {
             return NO_INDEX;
         }
-        place = leaves + hit.slot;
+        position_in_tree = leaves + hit.slot;
     }
-    scene.lighting.leaves[place as usize]
+    scene.lighting.leaves[position_in_tree as usize]
 }

@@ -5,8 +5,8 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::primitive::intersect;
-use super::ray::{Hit, Ray, by_itself, closer, no_hit};
-use super::shadow::{Cone, SampleBlock, light_frustum, may_block, occludes_segment, occlusion_mask};
+use super::ray::{Hit, Ray, closer, no_hit, standalone_prim};
+use super::shadow::{SampleBlock, ShadowFrustum, light_frustum, may_block, occludes_segment, occlusion_mask};
 use super::surface::Surface;
 use crate::records::{Light, Packed, Primitive, with_primitive_kind};
 
@@ -22,11 +22,11 @@ pub fn closest_primitive(scene: &Packed, ray: Ray, origin_prim: u32, inside_prim
 }
 
 pub fn occluded_by_primitives(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
-    let cone = light_frustum(light, surface.ray_origin);
+    let frustum = light_frustum(light, surface.ray_origin);
     let mut bits = 0;
     for (kind, range) in scene.shadow_casters() {
         bits |= with_primitive_kind!(kind, |kind| occluded_by(
-            scene, kind, range, surface, &cone, light, block
+            scene, kind, range, surface, &frustum, light, block
         ));
     }
     bits
@@ -53,8 +53,8 @@ pub fn is_occluded_by_primitive(
     t_max: f32,
     target_prim: u32,
 ) -> bool {
-    let is_inside = i == by_itself(surface.exclude_back);
-    (i != by_itself(surface.exclude_front)) & (i != target_prim)
+    let is_inside = i == standalone_prim(surface.exclude_back);
+    (i != standalone_prim(surface.exclude_front)) & (i != target_prim)
         && occludes_segment(kind, q, surface.ray_origin, is_inside, to, t_max)
 }
 
@@ -64,7 +64,7 @@ fn occluded_by(
     kind: u32,
     range: Range<usize>,
     surface: &Surface,
-    cone: &Cone,
+    frustum: &ShadowFrustum,
     light: &Light,
     block: SampleBlock,
 ) -> u32 {
@@ -72,8 +72,15 @@ fn occluded_by(
     for i in range {
         let (q, sphere) = (&scene.primitives[i], &scene.bounds[i]);
         let i = i as u32;
-        if (i != by_itself(surface.exclude_front)) & may_block(sphere, cone) {
-            bits |= occlusion_mask(kind, q, cone.apex, i == by_itself(surface.exclude_back), light, block);
+        if (i != standalone_prim(surface.exclude_front)) & may_block(sphere, frustum) {
+            bits |= occlusion_mask(
+                kind,
+                q,
+                frustum.apex,
+                i == standalone_prim(surface.exclude_back),
+                light,
+                block,
+            );
         }
     }
     bits

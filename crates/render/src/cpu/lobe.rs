@@ -74,8 +74,8 @@ pub fn half_vector(wo: Vec3, wi: Vec3) -> Vec3 {
 pub fn facet_eval(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
     let o = wo.z.abs();
     let i = wi.z.abs();
-    let seen = 0.5 * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
-    ggx_d(alpha, half_vector(wo, wi)) * seen
+    let masking = 0.5 * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
+    ggx_d(alpha, half_vector(wo, wi)) * masking
 }
 
 pub fn facet_pdf(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
@@ -87,18 +87,18 @@ pub fn facet_weight(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
     wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30)
 }
 
-pub fn streak_place(alpha: Vec2, w: Vec3) -> Vec2 {
+pub fn aniso_table_position(alpha: Vec2, w: Vec3) -> Vec2 {
     let x = alpha.x * w.x;
     let y = alpha.y * w.y;
     let square = (x * x + y * y) / max(w.x * w.x + w.y * w.y, 1e-30);
-    let seen = max(square.sqrt(), alpha.y);
-    let line = min((seen - alpha.y) / max(alpha.x - alpha.y, 1e-6), 1.0).sqrt();
-    let half_way = 0.5 * seen.sqrt();
+    let roughness = max(square.sqrt(), alpha.y);
+    let line = min((roughness - alpha.y) / max(alpha.x - alpha.y, 1e-6), 1.0).sqrt();
+    let half_way = 0.5 * roughness.sqrt();
     let cosine = min(max(w.z, 0.0), 1.0);
     Vec2::new(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)))
 }
 
 pub fn facet_loss(alpha: Vec2, wo: Vec3) -> f32 {
-    let once = ggx_albedo_along(alpha, wo);
-    max(1.0 / (once.x + once.y) - 1.005, 0.0)
+    let albedo = ggx_albedo_along(alpha, wo);
+    max(1.0 / (albedo.x + albedo.y) - 1.005, 0.0)
 }

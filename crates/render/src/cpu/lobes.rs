@@ -104,7 +104,7 @@ mod tests {
     use glam::UVec2;
 
     use super::*;
-    use crate::cpu::light::{Segments, segment};
+    use crate::cpu::light::{LightSegments, segment};
     use crate::cpu::phong::{is_lit, phong_lobes};
     use crate::cpu::samples::Samples;
     use crate::cpu::shadow::{SampleBlock, block_sample};
@@ -133,7 +133,7 @@ mod tests {
     /// Every set of instructions gives the bits of the functions for one sample.
     #[test]
     fn all_at_once_is_one_by_one() {
-        let to = Segments {
+        let to = LightSegments {
             towards: Vec3::new(0.3, -0.4, 0.5),
             u: Vec3::new(0.7, 0.1, 0.2),
             v: Vec3::new(-0.2, 0.9, 0.4),

@@ -48,7 +48,7 @@ pub fn sheared(v: Vec3, shear: Shear) -> Vec3 {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    pub met: bool,
+    pub is_hit: bool,
     pub t: f32,
     pub barycentric: Vec2,
 }
@@ -63,11 +63,11 @@ pub fn triangle_crossing(v0: Vec3, v1: Vec3, v2: Vec3, origin: Vec3, shear: Shea
     let sum = u + v + w;
     let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
     let t = (u * a.z + v * b.z + w * c.z) / sum;
-    let passage = box_interval(lowest(v0, v1, v2), highest(v0, v1, v2), s);
-    let met = inside & (sum.abs() > 0.0) & interval_hits(passage, INFINITE_T);
+    let interval = box_interval(lowest(v0, v1, v2), highest(v0, v1, v2), s);
+    let is_hit = inside & (sum.abs() > 0.0) & interval_hits(interval, INFINITE_T);
     Crossing {
-        met,
-        t: min(passage.y, max(passage.x, t)),
+        is_hit,
+        t: min(interval.y, max(interval.x, t)),
         barycentric: Vec2::new(v / sum, w / sum),
     }
 }
@@ -125,7 +125,7 @@ pub struct HitPrimitive {
     pub tangents_1: Tangents,
     pub tangents_2: Tangents,
     pub anchor: Vec3,
-    pub condition: f32,
+    pub condition_number: f32,
 }
 
 pub fn standalone_hit_primitive(q: &Primitive) -> HitPrimitive {
@@ -143,7 +143,7 @@ pub fn standalone_hit_primitive(q: &Primitive) -> HitPrimitive {
         tangents_1: Tangents::default(),
         tangents_2: Tangents::default(),
         anchor: Vec3::ZERO,
-        condition: 0.0,
+        condition_number: 0.0,
     }
 }
 
@@ -172,7 +172,7 @@ pub fn face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, materi
     }
 }
 
-pub fn face_surface(face: &HitPrimitive, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface {
+pub fn face_surface(face: &HitPrimitive, prim_id: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface {
     let q = &face.primitive;
     let from_anchor = face.edge_1 * b.x + face.edge_2 * b.y;
     let position = q.anchor + from_anchor;
@@ -182,8 +182,8 @@ pub fn face_surface(face: &HitPrimitive, place: UVec2, b: Vec2, d: Vec3, epsilon
         max(largest(face.edge_1), largest(face.edge_2)),
         largest(face.edge_2 - face.edge_1),
     );
-    let size =
-        max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition);
+    let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge)
+        * max(1.0, 0.125 * face.condition_number);
     let start = position + (normal - d) * (epsilon * size);
     let tangents = face_frame(face, b);
     let smooth_normal = face_normal(face, b) * side;
@@ -194,10 +194,10 @@ pub fn face_surface(face: &HitPrimitive, place: UVec2, b: Vec2, d: Vec3, epsilon
         shading_normal: smooth_normal,
         wo: -d,
         ray_origin: start,
-        terminator_offset: face_bulge(face, b, side),
+        terminator_offset: face_terminator_offset(face, b, side),
         side,
-        exclude_front: place,
-        exclude_back: place,
+        exclude_front: prim_id,
+        exclude_back: prim_id,
         uv: face_uv(face, b),
         du: tangents.u,
         dv: tangents.v,
@@ -217,30 +217,34 @@ pub fn face_normal(face: &HitPrimitive, b: Vec2) -> Vec3 {
     let length2 = dot(n, n);
     let unit = n / max(length2, 1e-12).sqrt();
     if length2 > 1e-12 {
-        turned_to(unit, face.primitive.z)
+        flipped_to(unit, face.primitive.z)
     } else {
         face.primitive.z
     }
 }
 
-pub fn turned_to(v: Vec3, side: Vec3) -> Vec3 {
+pub fn flipped_to(v: Vec3, side: Vec3) -> Vec3 {
     v * if dot(v, side) < 0.0 { -1.0 } else { 1.0 }
 }
 
-pub fn face_bulge(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3 {
+pub fn face_terminator_offset(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3 {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
-    let lift_0 = lift(turned_to(face.normal_0, up), p, up);
-    let lift_1 = lift(turned_to(face.normal_1, up), p - face.edge_1, up);
-    let lift_2 = lift(turned_to(face.normal_2, up), p - face.edge_2, up);
+    let lift_0 = lift(flipped_to(face.normal_0, up), p, up);
+    let lift_1 = lift(flipped_to(face.normal_1, up), p - face.edge_1, up);
+    let lift_2 = lift(flipped_to(face.normal_2, up), p - face.edge_2, up);
     lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y
 }
 
-pub fn lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3 {
-    n * if dot(n, up) > 0.8 { max(-dot(n, way), 0.0) } else { 0.0 }
+pub fn lift(n: Vec3, to_vertex: Vec3, up: Vec3) -> Vec3 {
+    n * if dot(n, up) > 0.8 {
+        max(-dot(n, to_vertex), 0.0)
+    } else {
+        0.0
+    }
 }
 
-pub fn face_lets_pass(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool {
+pub fn face_direction_allowed(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool {
     let fall = -dot(surface.normal, to);
     let height = dot(surface.normal, surface.terminator_offset);
     let crossing = surface.position + surface.terminator_offset + to * (height / max(fall, 1e-30));

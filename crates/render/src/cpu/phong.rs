@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-use super::light::Segments;
+use super::light::LightSegments;
 use super::lobes::{lit_bits, lobes_of_all};
 use super::math::{dot, max, power, power_whole};
-use super::mesh::{HitPrimitive, face_lets_pass};
+use super::mesh::{HitPrimitive, face_direction_allowed};
 use super::samples::{LEVEL, Samples};
 use super::shadow::SampleBlock;
 use super::surface::Surface;
@@ -36,13 +36,13 @@ pub fn is_lit(surface: &Surface, to: Vec3) -> bool {
     (dot(surface.shading_normal, to) > 0.0) & (dot(surface.smooth_normal, to) > 0.0)
 }
 
-pub fn unlit_mask(prim: &HitPrimitive, surface: &Surface, to: Segments, block: SampleBlock) -> u32 {
+pub fn unlit_mask(prim: &HitPrimitive, surface: &Surface, to: LightSegments, block: SampleBlock) -> u32 {
     let to = Samples::of(block).segments(*LEVEL, to);
     let lit = lit_bits(*LEVEL, surface, &to);
     let mut bits = to.all() & !lit;
     if surface.smooth_normal != surface.normal {
         for i in (0..to.count).filter(|i| (lit >> i) & 1 == 1) {
-            bits |= if face_lets_pass(prim, surface, to.get(i)) {
+            bits |= if face_direction_allowed(prim, surface, to.get(i)) {
                 0
             } else {
                 1 << i
@@ -63,7 +63,7 @@ pub fn phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32 {
 pub fn phong_block(
     surface: &Surface,
     material: &Material,
-    to: Segments,
+    to: LightSegments,
     block: SampleBlock,
     occluded: u32,
     exponent_bits: u32,

@@ -47,19 +47,19 @@ pub fn camera_sample(scene: &Packed, pixel: UVec2, sample: u32) -> CameraSample 
     let key = sample_key(pixel, scene.camera.seed, 0);
     let u = sample_square(s.pixel_pattern, s.pixel_side, index, round, key);
     let at = filtered(scene, u);
-    let place = pixel.as_vec2() + at.truncate();
-    let mut ray = view_ray(scene, place);
+    let raster = pixel.as_vec2() + at.truncate();
+    let mut ray = view_ray(scene, raster);
     if s.lens != 0 {
-        ray = lens_ray(&scene.camera, place, lens_place(scene, pixel, sample));
+        ray = lens_ray(&scene.camera, raster, lens_point(scene, pixel, sample));
     }
     CameraSample {
         ray,
-        differential: differential_at(scene, place),
+        differential: differential_at(scene, raster),
         weight: at.z,
     }
 }
 
-pub fn lens_place(scene: &Packed, pixel: UVec2, sample: u32) -> Vec2 {
+pub fn lens_point(scene: &Packed, pixel: UVec2, sample: u32) -> Vec2 {
     let key = hash4(UVec4::new(pixel.x, pixel.y, scene.camera.seed, 0)).zw();
     let mut u = sobol_sample(sample, key);
     if scene.specialization.pixel_pattern == RANDOM {
@@ -77,16 +77,16 @@ pub struct Layers {
     pub normal: Vec4,
 }
 
-pub fn differential_at(scene: &Packed, place: Vec2) -> Differential {
+pub fn differential_at(scene: &Packed, raster: Vec2) -> Differential {
     let s = &scene.specialization;
     if s.differentials == 0 {
         return Differential::default();
     }
     let spacing = 1.0 / (s.pixel_samples as f32).sqrt();
     if s.panoramic != 0 {
-        return panorama_differential(&scene.camera, place, spacing);
+        return panorama_differential(&scene.camera, raster, spacing);
     }
-    camera_differential(&scene.camera, place, spacing)
+    camera_differential(&scene.camera, raster, spacing)
 }
 
 pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {

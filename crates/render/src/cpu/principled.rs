@@ -9,7 +9,7 @@ use super::specular::{fresnel, refracted_cosine, refracted_direction};
 use super::surface::largest;
 use super::warp::{disk_sample, frame_around, vector_around};
 use crate::records::{
-    COAT_F0, LEAST_SHEEN, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Material,
+    COAT_F0, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, MIN_SHEEN_ROUGHNESS, Material,
     SMALLEST_ALPHA,
 };
 
@@ -20,10 +20,10 @@ pub struct PrincipledLobes {
     pub f0: Vec3,
     pub f90: Vec3,
     pub glass: f32,
-    pub passed: Vec3,
+    pub transmission_tint: Vec3,
     pub glass_f0: Vec3,
     pub glass_f90: f32,
-    pub head_on: f32,
+    pub f0_ior: f32,
     pub ratio: f32,
     pub eta: f32,
     pub thin: bool,
@@ -32,7 +32,7 @@ pub struct PrincipledLobes {
     pub coat_normal: Vec3,
     pub sheen: Vec3,
     pub sheen_alpha: f32,
-    pub chances: Vec4,
+    pub lobe_probs: Vec4,
 }
 
 pub fn principled_mixture(
@@ -56,7 +56,7 @@ pub fn principled_mixture(
         (true, true) => 1.0 / material.ior,
         (true, false) => material.ior,
     };
-    let mut left = 1.0;
+    let mut layer_throughput = 1.0;
     m.coat_normal = coat_normal;
     let over = outside | !volume;
     let mut coat_share = 0.0;
@@ -69,17 +69,17 @@ pub fn principled_mixture(
         m.coat = if over & (cosine > 0.0) { material.clearcoat } else { 0.0 };
         let reflected = ggx_albedo(m.coat_alpha, max(cosine, 0.0));
         coat_share = min(m.coat * (COAT_F0 * reflected.x + reflected.y), 1.0);
-        left = 1.0 - coat_share;
+        layer_throughput = 1.0 - coat_share;
     }
     let mut sheen_share = 0.0;
     if lobes & LOBE_SHEEN != 0 {
-        let roughness = max(material.sheen_roughness, LEAST_SHEEN);
+        let roughness = max(material.sheen_roughness, MIN_SHEEN_ROUGHNESS);
         m.sheen_alpha = roughness * roughness;
         let albedo = sheen_albedo(roughness, wo.z);
-        m.sheen = material.sheen * (if over { left } else { 0.0 } / max(albedo, 1.0));
+        m.sheen = material.sheen * (if over { layer_throughput } else { 0.0 } / max(albedo, 1.0));
         let bounded = min(albedo, 1.0);
         sheen_share = luminance(m.sheen) * albedo;
-        left *= if over {
+        layer_throughput *= if over {
             max(1.0 - largest(material.sheen) * bounded, 0.0)
         } else {
             1.0
@@ -87,63 +87,59 @@ pub fn principled_mixture(
     }
     let base = material.diffuse;
     let dielectric = 1.0 - material.metallic;
-    let ground = dielectric * (1.0 - material.transmission);
+    let diffuse_weight = dielectric * (1.0 - material.transmission);
     let ratio = (material.ior - 1.0) / (material.ior + 1.0);
     let mut reflected = Vec3::ZERO;
     let mut inner = Vec3::ZERO;
     let mut share = Vec2::ZERO;
-    let mut lost = 0.0;
+    let mut compensation = 0.0;
     if lobes & (LOBE_SPECULAR | LOBE_TRANSMISSION) != 0 {
         share = ggx_albedo(m.alpha.y, wo.z);
-        let mut certain = 1.005;
+        let mut lower_bound = 1.005;
         if lobes & LOBE_ANISOTROPY != 0 && material.aniso_table != 0 {
             share = energy.xy();
-            certain = 1.0;
+            lower_bound = 1.0;
         }
-        lost = max(1.0 / max(share.x + share.y, 1e-3) - certain, 0.0);
+        compensation = max(1.0 / max(share.x + share.y, 1e-3) - lower_bound, 0.0);
         let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
         let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
-        let inner_gain = Vec3::ONE + inner_f0 * lost;
-        let metal_gain = (Vec3::ONE + base * lost) * (material.metallic * left);
-        m.f0 = inner_f0 * inner_gain * (ground * left) + base * metal_gain;
-        m.f90 = inner_gain * (inner_f90 * (ground * left)) + metal_gain;
+        let inner_gain = Vec3::ONE + inner_f0 * compensation;
+        let metal_gain = (Vec3::ONE + base * compensation) * (material.metallic * layer_throughput);
+        m.f0 = inner_f0 * inner_gain * (diffuse_weight * layer_throughput) + base * metal_gain;
+        m.f90 = inner_gain * (inner_f90 * (diffuse_weight * layer_throughput)) + metal_gain;
         reflected = m.f0 * share.x + m.f90 * share.y;
         inner = (inner_f0 * share.x + Vec3::splat(inner_f90 * share.y)) * inner_gain;
     }
-    m.diffuse = base * (ground * left * max(1.0 - largest(inner), 0.0));
-    let mut clear = 0.0;
+    m.diffuse = base * (diffuse_weight * layer_throughput * max(1.0 - largest(inner), 0.0));
+    let mut glass_weight = 0.0;
     if lobes & LOBE_TRANSMISSION != 0 {
-        let head_on = ratio * ratio;
-        m.head_on = if m.thin {
-            2.0 * head_on / (1.0 + head_on)
-        } else {
-            head_on
-        };
-        m.glass_f0 = bounded_color(material.specular * m.head_on) * material.specular_weight;
+        let f0_ior = ratio * ratio;
+        m.f0_ior = if m.thin { 2.0 * f0_ior / (1.0 + f0_ior) } else { f0_ior };
+        m.glass_f0 = bounded_color(material.specular * m.f0_ior) * material.specular_weight;
         m.glass_f90 = material.specular_weight;
         m.ratio = if outside | m.thin {
             1.0 / material.ior
         } else {
             material.ior
         };
-        let kept = max(energy.z, 1e-3);
-        let gain = match (passes_straight(&m), m.thin) {
+        let glass_albedo = max(energy.z, 1e-3);
+        let gain = match (transmits_straight(&m), m.thin) {
             (true, _) => 1.0,
-            (_, true) => 1.0 + lost,
-            (_, false) => 1.0 / kept,
+            (_, true) => 1.0 + compensation,
+            (_, false) => 1.0 / glass_albedo,
         };
-        let glass = dielectric * material.transmission * left;
+        let glass = dielectric * material.transmission * layer_throughput;
         m.glass = glass * gain;
-        m.passed = base * m.glass;
+        m.transmission_tint = base * m.glass;
         let mirrored = min(
             luminance(m.glass_f0 * share.x + Vec3::splat(m.glass_f90 * share.y)),
             1.0,
         );
-        clear = glass * (luminance(base) * (1.0 - mirrored) + mirrored);
+        glass_weight = glass * (luminance(base) * (1.0 - mirrored) + mirrored);
     }
-    let weights = Vec4::new(luminance(m.diffuse), luminance(reflected), clear, coat_share);
+    let weights = Vec4::new(luminance(m.diffuse), luminance(reflected), glass_weight, coat_share);
     let sum = weights.x + weights.y + weights.z + weights.w + sheen_share;
-    m.chances = if sum > 1e-30 {
+    m.lobe_probs = if sum > 1e-30 {
         weights * (1.0 / max(sum, 1e-30))
     } else {
         Vec4::X
@@ -159,8 +155,11 @@ pub fn luminance(color: Vec3) -> f32 {
     0.2126 * color.x + 0.7152 * color.y + 0.0722 * color.z
 }
 
-pub fn sheen_chance(m: &PrincipledLobes) -> f32 {
-    max(1.0 - (m.chances.x + m.chances.y + m.chances.z + m.chances.w), 0.0)
+pub fn sheen_probability(m: &PrincipledLobes) -> f32 {
+    max(
+        1.0 - (m.lobe_probs.x + m.lobe_probs.y + m.lobe_probs.z + m.lobe_probs.w),
+        0.0,
+    )
 }
 
 pub fn schlick(f0: Vec3, f90: Vec3, cosine: f32) -> Vec3 {
@@ -174,7 +173,7 @@ pub fn glass_fresnel(m: &PrincipledLobes, cosine: f32) -> Vec3 {
     let behind = refracted_cosine(c, m.ratio);
     let once = fresnel(c, behind, m.ratio);
     let exact = if m.thin { 2.0 * once / (1.0 + once) } else { once };
-    let x = (exact - m.head_on) / max(1.0 - m.head_on, 1e-6);
+    let x = (exact - m.f0_ior) / max(1.0 - m.f0_ior, 1e-6);
     let f = m.glass_f0 + (Vec3::splat(m.glass_f90) - m.glass_f0) * x;
     if behind == 0.0 {
         Vec3::ONE
@@ -183,11 +182,11 @@ pub fn glass_fresnel(m: &PrincipledLobes, cosine: f32) -> Vec3 {
     }
 }
 
-pub fn glass_chance(m: &PrincipledLobes, cosine: f32) -> f32 {
+pub fn glass_probability(m: &PrincipledLobes, cosine: f32) -> f32 {
     min(luminance(glass_fresnel(m, cosine)), 1.0)
 }
 
-pub fn passes_straight(m: &PrincipledLobes) -> bool {
+pub fn transmits_straight(m: &PrincipledLobes) -> bool {
     is_flat(m.alpha) | (!m.thin & ((m.eta - 1.0).abs() < 1e-3))
 }
 
@@ -224,7 +223,7 @@ pub fn principled_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3, lobes: u32) -> V
         let half = half_between(wo, wi);
         value += schlick(m.f0, m.f90, max(dot(wo, half), 0.0)) * facets_eval(m.alpha, wo, wi, half);
     }
-    if lobes & LOBE_TRANSMISSION != 0 && !passes_straight(m) {
+    if lobes & LOBE_TRANSMISSION != 0 && !transmits_straight(m) {
         value += glass_eval(m, wo, wi);
     }
     if (lobes & LOBE_COAT != 0) && (wi.z > 0.0) & (m.coat > 0.0) {
@@ -245,7 +244,7 @@ pub fn glass_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> Vec3 {
         let factor = if above {
             reflected * m.glass
         } else {
-            m.passed * (Vec3::ONE - reflected)
+            m.transmission_tint * (Vec3::ONE - reflected)
         };
         return factor * facets_eval(m.alpha, wo, up, half);
     }
@@ -253,18 +252,18 @@ pub fn glass_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> Vec3 {
     let reflected = glass_fresnel(m, dot(wo, half));
     let seen = ggx_pdf(m.alpha, wo, half) * ggx_g1(m.alpha, wi);
     let density = seen * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta);
-    m.passed * (Vec3::ONE - reflected) * density
+    m.transmission_tint * (Vec3::ONE - reflected) * density
 }
 
 pub fn glass_pdf(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> f32 {
     let above = wi.z > 0.0;
     if above | m.thin {
         let half = half_between(wo, Vec3::new(wi.x, wi.y, wi.z.abs()));
-        let chance = glass_chance(m, dot(wo, half));
+        let chance = glass_probability(m, dot(wo, half));
         return mirrored_pdf(m.alpha, wo, half) * if above { chance } else { 1.0 - chance };
     }
     let half = refracting_half(wo, wi, m.eta);
-    let chance = glass_chance(m, dot(wo, half));
+    let chance = glass_probability(m, dot(wo, half));
     ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta) * (1.0 - chance)
 }
 
@@ -286,24 +285,24 @@ pub fn to_frame_around(n: Vec3, v: Vec3) -> Vec3 {
 }
 
 pub fn principled_pdf(m: &PrincipledLobes, wo: Vec3, wi: Vec3, lobes: u32) -> f32 {
-    let mut pdf = m.chances.x * (max(wi.z, 0.0) * std::f32::consts::FRAC_1_PI);
+    let mut pdf = m.lobe_probs.x * (max(wi.z, 0.0) * std::f32::consts::FRAC_1_PI);
     if (lobes & LOBE_SPECULAR != 0) && (wi.z > 0.0) & !is_flat(m.alpha) {
-        pdf += m.chances.y * mirrored_pdf(m.alpha, wo, half_between(wo, wi));
+        pdf += m.lobe_probs.y * mirrored_pdf(m.alpha, wo, half_between(wo, wi));
     }
-    if lobes & LOBE_TRANSMISSION != 0 && (m.chances.z > 0.0) & !passes_straight(m) {
-        pdf += m.chances.z * glass_pdf(m, wo, wi);
+    if lobes & LOBE_TRANSMISSION != 0 && (m.lobe_probs.z > 0.0) & !transmits_straight(m) {
+        pdf += m.lobe_probs.z * glass_pdf(m, wo, wi);
     }
     if lobes & LOBE_COAT != 0 {
         let o = to_frame_around(m.coat_normal, wo);
         let i = to_frame_around(m.coat_normal, wi);
         let alpha = Vec2::splat(m.coat_alpha);
-        if (m.chances.w > 0.0) & (i.z > 0.0) & !is_flat(alpha) {
-            pdf += m.chances.w * mirrored_pdf(alpha, o, half_between(o, i));
+        if (m.lobe_probs.w > 0.0) & (i.z > 0.0) & !is_flat(alpha) {
+            pdf += m.lobe_probs.w * mirrored_pdf(alpha, o, half_between(o, i));
         }
     }
     if lobes & LOBE_SHEEN != 0 {
         pdf += if wi.z > 0.0 {
-            sheen_chance(m) * 0.159_154_94
+            sheen_probability(m) * 0.159_154_94
         } else {
             0.0
         };
@@ -320,7 +319,7 @@ pub fn mirrored_pdf(alpha: Vec2, wo: Vec3, half: Vec3) -> f32 {
     }
 }
 
-pub fn nowhere() -> LobeSample {
+pub fn no_sample() -> LobeSample {
     LobeSample {
         wi: Vec3::Z,
         weight: Vec3::ZERO,
@@ -335,27 +334,27 @@ pub fn principled_sample(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lo
     let mut is_delta = false;
     let mut weight = Vec3::ZERO;
     let mut eta = 1.0;
-    let mut rest = random - m.chances.x;
+    let mut rest = random - m.lobe_probs.x;
     if lobes & LOBE_SPECULAR != 0 {
-        if (rest >= 0.0) & (rest < m.chances.y) {
+        if (rest >= 0.0) & (rest < m.lobe_probs.y) {
             is_delta = is_flat(m.alpha);
             let half = if is_delta { Vec3::Z } else { ggx_sample(m.alpha, wo, u) };
             wi = half * (2.0 * dot(wo, half)) - wo;
-            weight = schlick(m.f0, m.f90, wo.z) * (1.0 / m.chances.y);
+            weight = schlick(m.f0, m.f90, wo.z) * (1.0 / m.lobe_probs.y);
             if wi.z <= 0.0 {
-                return nowhere();
+                return no_sample();
             }
         }
-        rest -= m.chances.y;
+        rest -= m.lobe_probs.y;
     }
     if lobes & LOBE_TRANSMISSION != 0 {
-        if (rest >= 0.0) & (rest < m.chances.z) {
-            is_delta = passes_straight(m);
+        if (rest >= 0.0) & (rest < m.lobe_probs.z) {
+            is_delta = transmits_straight(m);
             let half = if is_delta { Vec3::Z } else { ggx_sample(m.alpha, wo, u) };
             let cosine = max(dot(wo, half), 1e-6);
             let reflected = glass_fresnel(m, cosine);
-            let chance = glass_chance(m, cosine);
-            let mirrors = rest < m.chances.z * chance;
+            let chance = glass_probability(m, cosine);
+            let mirrors = rest < m.lobe_probs.z * chance;
             let mirrored = half * (2.0 * cosine) - wo;
             let behind = refracted_cosine(cosine, m.eta);
             let bent = refracted_direction(-wo, half, m.eta, cosine, behind);
@@ -366,26 +365,26 @@ pub fn principled_sample(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lo
             };
             wi = normalize(if mirrors { mirrored } else { through });
             eta = if mirrors { 1.0 } else { m.eta };
-            let passing = m.passed * (Vec3::ONE - reflected) * (m.eta * m.eta);
-            let share = max(m.chances.z * if mirrors { chance } else { 1.0 - chance }, 1e-30);
+            let passing = m.transmission_tint * (Vec3::ONE - reflected) * (m.eta * m.eta);
+            let share = max(m.lobe_probs.z * if mirrors { chance } else { 1.0 - chance }, 1e-30);
             weight = if mirrors { reflected * m.glass } else { passing } * (1.0 / share);
             if wi.z * if mirrors { 1.0 } else { -1.0 } <= 0.0 {
-                return nowhere();
+                return no_sample();
             }
         }
-        rest -= m.chances.z;
+        rest -= m.lobe_probs.z;
     }
     if lobes & LOBE_COAT != 0 {
-        if (rest >= 0.0) & (rest < m.chances.w) {
+        if (rest >= 0.0) & (rest < m.lobe_probs.w) {
             let alpha = Vec2::splat(m.coat_alpha);
             is_delta = is_flat(alpha);
             let o = to_frame_around(m.coat_normal, wo);
             let half = if is_delta { Vec3::Z } else { ggx_sample(alpha, o, u) };
             wi = vector_around(m.coat_normal, half * (2.0 * dot(o, half)) - o);
-            let reflected = schlick(Vec3::splat(COAT_F0), Vec3::ONE, o.z) * (m.coat / m.chances.w);
+            let reflected = schlick(Vec3::splat(COAT_F0), Vec3::ONE, o.z) * (m.coat / m.lobe_probs.w);
             weight = if wi.z > 0.0 { reflected } else { Vec3::ZERO };
         }
-        rest -= m.chances.w;
+        rest -= m.lobe_probs.w;
     }
     if (lobes & LOBE_SHEEN != 0) && rest >= 0.0 {
         let height = 1.0 - p.x * p.x - p.y * p.y;

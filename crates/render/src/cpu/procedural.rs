@@ -63,7 +63,7 @@ pub fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let apart =
         wide_x | wide_y | (near_x & (offset.x.abs() >= 0.5 * t_max.x)) | (near_y & (offset.y.abs() >= 0.5 * t_max.y));
     let crossed = max(min(long.x.abs(), long.y.abs()), min(short.x.abs(), short.y.abs()));
-    let together = if crossed > MOST_PERIODS {
+    let together = if crossed > MAX_PERIODS {
         far_product(at, long, short, on)
     } else {
         let near = near_x & near_y;
@@ -168,7 +168,7 @@ pub fn along_edge(tail: Vec2, head: Vec2, on: f32, near: bool) -> f32 {
     let rise = high.y - low.y;
     let inverse = run / rise;
     let first = if near { 0.0 } else { floor(low.y) };
-    let most = min(floor(high.y) - first, MOST_PERIODS + 2.0);
+    let most = min(floor(high.y) - first, MAX_PERIODS + 2.0);
     let last = if near { 0.0 } else { most };
     let value_low = wave_value(low.y, on, near);
     let value_high = wave_value(high.y, on, near);
@@ -213,7 +213,7 @@ pub fn far_product(at: Vec2, long: Vec2, short: Vec2, on: f32) -> f32 {
     let turn = if a.x * a.y > 0.0 { -1.0 } else { 1.0 };
     let mut sum = 0.0;
     let mut i = 1.0;
-    while i <= MOST_HARMONICS {
+    while i <= MAX_HARMONICS {
         let n = turn * i;
         let m = floor(i * ratio + 0.5);
         let along = sine_ratio(m * a.x + n * a.y) * sine_ratio(m * b.x + n * b.y);
@@ -228,7 +228,7 @@ pub fn sine_ratio(x: f32) -> f32 {
     if x.abs() < 0.001 { 1.0 } else { sine(x) / (PI * x) }
 }
 
-const MOST_HARMONICS: f32 = 8.0;
-const MOST_PERIODS: f32 = 32.0;
+const MAX_HARMONICS: f32 = 8.0;
+const MAX_PERIODS: f32 = 32.0;
 const THINNEST: f32 = 0.001;
 const WIDEST: f32 = 4096.0;

@@ -30,8 +30,8 @@ pub fn no_hit() -> Hit {
     }
 }
 
-pub fn by_itself(place: UVec2) -> u32 {
-    if place.x == 0 { place.y } else { NO_INDEX }
+pub fn standalone_prim(prim_id: UVec2) -> u32 {
+    if prim_id.x == 0 { prim_id.y } else { NO_INDEX }
 }
 
 pub fn point_to_local(q: &Primitive, p: Vec3) -> Vec3 {

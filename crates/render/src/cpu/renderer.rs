@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::adaptive::{moments_with, pilot_add, pilot_finish, samples_wanted};
 use super::geometry::pixel_first_hit;
 use super::pixel::{Layers, pixel_radiance};
-use crate::backend::{Backend, Rules, Started};
+use crate::backend::{Backend, FilmState, Rules};
 use crate::error::RenderError;
 use crate::film::{Film, Layer};
 use crate::records::{FirstHit, Packed};
@@ -19,7 +19,7 @@ use wgray_image::Region;
 pub struct Cpu<'a> {
     scene: &'a Packed,
     rules: Rules,
-    film: Option<(Film, Started)>,
+    film: Option<(Film, FilmState)>,
     pending: Option<(Region, Range<u32>)>,
 }
 
@@ -120,14 +120,14 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
         region,
         sums,
         moments,
-        looks,
+        pilot_sums,
         layers,
     } = film;
     let region = *region;
     let first_looks = scene.sampling.adaptive && samples.start < scene.specialization.pilot_samples;
-    let (looks_to_read, looks_to_write) = match first_looks {
-        true => (&[][..], &mut looks[..]),
-        false => (&looks[..], &mut [][..]),
+    let (pilot_to_read, pilot_to_write) = match first_looks {
+        true => (&[][..], &mut pilot_sums[..]),
+        false => (&pilot_sums[..], &mut [][..]),
     };
     let runs = |records| runs(region, records, tile).into_iter();
     let sums = runs(sums);
@@ -136,15 +136,15 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
             first,
             sums,
             moments: &mut [],
-            looks: &mut [],
+            pilot_sums: &mut [],
             layers: Default::default(),
         })
         .collect();
     for (part, (_, moments)) in parts.iter_mut().zip(runs(moments)) {
         part.moments = moments;
     }
-    for (part, (_, looks)) in parts.iter_mut().zip(runs(looks_to_write)) {
-        part.looks = looks;
+    for (part, (_, pilot_sums)) in parts.iter_mut().zip(runs(pilot_to_write)) {
+        part.pilot_sums = pilot_sums;
     }
     for (i, layer) in layers.iter_mut().enumerate() {
         for (part, (_, layer)) in parts.iter_mut().zip(runs(layer)) {
@@ -163,8 +163,8 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
             } else if first_looks {
                 first_look(scene, pixel, samples.clone(), &mut run, x);
             } else {
-                let looks = neighbor_pilot_sum(looks_to_read, region, pixel);
-                further_samples(scene, pixel, samples.clone(), &mut run, x, looks);
+                let pilot_sums = neighbor_pilot_sum(pilot_to_read, region, pixel);
+                further_samples(scene, pixel, samples.clone(), &mut run, x, pilot_sums);
             }
         }
     });
@@ -175,7 +175,7 @@ struct Run<'a> {
     first: UVec2,
     sums: &'a mut [Vec4],
     moments: &'a mut [Vec4],
-    looks: &'a mut [Vec4],
+    pilot_sums: &'a mut [Vec4],
     layers: [&'a mut [Vec4]; Layer::ALL.len()],
 }
 
@@ -214,18 +214,23 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
 fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
     for sample in samples {
         let (value, layers) = pixel_radiance(scene, pixel, sample);
-        run.looks[x] = pilot_add(run.looks[x], run.sums[x], value);
+        run.pilot_sums[x] = pilot_add(run.pilot_sums[x], run.sums[x], value);
         run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
         run.sums[x] += value;
         run.add_layers(x, layers);
     }
-    run.looks[x] = pilot_finish(run.looks[x], run.sums[x], run.moments[x]);
+    run.pilot_sums[x] = pilot_finish(run.pilot_sums[x], run.sums[x], run.moments[x]);
 }
 
 /// Adds samples after the pilot samples to a pixel, as many as its neighbors' pilot samples require.
-fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, looks: Vec4) {
+fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, pilot_sums: Vec4) {
     let s = &scene.specialization;
-    let end = samples_wanted(looks, s.pilot_samples, f32::from_bits(s.squared_error), samples.end);
+    let end = samples_wanted(
+        pilot_sums,
+        s.pilot_samples,
+        f32::from_bits(s.squared_error),
+        samples.end,
+    );
     for sample in samples.start..end {
         let (value, layers) = pixel_radiance(scene, pixel, sample);
         run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
@@ -234,22 +239,22 @@ fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut 
     }
 }
 
-fn neighbor_pilot_sum(looks: &[Vec4], region: Region, pixel: UVec2) -> Vec4 {
+fn neighbor_pilot_sum(pilot_sums: &[Vec4], region: Region, pixel: UVec2) -> Vec4 {
     let (x, y) = (pixel.x - region.x0, pixel.y - region.y0);
     let width = region.width() as usize;
     let index = y as usize * width + x as usize;
     let mut sum = Vec4::ZERO;
     if y > 0 {
-        sum += looks[index - width];
+        sum += pilot_sums[index - width];
     }
     if x > 0 {
-        sum += looks[index - 1];
+        sum += pilot_sums[index - 1];
     }
     if x + 1 < region.width() {
-        sum += looks[index + 1];
+        sum += pilot_sums[index + 1];
     }
     if y + 1 < region.height() {
-        sum += looks[index + width];
+        sum += pilot_sums[index + width];
     }
     sum
 }

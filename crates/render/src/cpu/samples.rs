@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use fearless_simd::{Level, dispatch};
 
-use super::light::Segments;
+use super::light::LightSegments;
 use super::shadow::{SampleBlock, block_sample};
 use super::traversal::{Directions, MOST};
 use crate::records::GRID;
@@ -52,7 +52,7 @@ impl Samples {
     }
 
     /// The vectors to them.
-    pub fn segments(&self, level: Level, to: Segments) -> Directions {
+    pub fn segments(&self, level: Level, to: LightSegments) -> Directions {
         dispatch!(level, _simd => {
             let mut along = [[0.0; MOST]; 3];
             for (k, along) in along.iter_mut().enumerate() {

@@ -7,7 +7,7 @@ use super::diffuse::{angles_at, diffuse_eval, diffuse_pdf, rough_diffuse_eval};
 use super::energy::{principled_energy, single_scatter_albedo_aniso, single_scatter_albedo_glass};
 use super::lobe::{LobeSample, facet_alpha, facet_loss, is_polished, lobe_frame, vector_to_lobe};
 use super::math::{dot, max, min};
-use super::mesh::{HitPrimitive, face_lets_pass};
+use super::mesh::{HitPrimitive, face_direction_allowed};
 use super::metal::{metal_eval, metal_fresnel, metal_pdf, metal_sample};
 use super::modified_phong::{modified_phong_eval, modified_phong_pdf, phong_factors};
 use super::path::{is_specular, usable_normal};
@@ -30,10 +30,10 @@ pub static NO_MIXTURE: PrincipledLobes = PrincipledLobes {
     f0: Vec3::ZERO,
     f90: Vec3::ZERO,
     glass: 0.0,
-    passed: Vec3::ZERO,
+    transmission_tint: Vec3::ZERO,
     glass_f0: Vec3::ZERO,
     glass_f90: 0.0,
-    head_on: 0.0,
+    f0_ior: 0.0,
     ratio: 0.0,
     eta: 0.0,
     thin: false,
@@ -42,7 +42,7 @@ pub static NO_MIXTURE: PrincipledLobes = PrincipledLobes {
     coat_normal: Vec3::ZERO,
     sheen: Vec3::ZERO,
     sheen_alpha: 0.0,
-    chances: Vec4::ZERO,
+    lobe_probs: Vec4::ZERO,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -255,7 +255,7 @@ pub fn direction_allowed(
 ) -> bool {
     let mut lit = is_lit(surface, wi);
     if scene.specialization.tlas_kinds & (1 << INSTANCE) != 0 {
-        lit &= face_lets_pass(prim, surface, wi);
+        lit &= face_direction_allowed(prim, surface, wi);
     }
     if is_transmissive(material) {
         let behind = (dot(surface.shading_normal, wi) < 0.0) & (dot(surface.smooth_normal, wi) < 0.0);

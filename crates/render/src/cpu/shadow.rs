@@ -2,7 +2,7 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
-use super::light::{Segments, segments_to_light, segments_to_local};
+use super::light::{LightSegments, segments_to_light, segments_to_local};
 use super::math::dot;
 use super::primitive::{occludes, solid_levels};
 use super::ray::vector_to_local;
@@ -49,18 +49,18 @@ pub fn block_sample(block: SampleBlock, i: u32) -> Vec2 {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cone {
+pub struct ShadowFrustum {
     pub apex: Vec3,
-    pub to: Segments,
+    pub to: LightSegments,
     pub length2: f32,
     pub inverse_depth: f32,
 }
 
-pub fn light_frustum(light: &Light, p: Vec3) -> Cone {
+pub fn light_frustum(light: &Light, p: Vec3) -> ShadowFrustum {
     let to = segments_to_light(light, p);
     let length2 = dot(to.towards, to.towards);
     let depth = length2 - dot(to.towards, to.u).abs() - dot(to.towards, to.v).abs();
-    Cone {
+    ShadowFrustum {
         apex: p,
         to,
         length2,
@@ -68,13 +68,13 @@ pub fn light_frustum(light: &Light, p: Vec3) -> Cone {
     }
 }
 
-pub fn may_block(sphere: &Sphere, cone: &Cone) -> bool {
-    let w = sphere.center - cone.apex;
-    let along = dot(w, cone.to.towards);
-    let m = w - cone.to.towards * (along / cone.length2);
+pub fn may_block(sphere: &Sphere, frustum: &ShadowFrustum) -> bool {
+    let w = sphere.center - frustum.apex;
+    let along = dot(w, frustum.to.towards);
+    let m = w - frustum.to.towards * (along / frustum.length2);
     let m2 = dot(m, m);
-    let slope = (dot(m, cone.to.u).abs() + dot(m, cone.to.v).abs()) * cone.inverse_depth;
+    let slope = (dot(m, frustum.to.u).abs() + dot(m, frustum.to.v).abs()) * frustum.inverse_depth;
     let height = m2 - slope * along;
     let radius2 = sphere.radius * sphere.radius;
-    (slope < 0.0) | (height <= 0.0) | (height * height <= radius2 * (m2 + slope * slope * cone.length2))
+    (slope < 0.0) | (height <= 0.0) | (height * height <= radius2 * (m2 + slope * slope * frustum.length2))
 }

@@ -38,8 +38,8 @@ pub fn box_interval(low: Vec3, high: Vec3, s: Slabs) -> Vec2 {
     Vec2::new(near, far)
 }
 
-pub fn interval_hits(passage: Vec2, limit: f32) -> bool {
-    (passage.x <= passage.y) & (passage.y >= 0.0) & (passage.x <= limit)
+pub fn interval_hits(interval: Vec2, limit: f32) -> bool {
+    (interval.x <= interval.y) & (interval.y >= 0.0) & (interval.x <= limit)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

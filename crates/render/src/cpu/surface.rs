@@ -31,19 +31,19 @@ pub fn largest(v: Vec3) -> f32 {
 }
 
 pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
-    let met = ray.origin + ray.direction * t;
-    let way = met - q.anchor;
-    let from_anchor = vector_to_local(q, way);
+    let point = ray.origin + ray.direction * t;
+    let offset = point - q.anchor;
+    let from_anchor = vector_to_local(q, offset);
     let gradient = primitive_gradient(q, from_anchor - q.middle);
     let inverse_slope = 1.0 / dot(gradient, gradient).sqrt();
     let outward = gradient * inverse_slope;
     let solid = is_solid(q.kind);
     let height = primitive_height(q, from_anchor);
-    let position = met - outward * (height * inverse_slope);
+    let position = point - outward * (height * inverse_slope);
     let inside = dot(outward, ray.direction) > 0.0;
     let side = if inside { -1.0 } else { 1.0 };
     let normal = outward * side;
-    let size = max(largest(position), largest(way));
+    let size = max(largest(position), largest(offset));
     Surface {
         position,
         normal,

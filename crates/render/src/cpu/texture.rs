@@ -177,8 +177,8 @@ pub fn ewa_level_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2, dx: 
     base + sum * if total > 0.0 { 1.0 / total } else { 0.0 }
 }
 
-pub fn channel_of(color: Vec3, lookup: &Lookup, place: u32) -> f32 {
-    let channel = (lookup.channels >> (2 * place)) & 3;
+pub fn channel_of(color: Vec3, lookup: &Lookup, slot: u32) -> f32 {
+    let channel = (lookup.channels >> (2 * slot)) & 3;
     match channel {
         1 => color.y,
         2 => color.z,
@@ -194,7 +194,7 @@ pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Materi
     if lookup.purposes & FOR_DIRECTION != 0 {
         m.rotation += direction_turn(color);
     }
-    for (number, purpose, place) in [
+    for (number, purpose, slot) in [
         (&mut m.metallic, FOR_METALLIC, METALLIC_CHANNEL),
         (&mut m.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL),
         (&mut m.specular_weight, FOR_WEIGHT, WEIGHT_CHANNEL),
@@ -205,7 +205,7 @@ pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Materi
         (&mut m.opacity, FOR_OPACITY, OPACITY_CHANNEL),
     ] {
         if lookup.purposes & purpose != 0 {
-            *number = channel_of(color, lookup, place);
+            *number = channel_of(color, lookup, slot);
         }
     }
     m
@@ -240,8 +240,8 @@ pub fn evaluate_material(
         if i < material.lookups.y {
             let lookup = &scene.textures.lookups[(material.lookups.x + i) as usize];
             let t = &scene.textures.records[lookup.texture as usize];
-            let place = footprint_in_set(scene, footprint, prim, hit, at, lookup.uv_set);
-            let color = texture_color(scene, t, place);
+            let slot = footprint_in_set(scene, footprint, prim, hit, at, lookup.uv_set);
+            let color = texture_color(scene, t, slot);
             let purposes = lookup.purposes;
             if purposes & FOR_AMBIENT != 0 {
                 shading.material.ambient = color;

@@ -16,12 +16,12 @@ pub fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     2.0 * once / (1.0 + once)
 }
 
-pub fn turned_up(wi: Vec3) -> Vec3 {
+pub fn to_upper_side(wi: Vec3) -> Vec3 {
     Vec3::new(wi.x, wi.y, wi.z.abs())
 }
 
 pub fn thin_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3 {
-    let up = turned_up(wi);
+    let up = to_upper_side(wi);
     let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));
     let share = if wi.z > 0.0 {
         Vec3::splat(reflected)
@@ -33,7 +33,7 @@ pub fn thin_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3 {
 }
 
 pub fn thin_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32 {
-    let up = turned_up(wi);
+    let up = to_upper_side(wi);
     let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));
     let share = if wi.z > 0.0 { reflected } else { 1.0 - reflected };
     if (wo.z > 0.0) & (up.z > 0.0) {

@@ -2,9 +2,9 @@
 
 use wgpu::{Backends, DeviceType};
 
-use super::controls::FloatControls;
+use super::float_controls::FloatControls;
 use crate::error::RenderError;
-use wgray_image::contain::catch_panic;
+use wgray_image::panic_guard::catch_panic;
 
 /// Advice for systems without an adapter.
 pub const HOW_TO_GET_VULKAN: &str =
@@ -12,7 +12,7 @@ pub const HOW_TO_GET_VULKAN: &str =
 
 /// Requested device.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Choice {
+pub enum AdapterChoice {
     /// A physical GPU, else software Vulkan.
     Auto,
     /// Any adapter.
@@ -25,7 +25,7 @@ pub enum Choice {
 
 /// Properties of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Info {
+pub struct GpuInfo {
     /// Name.
     pub name: String,
     /// Name and version of the driver.
@@ -46,7 +46,7 @@ pub struct Info {
     pub storage_buffers: u32,
 }
 
-impl Info {
+impl GpuInfo {
     /// Returns true if the adapter computes on the CPU, such as lavapipe and SwiftShader.
     pub fn is_software(&self) -> bool {
         self.kind == SOFTWARE
@@ -56,7 +56,7 @@ impl Info {
 const SOFTWARE: &str = "software";
 
 /// Returns all adapters that wgpu finds, in the order of preference.
-pub fn adapters() -> Vec<Info> {
+pub fn adapters() -> Vec<GpuInfo> {
     enumerate().iter().map(info).collect()
 }
 
@@ -65,7 +65,7 @@ pub fn adapters() -> Vec<Info> {
 /// # Errors
 ///
 /// The errors of [`choose`](super::choose).
-pub fn preferred(choice: &Choice) -> Result<Info, RenderError> {
+pub fn preferred(choice: &AdapterChoice) -> Result<GpuInfo, RenderError> {
     let infos = adapters();
     let fitting = fitting(&infos, choice).map_err(RenderError::NoDevice)?;
     let first = fitting.first().and_then(|i| infos.get(*i)).cloned();
@@ -75,8 +75,8 @@ pub fn preferred(choice: &Choice) -> Result<Info, RenderError> {
 pub(super) const NONE_FOUND: &str = "no Vulkan, Metal or DX12 adapter found; ";
 
 /// Returns the indices of the matching adapters, best first. The error is a message for the user.
-pub(super) fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
-    let Choice::Named(name) = choice else {
+pub(super) fn fitting(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<usize>, String> {
+    let AdapterChoice::Named(name) = choice else {
         return Ok((0..infos.len()).collect());
     };
     if infos.is_empty() {
@@ -85,7 +85,8 @@ pub(super) fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, Str
     if let Some(number) = name.parse().ok().filter(|number| (1..=infos.len()).contains(number)) {
         return Ok(vec![number - 1]);
     }
-    let all = |fits: &dyn Fn(&Info) -> bool| -> Vec<usize> { (0..infos.len()).filter(|i| fits(&infos[*i])).collect() };
+    let all =
+        |fits: &dyn Fn(&GpuInfo) -> bool| -> Vec<usize> { (0..infos.len()).filter(|i| fits(&infos[*i])).collect() };
     let whole = all(&|info| info.name.to_lowercase() == name.to_lowercase());
     let found = match whole.is_empty() {
         // A number outside the list must not match a digit of a version.
@@ -146,9 +147,9 @@ fn is_lavapipe(name: &str) -> bool {
     name.starts_with("llvmpipe")
 }
 
-pub(super) fn info(adapter: &wgpu::Adapter) -> Info {
+pub(super) fn info(adapter: &wgpu::Adapter) -> GpuInfo {
     let (info, limits) = (adapter.get_info(), adapter.limits());
-    Info {
+    GpuInfo {
         driver: [info.driver, info.driver_info].join(" ").trim().to_string(),
         backend: info.backend.to_string(),
         kind: match info.device_type {
@@ -176,7 +177,7 @@ fn has_word(text: &str, word: &str) -> bool {
 }
 
 /// Returns true if part of the name, driver or type matches, ignoring case.
-fn matches(info: &Info, name: &str) -> bool {
+fn matches(info: &GpuInfo, name: &str) -> bool {
     let name = name.to_lowercase();
     let lavapipe = if is_lavapipe(&info.name) { "lavapipe" } else { "" };
     [info.name.as_str(), info.driver.as_str(), info.kind, lavapipe]
@@ -188,8 +189,8 @@ fn matches(info: &Info, name: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn adapter(name: &str, driver: &str, kind: &'static str) -> Info {
-        Info {
+    fn adapter(name: &str, driver: &str, kind: &'static str) -> GpuInfo {
+        GpuInfo {
             name: name.to_string(),
             driver: driver.to_string(),
             backend: "vulkan".to_string(),
@@ -248,7 +249,7 @@ mod tests {
             adapter("Radeon 780M", "amdvlk", "integrated"),
             adapter("llvmpipe (LLVM 15)", "Mesa 22", "software"),
         ];
-        let found = |name: &str| fitting(&infos, &Choice::Named(name.to_string()));
+        let found = |name: &str| fitting(&infos, &AdapterChoice::Named(name.to_string()));
         assert_eq!(found("radeon rx 7900"), Ok(vec![0]), "the whole name goes before parts");
         assert_eq!(found("XT"), Ok(vec![1]));
         assert_eq!(
@@ -285,7 +286,7 @@ mod tests {
             ),
             "{none}"
         );
-        assert_eq!(fitting(&infos, &Choice::Auto), Ok(vec![0, 1, 2, 3, 4]));
-        assert_eq!(fitting(&[], &Choice::Named("1".to_string())), Ok(Vec::new()));
+        assert_eq!(fitting(&infos, &AdapterChoice::Auto), Ok(vec![0, 1, 2, 3, 4]));
+        assert_eq!(fitting(&[], &AdapterChoice::Named("1".to_string())), Ok(Vec::new()));
     }
 }

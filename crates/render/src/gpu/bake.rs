@@ -8,13 +8,13 @@ use glam::UVec4;
 
 use crate::pack::MAX_LINEAR_PRIMITIVES;
 use crate::records::{
-    Emitter, Field as _, Instance, Item, Light, LightNode, Lookup, Material, Node, Packed, Record, SAMPLE_BLOCK,
+    BvhItem, Emitter, Field as _, Instance, Light, LightNode, Lookup, Material, Node, Packed, Record, SAMPLE_BLOCK,
     Texture,
 };
 
 /// Maximum number of materials, lights and textures of a baked scene. Compile time grows faster than linearly with
 /// them.
-pub const MOST_RECORDS: usize = 512;
+pub const MAX_RECORDS: usize = 512;
 
 /// Returns [`bake`] if the scene is small enough.
 pub fn bake_if_small(packed: &Packed) -> Option<String> {
@@ -26,7 +26,7 @@ pub fn bake_if_small(packed: &Packed) -> Option<String> {
     };
     let of_looks = packed.materials.len() + packed.textures.lookups.len() + packed.textures.records.len();
     let records = of_looks + lights + packed.lighting.emitters.len();
-    (packed.primitives.len() <= MAX_LINEAR_PRIMITIVES && records <= MOST_RECORDS).then(|| bake(packed))
+    (packed.primitives.len() <= MAX_LINEAR_PRIMITIVES && records <= MAX_RECORDS).then(|| bake(packed))
 }
 
 /// Returns WGSL for one scene: the functions of `buffers.wgsl`, and those that load records.
@@ -51,19 +51,19 @@ pub fn bake(packed: &Packed) -> String {
     write_function(
         &mut out,
         "occluded_by_primitives(surface: Surface, light: Light, block: SampleBlock) -> u32",
-        "let cone = light_frustum(light, surface.ray_origin);\n    var bits = 0u;",
+        "let frustum = light_frustum(light, surface.ray_origin);\n    var bits = 0u;",
         "bits",
         |body| {
             for (kind, range) in packed.shadow_casters() {
                 let (start, end) = (range.start, range.end);
                 let _ = writeln!(
                     body,
-                    "    bits |= occluded_by({kind}u, vec2u({start}u, {end}u), surface, cone, light, block);"
+                    "    bits |= occluded_by({kind}u, vec2u({start}u, {end}u), surface, frustum, light, block);"
                 );
             }
         },
     );
-    let signature = "shadow_candidates(first: u32, end: u32, cone: Cone) -> u32";
+    let signature = "shadow_candidates(first: u32, end: u32, frustum: ShadowFrustum) -> u32";
     write_function(&mut out, signature, "var bits = 0u;", "bits", |body| {
         for (_, range) in packed.shadow_casters() {
             for first in range.clone().step_by(SAMPLE_BLOCK as usize) {
@@ -72,7 +72,7 @@ pub fn bake(packed: &Packed) -> String {
                     let (bit, sphere) = (i - first, packed.bounds[i].constant());
                     let _ = writeln!(
                         body,
-                        "        bits |= select(0u, {}u, may_block({sphere}, cone));",
+                        "        bits |= select(0u, {}u, may_block({sphere}, frustum));",
                         1u32 << bit
                     );
                 }
@@ -145,7 +145,7 @@ pub fn tables() -> String {
 /// Returns WGSL of the functions that load records of BVHs and meshes, which are never baked.
 pub fn tree_tables() -> String {
     let mut out = String::new();
-    from_rows::<Item>(&mut out, "load_item", "nodes", "counts.tree.x");
+    from_rows::<BvhItem>(&mut out, "load_item", "nodes", "counts.tree.x");
     from_rows::<Instance>(&mut out, "load_instance", "nodes", "counts.tree.y");
     from_rows::<LightNode>(&mut out, "load_light_node", "records", "counts.emitters.z");
     let _ = writeln!(out, "fn load_node(at: u32) -> Node {{");

@@ -7,43 +7,43 @@ use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationError, Validati
 use naga::{GlobalVariable, Handle, Module, Span, WithSpan};
 
 use super::compose::{Kernel, ROUNDING, Source};
-use super::controls::FloatControls;
-use super::depth::too_deep;
+use super::float_controls::FloatControls;
+use super::naga_messages;
+use super::nesting_limit::too_deep;
 use super::prune::prune;
 use super::rounding::{Rounding, round_in_software};
 use super::spirv;
-use super::wording;
 use crate::error::ShaderError;
 use crate::records::Specialization;
 
 /// A kernel that naga accepts.
-pub struct Checked {
+pub struct ValidKernel {
     module: Module,
     info: ModuleInfo,
 }
 
 /// Parses and validates a kernel.
-pub fn check(source: &Source) -> Result<Checked, ShaderError> {
+pub fn check(source: &Source) -> Result<ValidKernel, ShaderError> {
     check_at(source).map_err(|(error, _)| error)
 }
 
 /// Parses and validates a kernel. An error comes with its place in the whole text, if it has one.
-pub fn check_at(source: &Source) -> Result<Checked, (ShaderError, Option<usize>)> {
+pub fn check_at(source: &Source) -> Result<ValidKernel, (ShaderError, Option<usize>)> {
     let start = |span: Option<Span>| span.and_then(Span::to_range).map(|range| range.start);
     if let Some((place, rule)) = too_deep(&source.text) {
         let span = Some(Span::from(place));
         return Err((ShaderError::at(source, span, rule), start(span)));
     }
     let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| {
-        let (span, message) = wording::parse_message(&error, source);
+        let (span, message) = naga_messages::parse_message(&error, source);
         (ShaderError::at(source, span, message), start(span))
     })?;
     let info = validate(&module).map_err(|error| {
-        let span = wording::place(&source.text, &error);
-        let message = wording::message(&module, &source.text, error.as_inner());
+        let span = naga_messages::place(&source.text, &error);
+        let message = naga_messages::message(&module, &source.text, error.as_inner());
         (ShaderError::at(source, span, message), start(span))
     })?;
-    Ok(Checked { module, info })
+    Ok(ValidKernel { module, info })
 }
 
 fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
@@ -52,7 +52,7 @@ fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>
         .map_err(Box::new)
 }
 
-impl Checked {
+impl ValidKernel {
     /// Returns the module of naga.
     pub(super) fn module(&self) -> &Module {
         &self.module
@@ -88,7 +88,7 @@ impl Checked {
             Rounding::Device => None,
             Rounding::Software => Some(self.rounded_in_software()?),
         };
-        let Checked { module, info } = rounded.as_ref().unwrap_or(self);
+        let ValidKernel { module, info } = rounded.as_ref().unwrap_or(self);
         let constants = constants
             .iter()
             .map(|(name, value)| (name.to_string(), f64::from(*value)));
@@ -122,10 +122,10 @@ impl Checked {
     }
 
     /// This kernel with quotients and square roots by `shaders/rounding.wgsl`.
-    fn rounded_in_software(&self) -> Result<Checked, ShaderError> {
+    fn rounded_in_software(&self) -> Result<ValidKernel, ShaderError> {
         let mut module = self.module.clone();
         round_in_software(&mut module, &self.info).map_err(|error| ShaderError::other(ROUNDING, &error))?;
         let info = validate(&module).map_err(|error| ShaderError::other("rounding", &error))?;
-        Ok(Checked { module, info })
+        Ok(ValidKernel { module, info })
     }
 }

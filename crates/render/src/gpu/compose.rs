@@ -9,7 +9,7 @@ use super::dispatch;
 use super::functions::is_same_code;
 use crate::records;
 use crate::records::Specialization;
-use wgray_image::waiting;
+use wgray_image::blocking_path;
 use wgray_scene::Integrator;
 use wgray_shaders::{
     ADAPTIVE_FILE, FIRST_HITS_FILE, FROM_BUFFERS, KERNEL, PATH, PHONG, RENDER_FILE, ROUNDING_FILE, SAMPLES, TEXELS,
@@ -94,7 +94,7 @@ impl Shaders {
     pub fn read(folder: &Path) -> io::Result<Shaders> {
         let read = |name: &str| {
             let path = folder.join(name);
-            let text = waiting::check(&path).and_then(|()| fs::read_to_string(&path));
+            let text = blocking_path::reject(&path).and_then(|()| fs::read_to_string(&path));
             let text = text.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
             Ok((name.to_string(), without_mark(text)))
         };

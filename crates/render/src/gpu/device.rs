@@ -5,20 +5,20 @@ use std::sync::mpsc;
 use bytemuck::{Pod, bytes_of, cast_slice};
 use wgpu::BufferUsages;
 
-use super::adapter::{Choice, HOW_TO_GET_VULKAN, Info, NONE_FOUND, enumerate, fitting, info};
+use super::adapter::{AdapterChoice, GpuInfo, HOW_TO_GET_VULKAN, NONE_FOUND, enumerate, fitting, info};
 use super::failure::{Failure, error_of_opening};
 use crate::error::RenderError;
-use wgray_image::contain::{DropContained, catch_panic};
+use wgray_image::panic_guard::{CatchPanicOnDrop, catch_panic};
 
 /// An open device. Clones are handles to the same device.
 #[derive(Clone)]
 pub struct Device {
     // Dropped in this order. wgpu may panic if the device is lost.
-    pub(super) queue: DropContained<wgpu::Queue>,
-    pub(super) device: DropContained<wgpu::Device>,
+    pub(super) queue: CatchPanicOnDrop<wgpu::Queue>,
+    pub(super) device: CatchPanicOnDrop<wgpu::Device>,
     failure: Failure,
     /// Properties of its adapter.
-    pub info: Info,
+    pub info: GpuInfo,
 }
 
 /// Opens the best matching adapter that can be opened.
@@ -27,7 +27,7 @@ pub struct Device {
 ///
 /// [`RenderError::NoDevice`] if no adapter matches, or if adapters of different names do. If no matching adapter can be
 /// opened, the error of the last one.
-pub fn choose(choice: &Choice) -> Result<Device, RenderError> {
+pub fn choose(choice: &AdapterChoice) -> Result<Device, RenderError> {
     choose_among(choice, &|_| true)
 }
 
@@ -36,9 +36,9 @@ pub fn choose(choice: &Choice) -> Result<Device, RenderError> {
 /// # Errors
 ///
 /// The errors of [`choose`].
-pub fn choose_among(choice: &Choice, wanted: &dyn Fn(&Info) -> bool) -> Result<Device, RenderError> {
+pub fn choose_among(choice: &AdapterChoice, wanted: &dyn Fn(&GpuInfo) -> bool) -> Result<Device, RenderError> {
     let adapters = enumerate();
-    let infos: Vec<Info> = adapters.iter().map(info).collect();
+    let infos: Vec<GpuInfo> = adapters.iter().map(info).collect();
     let mut failure = None;
     let fitting = fitting(&infos, choice).map_err(RenderError::NoDevice)?;
     for i in fitting.into_iter().filter(|i| wanted(&infos[*i])) {
@@ -83,8 +83,8 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
     let failure = Failure::default();
     failure.listen(&device);
     Ok(Device {
-        queue: DropContained::new(queue),
-        device: DropContained::new(device),
+        queue: CatchPanicOnDrop::new(queue),
+        device: CatchPanicOnDrop::new(device),
         failure,
         info,
     })
@@ -228,16 +228,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_goes_wrong_outside_of_checks_is_told_by_the_next_call() {
-        let device = match choose(&Choice::Auto) {
+    fn errors_outside_of_checks_are_reported_by_the_next_check() {
+        let device = match choose(&AdapterChoice::Auto) {
             Ok(device) => device,
             Err(_) if std::env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some() => return,
             Err(error) => panic!("{error}"),
         };
         assert!(device.checked(|| ()).is_ok());
         device.buffer(u64::MAX, BufferUsages::STORAGE); // no device has that much
-        let told = device.checked(|| ()).expect_err("the error of before").to_string();
-        assert!(told.starts_with(&device.info.name), "{told}");
-        assert!(device.checked(|| ()).is_ok(), "it is told once");
+        let error = device.checked(|| ()).expect_err("the recorded error").to_string();
+        assert!(error.starts_with(&device.info.name), "{error}");
+        assert!(device.checked(|| ()).is_ok(), "the error is reported twice");
     }
 }

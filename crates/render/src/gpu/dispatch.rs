@@ -41,15 +41,15 @@ pub fn item_tests() -> String {
         false,
         &[
             (
-                "closest_of_primitive_item(before: Hit, item: Item, ray: Ray, near: f32, origin_prim: vec2u, inside_prim: vec2u) -> Hit",
+                "closest_of_primitive_item(before: Hit, item: BvhItem, ray: Ray, near: f32, origin_prim: vec2u, inside_prim: vec2u) -> Hit",
                 "var hit = before;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
-        hit = nearer_hit(hit, hit_by_itself(KIND, item.index, ray, near, origin_prim, inside_prim));
+        hit = nearer_hit(hit, standalone_hit(KIND, item.index, ray, near, origin_prim, inside_prim));
     }",
                 "hit",
             ),
             (
-                "occluded_by_primitive_item(item: Item, p: vec3f, inside_prim: bool, light: Light, block: SampleBlock) -> u32",
+                "occluded_by_primitive_item(item: BvhItem, p: vec3f, inside_prim: bool, light: Light, block: SampleBlock) -> u32",
                 "var bits = 0u;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
         bits = occlusion_mask(KIND, primitives[item.index], p, inside_prim, light, block);
@@ -57,7 +57,7 @@ pub fn item_tests() -> String {
                 "bits",
             ),
             (
-                "is_occluded_by_primitive_item(item: Item, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
+                "is_occluded_by_primitive_item(item: BvhItem, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
                 "var occluded = false;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
         occluded = is_occluded_by_primitive(KIND, primitives[item.index], item.index, surface, to, t_max, target_prim);

@@ -9,18 +9,18 @@ use crate::error::RenderError;
 
 /// Recorded failures of a device. Clones share them.
 #[derive(Clone, Default)]
-pub struct Failure(Arc<Mutex<Known>>);
+pub struct Failure(Arc<Mutex<FailureState>>);
 
 #[derive(Default)]
-struct Known {
+struct FailureState {
     /// Reason of the device loss, which is permanent.
-    lost: Option<Fault>,
+    lost: Option<DeviceFault>,
     /// First error outside of error scopes, until it is reported.
-    untold: Option<Fault>,
+    untold: Option<DeviceFault>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Fault {
+enum DeviceFault {
     Lost(String),
     Memory,
     Other(String),
@@ -34,31 +34,31 @@ const NO_MEMORY: &str = "Out of memory";
 const LOST_AT_OPENING: &str = "Parent device is lost";
 const NO_MEMORY_AT_OPENING: &str = "Not enough memory left.";
 
-impl Fault {
-    fn of(error: &wgpu::Error) -> Fault {
+impl DeviceFault {
+    fn of(error: &wgpu::Error) -> DeviceFault {
         match error {
-            wgpu::Error::OutOfMemory { .. } => Fault::Memory,
-            other => Fault::Other(other.to_string()),
+            wgpu::Error::OutOfMemory { .. } => DeviceFault::Memory,
+            other => DeviceFault::Other(other.to_string()),
         }
     }
 
-    fn of_loss(reason: wgpu::DeviceLostReason, message: &str) -> Fault {
+    fn of_loss(reason: wgpu::DeviceLostReason, message: &str) -> DeviceFault {
         match (reason, message) {
-            (wgpu::DeviceLostReason::Destroyed, _) => Fault::Lost("it was released".to_string()),
-            (_, NO_MEMORY) => Fault::Memory,
-            (_, LOST) => Fault::Lost(
+            (wgpu::DeviceLostReason::Destroyed, _) => DeviceFault::Lost("it was released".to_string()),
+            (_, NO_MEMORY) => DeviceFault::Memory,
+            (_, LOST) => DeviceFault::Lost(
                 "the driver ended it, for example after a reset or a dispatch that took too long".to_string(),
             ),
-            (_, other) => Fault::Lost(other.to_string()),
+            (_, other) => DeviceFault::Lost(other.to_string()),
         }
     }
 
     fn into_error(self, device: &str) -> RenderError {
         let device = device.to_string();
         match self {
-            Fault::Lost(message) => RenderError::Lost { device, message },
-            Fault::Memory => RenderError::OutOfMemory { device, message: None },
-            Fault::Other(message) => RenderError::Device { device, message },
+            DeviceFault::Lost(message) => RenderError::Lost { device, message },
+            DeviceFault::Memory => RenderError::OutOfMemory { device, message: None },
+            DeviceFault::Other(message) => RenderError::Device { device, message },
         }
     }
 }
@@ -67,21 +67,21 @@ impl Failure {
     /// Records device loss, and errors outside of error scopes, for which wgpu would panic.
     pub fn listen(&self, device: &wgpu::Device) {
         let (errors, losses) = (self.clone(), self.clone());
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| errors.keep(Fault::of(&error))));
-        device.set_device_lost_callback(move |reason, message| losses.lose(Fault::of_loss(reason, &message)));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| errors.keep(DeviceFault::of(&error))));
+        device.set_device_lost_callback(move |reason, message| losses.lose(DeviceFault::of_loss(reason, &message)));
     }
 
-    fn known<T>(&self, look: impl FnOnce(&mut Known) -> T) -> T {
-        look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    fn known<T>(&self, access: impl FnOnce(&mut FailureState) -> T) -> T {
+        access(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    fn keep(&self, fault: Fault) {
+    fn keep(&self, fault: DeviceFault) {
         self.known(|known| {
             known.untold.get_or_insert(fault);
         });
     }
 
-    fn lose(&self, fault: Fault) {
+    fn lose(&self, fault: DeviceFault) {
         self.known(|known| {
             known.lost.get_or_insert(fault);
         });
@@ -96,10 +96,10 @@ impl Failure {
         raised: Option<&wgpu::Error>,
     ) -> Result<T, RenderError> {
         let (lost, untold) = self.known(|known| (known.lost.clone(), known.untold.take()));
-        let fault = lost.or(raised.map(Fault::of)).or(untold);
+        let fault = lost.or(raised.map(DeviceFault::of)).or(untold);
         match (fault, value) {
             (Some(fault), _) => Err(fault.into_error(device)),
-            (None, Err(message)) => Err(Fault::Other(message).into_error(device)),
+            (None, Err(message)) => Err(DeviceFault::Other(message).into_error(device)),
             (None, Ok(value)) => Ok(value),
         }
     }
@@ -107,7 +107,7 @@ impl Failure {
     /// Returns an error with this message, or the device loss that caused it.
     pub fn error(&self, device: &str, message: &dyn Display) -> RenderError {
         let lost = self.known(|known| known.lost.clone());
-        lost.unwrap_or_else(|| Fault::Other(message.to_string()))
+        lost.unwrap_or_else(|| DeviceFault::Other(message.to_string()))
             .into_error(device)
     }
 }
@@ -124,9 +124,9 @@ pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
             message: Some("the driver has no memory to open it; use the CPU".to_owned()),
         }
     } else if says(LOST_AT_OPENING) {
-        Fault::Lost("the driver does not open it".to_string()).into_error(device)
+        DeviceFault::Lost("the driver does not open it".to_string()).into_error(device)
     } else {
-        Fault::Other(error.to_string()).into_error(device)
+        DeviceFault::Other(error.to_string()).into_error(device)
     }
 }
 
@@ -139,18 +139,18 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_is_told_by_every_call_and_all_else_once() {
+    fn a_loss_is_reported_every_time_and_other_errors_once() {
         let failure = Failure::default();
         let judge = |value: Result<u8, &str>| told(failure.judge("gpu", value.map_err(str::to_string), None));
         assert_eq!(judge(Ok(7)), "7");
         assert_eq!(judge(Err("a panic")), "gpu: a panic");
-        failure.keep(Fault::Other("first".to_string()));
-        failure.keep(Fault::Other("second".to_string()));
+        failure.keep(DeviceFault::Other("first".to_string()));
+        failure.keep(DeviceFault::Other("second".to_string()));
         assert_eq!(failure.error("gpu", &"another").to_string(), "gpu: another");
         assert_eq!(judge(Ok(7)), "gpu: first");
         assert_eq!(judge(Ok(7)), "7");
-        failure.lose(Fault::of_loss(wgpu::DeviceLostReason::Unknown, "reset"));
-        failure.lose(Fault::of_loss(wgpu::DeviceLostReason::Destroyed, ""));
+        failure.lose(DeviceFault::of_loss(wgpu::DeviceLostReason::Unknown, "reset"));
+        failure.lose(DeviceFault::of_loss(wgpu::DeviceLostReason::Destroyed, ""));
         for value in [Ok(7), Err("a panic"), Ok(7)] {
             assert_eq!(judge(value), "gpu: the device was lost: reset");
         }
@@ -161,11 +161,11 @@ mod tests {
     }
 
     #[test]
-    fn want_of_memory_is_told_from_a_loss() {
-        let of = |message| Fault::of_loss(wgpu::DeviceLostReason::Unknown, message);
-        assert_eq!(of("Out of memory"), Fault::Memory);
-        assert!(matches!(of("Device is lost"), Fault::Lost(_)));
-        assert_eq!(of("anything"), Fault::Lost("anything".to_string()));
+    fn out_of_memory_is_not_a_device_loss() {
+        let of = |message| DeviceFault::of_loss(wgpu::DeviceLostReason::Unknown, message);
+        assert_eq!(of("Out of memory"), DeviceFault::Memory);
+        assert!(matches!(of("Device is lost"), DeviceFault::Lost(_)));
+        assert_eq!(of("anything"), DeviceFault::Lost("anything".to_string()));
         let error = std::io::Error::other("Not enough memory left.");
         assert!(matches!(
             error_of_opening("gpu", &error),

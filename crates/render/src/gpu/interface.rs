@@ -5,10 +5,10 @@ use naga::{
     AddressSpace, ArraySize, GlobalVariable, Handle, Module, ShaderStage, Span, StorageAccess, Type, TypeInner,
 };
 
-use super::compile::{Checked, check};
+use super::compile::{ValidKernel, check};
 use super::compose::{Kernel, Shaders, Source};
 use super::functions::functions;
-use super::wording::type_name;
+use super::naga_messages::type_name;
 use crate::error::ShaderError;
 use wgray_scene::Integrator;
 
@@ -18,7 +18,7 @@ pub fn mistakes(
     kernel: &Kernel,
     integrator: Integrator,
     source: &Source,
-    checked: &Checked,
+    checked: &ValidKernel,
     whole: bool,
 ) -> Result<Vec<ShaderError>, ShaderError> {
     let built_in = Shaders::built_in().compose(kernel, integrator, None);
@@ -44,7 +44,7 @@ struct Sides<'a> {
 }
 
 impl Sides<'_> {
-    fn compared(mut self, own: &Checked, right: &Checked, whole: bool) -> Vec<ShaderError> {
+    fn compared(mut self, own: &ValidKernel, right: &ValidKernel, whole: bool) -> Vec<ShaderError> {
         self.entry_point();
         self.bindings();
         self.constants();
@@ -55,7 +55,7 @@ impl Sides<'_> {
     }
 
     /// Checks that the kernel writes all buffers that the program reads back.
-    fn results(&mut self, own: &Checked, right: &Checked) {
+    fn results(&mut self, own: &ValidKernel, right: &ValidKernel) {
         let entry = self.kernel.entry_point;
         let at = |module: &Module, binding| {
             let mut all = module.global_variables.iter();

@@ -1,6 +1,6 @@
 //! The kernel that a device would run for a scene, predicted without opening the device.
 
-use super::adapter::Info;
+use super::adapter::GpuInfo;
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, RENDER, Shaders};
 use super::scene::bytes_of_scene;
@@ -20,7 +20,7 @@ pub struct KernelPlan {
 }
 
 /// Predicts the kernel for a packed scene on a device.
-pub fn plan_kernel(packed: &Packed, info: &Info) -> KernelPlan {
+pub fn plan_kernel(packed: &Packed, info: &GpuInfo) -> KernelPlan {
     let kernel = if packed.sampling.adaptive { &ADAPTIVE } else { &RENDER };
     let baked = info.is_software().then(|| bake_if_small(packed)).flatten();
     let source = Shaders::built_in().compose(kernel, packed.integrator, baked.as_deref());

@@ -14,12 +14,12 @@ pub struct Held {
 }
 
 /// The name of an allocation and its size in bytes.
-pub type Asked = (String, u64);
+pub type FailedAllocation = (String, u64);
 
 impl Held {
     /// Adds the failed allocation, if it is known, and the memory in use to an out-of-memory error that has no message yet. Other errors are
     /// returned unchanged.
-    pub fn explain(&self, error: RenderError, asked: Option<&Asked>) -> RenderError {
+    pub fn explain(&self, error: RenderError, asked: Option<&FailedAllocation>) -> RenderError {
         match error {
             RenderError::OutOfMemory { device, message: None } => RenderError::OutOfMemory {
                 device,
@@ -29,7 +29,7 @@ impl Held {
         }
     }
 
-    fn message(&self, asked: Option<&Asked>) -> String {
+    fn message(&self, asked: Option<&FailedAllocation>) -> String {
         let asked = match asked {
             Some((what, bytes)) => format!("the driver has no {} MiB for {what}", mebibytes(*bytes)),
             None => "the driver has no more".to_owned(),

@@ -26,7 +26,7 @@ pub const GROUPS: [&[BufferBindingType]; 3] = [
 ];
 
 /// The group of what changes with every call; it ends with the values of sliders, if a kernel has any.
-pub const CALL: usize = 0;
+pub const DISPATCH_GROUP: usize = 0;
 /// The group of the scene, which ends with its texels.
 pub const SCENE: usize = 1;
 
@@ -54,7 +54,7 @@ const _: () = assert!(STORAGE_BUFFERS <= 8);
 pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) -> Vec<wgpu::BindGroupLayout> {
     let layout = |(group, types): (usize, &&[BufferBindingType])| {
         let more = match group {
-            CALL => std::iter::repeat_n(UNIFORM, usize::from(sliders)),
+            DISPATCH_GROUP => std::iter::repeat_n(UNIFORM, usize::from(sliders)),
             SCENE => std::iter::repeat_n(READ, more_texels),
             _ => std::iter::repeat_n(READ, 0),
         };

@@ -11,17 +11,17 @@ use wgpu::BufferUsages;
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
 use super::device::{Device, Mapping};
-use super::memory::{Asked, Held};
+use super::loop_budget::samples_per_dispatch;
+use super::memory::{FailedAllocation, Held};
 use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
 use super::rounding::Rounding;
-use super::rounds::samples_per_call;
 use super::scene::SceneBuffers;
 use super::sliders::{Slider, with_buffer};
 use super::texels::TexelParts;
 use super::timer::{TIMES, Timer};
-use crate::backend::{Backend, Rules, Started};
+use crate::backend::{Backend, FilmState, Rules};
 use crate::error::RenderError;
-use crate::film::{Film, Form};
+use crate::film::{Film, FilmLayout};
 use crate::records::{Camera, DispatchParams, FirstHit, Packed, Specialization};
 use wgray_image::Region;
 use wgray_scene::Integrator;
@@ -59,19 +59,19 @@ pub struct Gpu {
     completion: [wgpu::Buffer; 2],
     /// Film rows before the last dispatch, for `undo`.
     before: Option<wgpu::Buffer>,
-    film: Option<(Target, Started)>,
+    film: Option<(Target, FilmState)>,
     pending: Option<Pending>,
     rules: Rules,
     /// Estimated maximum number of samples per dispatch without truncated loops.
-    samples_per_call: u32,
+    samples_per_dispatch: u32,
     slider_values: Option<wgpu::Buffer>,
     timer: Option<Timer>,
-    calls: Vec<Call>,
+    dispatches: Vec<Dispatch>,
 }
 
 /// Duration of a dispatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Call {
+pub struct Dispatch {
     /// Entry point of the kernel.
     pub kernel: &'static str,
     /// Duration.
@@ -185,7 +185,7 @@ impl Gpu {
         let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let completion = [device.buffer(RECEIPT, written), receipt_to_read(device)];
         let mut gpu = Gpu {
-            samples_per_call: samples_per_call(packed, kernels.baked.is_some()),
+            samples_per_dispatch: samples_per_dispatch(packed, kernels.baked.is_some()),
             device: device.clone(),
             kernels,
             render,
@@ -199,7 +199,7 @@ impl Gpu {
             rules: Rules::of(packed),
             slider_values,
             timer: None,
-            calls: Vec::new(),
+            dispatches: Vec::new(),
         };
         let nothing = Region {
             x0: 0,
@@ -235,15 +235,15 @@ impl Gpu {
         }
     }
 
-    /// Enables timing of dispatches; see [`Gpu::calls`].
+    /// Enables timing of dispatches; see [`Gpu::dispatches`].
     pub fn time_calls(&mut self) -> Result<(), RenderError> {
         self.timer = Some(self.device.checked(|| Timer::new(&self.device))?);
         Ok(())
     }
 
     /// Returns the dispatches that have ended since the previous query.
-    pub fn calls(&mut self) -> Vec<Call> {
-        std::mem::take(&mut self.calls)
+    pub fn dispatches(&mut self) -> Vec<Dispatch> {
+        std::mem::take(&mut self.dispatches)
     }
 
     /// Returns the device.
@@ -261,12 +261,12 @@ impl Gpu {
         self.idle()?;
         let texels = TexelParts::of(&self.device.info, packed)?;
         let same_kernel = self.kernels.baked.is_none()
-            && (self.kernels.constants, self.rules.form()) == (packed.specialization, packed.form())
+            && (self.kernels.constants, self.rules.film_layout()) == (packed.specialization, packed.film_layout())
             && (self.kernels.integrator, self.kernels.texels) == (packed.integrator, texels);
         if same_kernel {
             self.film = None;
             self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts)?;
-            self.samples_per_call = samples_per_call(packed, false);
+            self.samples_per_dispatch = samples_per_dispatch(packed, false);
             self.rules = Rules::of(packed);
         }
         Ok(same_kernel)
@@ -300,7 +300,7 @@ impl Gpu {
     }
 
     fn kernel(&self) -> &'static Kernel {
-        kernel_of(self.rules.form().adaptive)
+        kernel_of(self.rules.film_layout().adaptive)
     }
 
     fn held(&self) -> Held {
@@ -311,7 +311,7 @@ impl Gpu {
         }
     }
 
-    fn explained<T>(&self, result: Result<T, RenderError>, asked: Option<Asked>) -> Result<T, RenderError> {
+    fn explained<T>(&self, result: Result<T, RenderError>, asked: Option<FailedAllocation>) -> Result<T, RenderError> {
         result.map_err(|error| self.held().explain(error, asked.as_ref()))
     }
 
@@ -374,7 +374,7 @@ impl Gpu {
         let (completion, ticks) = completion.split_at((RECEIPT / 4) as usize);
         if let Some(timer) = &self.timer {
             let told = timer.took(ticks);
-            self.calls.push(Call {
+            self.dispatches.push(Dispatch {
                 kernel,
                 took: told.unwrap_or(waited),
                 by_device: told.is_some(),
@@ -406,7 +406,7 @@ impl Gpu {
             }
         };
         let most = self.rules.end_of_part(&samples) - samples.start;
-        let end = samples.start + self.samples_per_call.min(most);
+        let end = samples.start + self.samples_per_dispatch.min(most);
         let save = |encoder: &mut wgpu::CommandEncoder| {
             for (start, copy) in rows.pieces() {
                 encoder.copy_buffer_to_buffer(&film.buffer, start, &before, copy, rows.size);
@@ -444,7 +444,7 @@ impl Gpu {
                 if count <= 1 {
                     return Err(self.cut_short());
                 }
-                self.samples_per_call = count / 2;
+                self.samples_per_dispatch = count / 2;
                 samples
             }
         };
@@ -531,8 +531,8 @@ fn receipt_to_read(device: &Device) -> wgpu::Buffer {
 }
 
 /// Converts the records of a kernel to a film. They contain its non-empty lists in order.
-fn film_of(region: Region, form: Form, records: &[Vec4]) -> Film {
-    let mut film = Film::of(region, form);
+fn film_of(region: Region, film_layout: FilmLayout, records: &[Vec4]) -> Film {
+    let mut film = Film::of(region, film_layout);
     let lists = film.lists_mut().filter(|list| !list.is_empty());
     for (list, records) in lists.zip(records.chunks(region.pixels() as usize)) {
         list.copy_from_slice(records);
@@ -549,7 +549,7 @@ impl Backend for Gpu {
         self.idle()?;
         let started = self.rules.begin(region)?;
         self.film = None; // freed first, since both may not fit into memory
-        let film = self.target(self.rules.form().bytes(), region)?;
+        let film = self.target(self.rules.film_layout().bytes(), region)?;
         self.film = Some((film, started));
         Ok(())
     }
@@ -609,7 +609,7 @@ impl Backend for Gpu {
         let result = self.device.download(&film.buffer);
         let result = self.explained(result, Some(("a copy of the film".to_string(), film.buffer.size())));
         let records: Vec<Vec4> = self.or_lost(result)?;
-        Ok(film_of(region, self.rules.form(), &records))
+        Ok(film_of(region, self.rules.film_layout(), &records))
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
@@ -633,9 +633,9 @@ impl Backend for Gpu {
     fn largest_film(&self) -> u64 {
         let info = &self.device.info;
         let bytes = info.largest_binding.min(info.largest_buffer);
-        let form = self.rules.form();
-        let most = bytes / form.bytes().max(FIRST_HITS_RECORD) as u64;
-        if !form.adaptive {
+        let film_layout = self.rules.film_layout();
+        let most = bytes / film_layout.bytes().max(FIRST_HITS_RECORD) as u64;
+        if !film_layout.adaptive {
             return most;
         }
         let picture = self.rules.picture();

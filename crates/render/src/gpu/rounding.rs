@@ -28,10 +28,10 @@ const SQUARE_ROOTS: [&str; 4] = ["square_root", "square_root2", "square_root3", 
 /// A function that `shaders/rounding.wgsl` lacks.
 #[derive(Debug, thiserror::Error)]
 #[error("there is no function '{0}'")]
-pub struct Missing(&'static str);
+pub struct MissingFunction(&'static str);
 
 /// Replaces all float quotients and square roots by calls of the functions of `shaders/rounding.wgsl`.
-pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), Missing> {
+pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), MissingFunction> {
     // These functions use the operations of the device.
     let own = [named(module, QUOTIENTS[0])?, named(module, SQUARE_ROOTS[0])?];
     let mut in_functions = Vec::new();
@@ -55,12 +55,12 @@ pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), M
     Ok(())
 }
 
-fn named(module: &Module, name: &'static str) -> Result<Handle<Function>, Missing> {
+fn named(module: &Module, name: &'static str) -> Result<Handle<Function>, MissingFunction> {
     let found = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name));
-    found.map(|(handle, _)| handle).ok_or(Missing(name))
+    found.map(|(handle, _)| handle).ok_or(MissingFunction(name))
 }
 
-fn calls_of(module: &Module, function: &Function, info: &FunctionInfo) -> Result<Calls, Missing> {
+fn calls_of(module: &Module, function: &Function, info: &FunctionInfo) -> Result<Calls, MissingFunction> {
     let mut calls = Calls::new();
     for (handle, expression) in function.expressions.iter() {
         let (names, arguments) = match *expression {

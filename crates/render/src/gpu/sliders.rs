@@ -6,15 +6,15 @@ use std::ops::Range;
 use naga::{ArraySize, Expression, Handle, Literal, Module, Override, TypeInner};
 use serde::{Deserialize, Serialize};
 
-use super::compile::{Checked, check};
+use super::compile::{ValidKernel, check};
 use super::compose::{ADAPTIVE, Kernel, RENDER, Shaders, Source};
 use super::functions::functions;
-use super::pipeline::{CALL, GROUPS};
+use super::pipeline::{DISPATCH_GROUP, GROUPS};
 use crate::error::ShaderError;
 use wgray_scene::Integrator;
 
 /// The binding of the values in the group of a call, after those of every kernel.
-const BINDING: usize = GROUPS[CALL].len();
+const BINDING: usize = GROUPS[DISPATCH_GROUP].len();
 /// The name of the buffer of values in a kernel.
 const VALUES: &str = "slider_values";
 
@@ -152,13 +152,14 @@ pub fn with_buffer(source: Source, kernel: &Kernel, sliders: &[Slider]) -> Resul
     let edited = |source: Source, (range, text): (Range<usize>, String)| source.replaced(range, &text);
     let mut source = edits.into_iter().fold(source.clone(), edited);
     let rows = sliders.len().div_ceil(4);
-    let declaration = format!("@group({CALL}) @binding({BINDING}) var<uniform> {VALUES}: array<vec4u, {rows}>;");
+    let declaration =
+        format!("@group({DISPATCH_GROUP}) @binding({BINDING}) var<uniform> {VALUES}: array<vec4u, {rows}>;");
     source.append("(the values of sliders)", &declaration);
     Ok(source)
 }
 
 /// Returns the sliders of a kernel, and the places of their declarations.
-fn declared(checked: &Checked, source: &Source) -> impl Iterator<Item = (Slider, Range<usize>)> {
+fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Slider, Range<usize>)> {
     let module = checked.module();
     module.overrides.iter().filter_map(move |(handle, declared)| {
         let Override {

@@ -1,6 +1,6 @@
 //! SPIR-V transformations that forbid drivers to fuse or reorder float operations, and request float controls.
 
-use super::controls::FloatControls;
+use super::float_controls::FloatControls;
 
 /// Opcodes of float arithmetic that naga emits: negate, add, subtract, multiply, divide, vector times scalar, dot.
 pub const ARITHMETIC: [u16; 7] = [127, 129, 131, 133, 136, 142, 148];
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_asked_for_is_there_in_its_section() {
+    fn float_controls_are_in_their_sections() {
         let one = |capability: u32, mode: u32| (vec![capability], vec![vec![mode, 32]], true);
         let (denormals, signed_zeros, rounding) = (one(4464, 4459), one(4466, 4461), one(4467, 4462));
         let none = FloatControls::NONE;
@@ -211,17 +211,21 @@ mod tests {
             assert!(in_order(&module), "{controls:?}");
         }
         let (plain, all) = (module(none), module(FloatControls::ALL));
-        let left = |module: &[u32]| -> Vec<Vec<u32>> {
+        let other_instructions = |module: &[u32]| -> Vec<Vec<u32>> {
             let of_controls = |words: &[u32]| words[1..].iter().any(|word| (4459..=4468).contains(word));
             let others = instructions(module).filter(|(opcode, words)| *opcode != 10 && !of_controls(words));
             others.map(|(_, words)| words.to_vec()).collect()
         };
-        assert_eq!(left(&plain), left(&all), "nothing else is changed");
+        assert_eq!(
+            other_instructions(&plain),
+            other_instructions(&all),
+            "other instructions are changed"
+        );
         assert_eq!(plain[..HEADER], all[..HEADER]);
     }
 
     #[test]
-    fn instructions_out_of_order_are_found() {
+    fn misplaced_instructions_are_detected() {
         let module = module(FloatControls::ALL);
         let mut wrong = module.clone();
         let capabilities = end_of(&module, |opcode| opcode == OP_CAPABILITY);

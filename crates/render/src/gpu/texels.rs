@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use glam::UVec4;
 
-use super::adapter::Info;
+use super::adapter::GpuInfo;
 use super::bake::{mesh_rows_count, node_rows_count};
 use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
 use crate::error::RenderError;
@@ -20,7 +20,7 @@ pub struct TexelParts {
 
 impl TexelParts {
     /// Returns the distribution for a scene, or an error if the scene exceeds the limits of the device.
-    pub fn of(info: &Info, packed: &Packed) -> Result<TexelParts, RenderError> {
+    pub fn of(info: &GpuInfo, packed: &Packed) -> Result<TexelParts, RenderError> {
         let largest = info.largest_binding.min(info.largest_buffer);
         let too_large = |message: String| RenderError::TooLarge {
             device: info.name.clone(),
@@ -100,8 +100,8 @@ mod tests {
     use crate::pack::pack;
     use wgray_scene::Scene;
 
-    fn info(largest_binding: u64, storage_buffers: u32) -> Info {
-        Info {
+    fn info(largest_binding: u64, storage_buffers: u32) -> GpuInfo {
+        GpuInfo {
             name: "small".to_owned(),
             driver: String::new(),
             backend: String::new(),
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn what_a_device_cannot_see_is_told_with_the_way_out() {
         let storage = STORAGE_BUFFERS as u32;
-        let told = |info: Info, packed: &Packed| TexelParts::of(&info, packed).unwrap_err().to_string();
+        let told = |info: GpuInfo, packed: &Packed| TexelParts::of(&info, packed).unwrap_err().to_string();
         assert_eq!(
             told(info(1 << 20, storage), &packed(1, (1 << 18) + 1)),
             "small: the scene's images need 1.0 MiB; the limit is 1 x 1.0 MiB; the CPU has no such limit"

@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::bake::bake_if_small;
-use super::compile::{Checked, check_at};
+use super::compile::{ValidKernel, check_at};
 use super::compose::{KERNELS, Kernel, Shaders, Source};
-use super::controls::FloatControls;
+use super::float_controls::FloatControls;
 use super::functions::functions;
 use super::interface;
 use super::rounding::Rounding;
@@ -82,7 +82,7 @@ fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError
 /// Finds the errors in all functions, although naga stops at the first error: a function with an error gets an empty
 /// body, which does not matter to its callers. The rest is a kernel that naga accepts, unless an error is outside all
 /// bodies.
-fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Source, Checked)>) {
+fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Source, ValidKernel)>) {
     let mut errors: Vec<ShaderError> = Vec::new();
     loop {
         let (mut error, at) = match check_at(&source) {

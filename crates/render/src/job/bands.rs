@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::piece::{CheckpointStore, Piece, StoredPiece};
-use super::steps::{Order, Reached, Steps};
-use super::{CALL, Cut, bands};
+use super::piece::{CheckpointStore, FilmPiece, StoredPiece};
+use super::steps::{Order, SampleProgress, Steps};
+use super::{DISPATCH_DURATION, WorkSplit, bands};
 use crate::backend::Backend;
 use crate::error::RenderError;
-use crate::film::{Film, Form};
+use crate::film::{Film, FilmLayout};
 use wgray_image::Region;
 use wgray_image::memory::fallible;
 
@@ -56,7 +56,7 @@ pub struct Bands<'a> {
 }
 
 /// A rendered band.
-pub struct Finished {
+pub struct FinishedBand {
     /// The pixels.
     pub film: Film,
     /// Minimum number of samples of a pixel.
@@ -67,17 +67,17 @@ pub struct Finished {
     pub camera_rays: u64,
 }
 
-impl Finished {
-    fn of(piece: Piece) -> Finished {
-        let Piece { region, reached, film } = piece;
+impl FinishedBand {
+    fn of(piece: FilmPiece) -> FinishedBand {
+        let FilmPiece { region, reached, film } = piece;
         let film = film.part(region);
-        let Reached { pass, next: [x, y] } = reached;
+        let SampleProgress { pass, next: [x, y] } = reached;
         let (rows, columns) = (
             u64::from(y.saturating_sub(region.y0)),
             u64::from(x.saturating_sub(region.x0)),
         );
         let ahead = (rows * u64::from(region.width()) + columns).min(region.pixels());
-        let (camera_rays, min_samples) = match film.form().adaptive {
+        let (camera_rays, min_samples) = match film.film_layout().adaptive {
             true => (
                 film.sample_counts().map(u64::from).sum(),
                 film.sample_counts().min().unwrap_or(0),
@@ -87,7 +87,7 @@ impl Finished {
                 pass.start,
             ),
         };
-        Finished {
+        FinishedBand {
             film,
             min_samples,
             requested_samples: pass.start,
@@ -100,7 +100,7 @@ struct Band {
     region: Region,
     state: State,
     /// The piece after the last whole pass, if the current pass has changed it.
-    passed: Option<Piece>,
+    passed: Option<FilmPiece>,
 }
 
 enum State {
@@ -108,7 +108,7 @@ enum State {
     /// In the checkpoint store.
     Stored(StoredPiece),
     /// In memory.
-    Here(Piece),
+    Here(FilmPiece),
 }
 
 #[derive(PartialEq, Eq)]
@@ -121,14 +121,14 @@ enum End {
 const PASS: Duration = Duration::from_secs(1);
 
 /// Minimum rows of a shortened band, without and with adaptive sampling, which adds two rows for the neighbors.
-const LEAST_ROWS: [u32; 2] = [16, 64];
+const MIN_ROWS: [u32; 2] = [16, 64];
 
 impl<'a> Bands<'a> {
     /// Splits a region into bands, and takes over the pieces of a store, which must lie in the region.
     pub fn new(
         region: Region,
         samples: u32,
-        cut: &Cut,
+        split: &WorkSplit,
         order: Order,
         largest_film: u64,
         store: &'a mut dyn CheckpointStore,
@@ -137,7 +137,7 @@ impl<'a> Bands<'a> {
         let mut y = region.y0;
         let add_new = |all: &mut VecDeque<Band>, y0: u32, y1: u32| {
             let rows = Region { y0, y1, ..region };
-            let new = bands(rows, cut, largest_film).map(|region| Band::new(region, State::New));
+            let new = bands(rows, split, largest_film).map(|region| Band::new(region, State::New));
             all.extend(new);
         };
         for piece in store.pieces() {
@@ -155,7 +155,7 @@ impl<'a> Bands<'a> {
             samples,
             whole: None,
             pass: None,
-            steps: Steps::new(cut, CALL, order),
+            steps: Steps::new(split, DISPATCH_DURATION, order),
             done: 0.0,
             total: region.pixels() as f64 * f64::from(samples),
             kept: (Instant::now(), Duration::ZERO),
@@ -168,8 +168,8 @@ impl<'a> Bands<'a> {
     /// # Errors
     ///
     /// [`RenderError::Memory`] if the films do not fit.
-    pub fn as_a_whole(mut self, form: Form) -> Result<Bands<'a>, RenderError> {
-        there_is_memory(self.pixels().saturating_mul(form.bytes() as u64))?;
+    pub fn as_a_whole(mut self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
+        there_is_memory(self.pixels().saturating_mul(film_layout.bytes() as u64))?;
         self.whole = Some(false);
         Ok(self)
     }
@@ -179,9 +179,9 @@ impl<'a> Bands<'a> {
     /// # Errors
     ///
     /// [`RenderError::Memory`] if the films do not fit.
-    pub fn in_passes(self, form: Form) -> Result<Bands<'a>, RenderError> {
-        there_is_memory(self.pixels().saturating_mul(2 * form.bytes() as u64))?;
-        let mut bands = self.as_a_whole(form)?;
+    pub fn in_passes(self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
+        there_is_memory(self.pixels().saturating_mul(2 * film_layout.bytes() as u64))?;
+        let mut bands = self.as_a_whole(film_layout)?;
         bands.pass = Some(0);
         Ok(bands)
     }
@@ -201,7 +201,7 @@ impl<'a> Bands<'a> {
         backend: &mut dyn Backend,
         watch: &mut Watch,
         made: &mut dyn FnMut(),
-    ) -> Result<Option<Finished>, RenderError> {
+    ) -> Result<Option<FinishedBand>, RenderError> {
         if self.whole == Some(false) {
             self.grow(backend, watch, made)?;
             self.whole = Some(true);
@@ -218,8 +218,8 @@ impl<'a> Bands<'a> {
         };
         self.done += band.region.pixels() as f64 * f64::from(self.samples);
         match band.state {
-            State::Here(piece) => Ok(Some(Finished::of(piece))),
-            State::Stored(kept) => Ok(Some(Finished::of(self.store.load(kept.number)?))),
+            State::Here(piece) => Ok(Some(FinishedBand::of(piece))),
+            State::Stored(kept) => Ok(Some(FinishedBand::of(self.store.load(kept.number)?))),
             State::New => Err(RenderError::NoFilm), // not possible: `work` has created a piece
         }
     }
@@ -272,7 +272,7 @@ impl<'a> Bands<'a> {
     /// Errors of `output`, and of a store that cannot load a piece.
     pub fn last_pass(
         &mut self,
-        output: &mut dyn FnMut(Finished) -> Result<(), RenderError>,
+        output: &mut dyn FnMut(FinishedBand) -> Result<(), RenderError>,
     ) -> Result<(), RenderError> {
         for band in &self.bands {
             let piece = match (&band.passed, &band.state) {
@@ -280,7 +280,7 @@ impl<'a> Bands<'a> {
                 (None, State::Stored(kept)) => self.store.load(kept.number)?,
                 (None, State::New) => return Err(RenderError::NoFilm),
             };
-            output(Finished::of(piece))?;
+            output(FinishedBand::of(piece))?;
         }
         Ok(())
     }
@@ -358,7 +358,7 @@ impl<'a> Bands<'a> {
         if !self.store.small_pieces() {
             return;
         }
-        let least = LEAST_ROWS[usize::from(backend.samples_of_all() < self.samples)];
+        let least = MIN_ROWS[usize::from(backend.samples_of_all() < self.samples)];
         let of_a_row = f64::from(region.width()) * f64::from(self.samples);
         let of_a_piece = self.steps.speed().unwrap_or(0.0) * self.store.interval().as_secs_f64();
         let rows = ((of_a_piece / of_a_row) as u32).max(least);
@@ -455,7 +455,7 @@ impl<'a> Bands<'a> {
         let reached = self.steps.reached().clone();
         let is_finished = reached.pass.start >= self.samples;
         let film = backend.film()?;
-        let piece = Piece {
+        let piece = FilmPiece {
             region,
             reached,
             film: if is_finished { film.part(region) } else { film },
@@ -501,7 +501,7 @@ impl Band {
         }
     }
 
-    fn reached(&self) -> Option<&Reached> {
+    fn reached(&self) -> Option<&SampleProgress> {
         match &self.state {
             State::New => None,
             State::Stored(kept) => Some(&kept.reached),

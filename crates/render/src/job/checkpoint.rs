@@ -11,10 +11,10 @@ use tempfile::NamedTempFile;
 use thiserror::Error;
 
 use super::identity::Identity;
-use super::piece::{CheckpointStore, Piece, StoredPiece};
+use super::piece::{CheckpointStore, FilmPiece, StoredPiece};
 use super::pieces_file::{self, Entry, FORMAT, Header, Key};
 use crate::error::RenderError;
-use crate::film::Form;
+use crate::film::FilmLayout;
 use wgray_image::Output;
 
 /// Why a checkpoint cannot be used.
@@ -53,7 +53,7 @@ pub enum CheckpointError {
 }
 
 /// Options for opening a checkpoint.
-pub struct Opening<'a> {
+pub struct CheckpointOptions<'a> {
     /// Path of the file, or of a folder in which each job has its own file.
     pub path: PathBuf,
     /// Resume from an existing file.
@@ -74,7 +74,7 @@ pub struct Checkpoint<'a> {
     file: File,
     header: Header,
     key: Key,
-    form: Form,
+    film_layout: FilmLayout,
     entries: Vec<Entry>,
     /// Pieces that no later one replaces, by their first rows.
     latest: BTreeMap<u32, usize>,
@@ -101,8 +101,12 @@ impl<'a> Checkpoint<'a> {
     /// # Errors
     ///
     /// [`CheckpointError`].
-    pub fn open(opening: Opening<'a>, identity: Identity, form: Form) -> Result<Checkpoint<'a>, CheckpointError> {
-        let Opening {
+    pub fn open(
+        opening: CheckpointOptions<'a>,
+        identity: Identity,
+        film_layout: FilmLayout,
+    ) -> Result<Checkpoint<'a>, CheckpointError> {
+        let CheckpointOptions {
             path: name,
             resume,
             interval,
@@ -143,7 +147,7 @@ impl<'a> Checkpoint<'a> {
                                 file,
                                 header,
                                 key,
-                                form,
+                                film_layout,
                                 entries: Vec::new(),
                                 latest: BTreeMap::new(),
                                 end,
@@ -188,7 +192,7 @@ impl<'a> Checkpoint<'a> {
             if !is_at(&file, path) {
                 continue;
             }
-            return Checkpoint::continue_from(name, path, file, header, form, interval, tell);
+            return Checkpoint::continue_from(name, path, file, header, film_layout, interval, tell);
         }
     }
 
@@ -202,7 +206,7 @@ impl<'a> Checkpoint<'a> {
         path: &Path,
         mut file: File,
         header: Header,
-        form: Form,
+        film_layout: FilmLayout,
         interval: Duration,
         mut tell: Box<dyn FnMut(&str) + 'a>,
     ) -> Result<Checkpoint<'a>, CheckpointError> {
@@ -242,7 +246,7 @@ impl<'a> Checkpoint<'a> {
             file,
             header: found,
             key,
-            form,
+            film_layout,
             entries: contents.entries,
             latest,
             end: contents.end,
@@ -253,7 +257,7 @@ impl<'a> Checkpoint<'a> {
         })
     }
 
-    fn append(&mut self, piece: &Piece) -> io::Result<()> {
+    fn append(&mut self, piece: &FilmPiece) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(self.end))?;
         let mut out = BufWriter::with_capacity(1 << 20, &self.file);
         let bytes = pieces_file::write_piece(&mut out, &self.key, piece, &[])?;
@@ -363,9 +367,9 @@ impl CheckpointStore for Checkpoint<'_> {
         self.latest.values().map(kept).collect()
     }
 
-    fn load(&mut self, number: usize) -> Result<Piece, RenderError> {
+    fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError> {
         let entry = self.entries.get(number).ok_or(RenderError::NoFilm)?;
-        let read = pieces_file::read_piece(&self.file, &self.key, entry, self.form);
+        let read = pieces_file::read_piece(&self.file, &self.key, entry, self.film_layout);
         let named = |error: io::Error| {
             let message = format!("{}: cannot be read: {error}", self.name.display());
             RenderError::Input(io::Error::new(error.kind(), message))
@@ -373,7 +377,7 @@ impl CheckpointStore for Checkpoint<'_> {
         Ok(read.map_err(named)?.0)
     }
 
-    fn keep(&mut self, piece: &Piece) {
+    fn keep(&mut self, piece: &FilmPiece) {
         let result = self.append(piece);
         self.noted(result);
     }

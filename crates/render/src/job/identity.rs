@@ -36,7 +36,7 @@ pub struct Identity {
 impl Identity {
     /// Returns the identity of rendering `region` of a scene.
     pub fn of(scene: &Packed, region: Region, exact_rounding: bool) -> Identity {
-        let form = scene.form();
+        let film_layout = scene.film_layout();
         Identity {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             shaders: wgray_shaders::hash(),
@@ -44,8 +44,8 @@ impl Identity {
             picture: [scene.camera.width, scene.camera.height],
             region: [region.x0, region.y0, region.x1, region.y1],
             pixel_samples: scene.sampling.pixel_samples,
-            adaptive: form.adaptive,
-            layers: form.layers,
+            adaptive: film_layout.adaptive,
+            layers: film_layout.layers,
             exact_rounding,
         }
     }

@@ -14,57 +14,57 @@ use std::time::Duration;
 
 use crate::backend::Backend;
 use crate::error::RenderError;
-use crate::film::{Film, Form};
+use crate::film::{Film, FilmLayout};
 use crate::records::FirstHit;
 use wgray_image::Region;
 
-pub use bands::{Bands, Finished, Flow, Watch, there_is_memory};
+pub use bands::{Bands, FinishedBand, Flow, Watch, there_is_memory};
 pub use identity::{Identity, hash_of_scene};
 pub use part::{PartError, PartHeader, Parts, Tile, read_part, write_part};
-pub use piece::{CheckpointStore, INTERVAL, NoCheckpoint, Piece, StoredPiece};
-pub use steps::{Order, Reached, Steps};
+pub use piece::{CheckpointStore, FilmPiece, INTERVAL, NoCheckpoint, StoredPiece};
+pub use steps::{Order, SampleProgress, Steps};
 
 /// Target duration of a dispatch: long enough to hide its overhead, short enough for watchdogs and cancellation.
-const CALL: Duration = Duration::from_millis(60);
+const DISPATCH_DURATION: Duration = Duration::from_millis(60);
 
 /// Partition of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cut {
+pub struct WorkSplit {
     /// Maximum size of a film in pixels.
     pub band_pixels: u64,
     /// Samples per dispatch; `None` adapts to the speed.
-    pub samples_per_call: Option<u32>,
+    pub samples_per_dispatch: Option<u32>,
     /// Rows per dispatch; `None` adapts to the speed.
-    pub rows_per_call: Option<u32>,
+    pub rows_per_dispatch: Option<u32>,
 }
 
-impl Default for Cut {
+impl Default for WorkSplit {
     /// Films of at most 64 MiB, 192 MiB under adaptive sampling.
-    fn default() -> Cut {
-        Cut {
+    fn default() -> WorkSplit {
+        WorkSplit {
             band_pixels: 4 << 20,
-            samples_per_call: None,
-            rows_per_call: None,
+            samples_per_dispatch: None,
+            rows_per_dispatch: None,
         }
     }
 }
 
-impl Cut {
-    /// Returns [`Cut::default`], with smaller bands for layers: a film takes no more memory than an adaptive one.
-    pub fn of(form: Form) -> Cut {
+impl WorkSplit {
+    /// Returns [`WorkSplit::default`], with smaller bands for layers: a film takes no more memory than an adaptive one.
+    pub fn of(film_layout: FilmLayout) -> WorkSplit {
         const LISTS: u64 = 3;
-        let cut = Cut::default();
-        Cut {
-            band_pixels: cut.band_pixels * LISTS / LISTS.max(form.lists() as u64),
-            ..cut
+        let split = WorkSplit::default();
+        WorkSplit {
+            band_pixels: split.band_pixels * LISTS / LISTS.max(film_layout.lists() as u64),
+            ..split
         }
     }
 }
 
 /// Splits a region into bands of whole rows that fit a film, from the top. A region without pixels has none.
-pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
+pub fn bands(region: Region, split: &WorkSplit, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
     let [width, height] = [region.width(), region.height()].map(|n| u64::from(n.max(1)));
-    let rows = (cut.band_pixels.min(largest_film) / width).clamp(1, height) as u32;
+    let rows = (split.band_pixels.min(largest_film) / width).clamp(1, height) as u32;
     let end = if region.is_empty() { region.y0 } else { region.y1 };
     (region.y0..end).step_by(rows as usize).map(move |y0| Region {
         y0,
@@ -77,12 +77,12 @@ pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item
 /// bounded size.
 pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<FirstHit>, RenderError> {
     const CALL_PIXELS: u64 = 1 << 18;
-    let cut = Cut {
+    let split = WorkSplit {
         band_pixels: CALL_PIXELS,
-        ..Cut::default()
+        ..WorkSplit::default()
     };
     let mut hits = Vec::new();
-    for strip in bands(region, &cut, backend.largest_film()) {
+    for strip in bands(region, &split, backend.largest_film()) {
         hits.extend(backend.first_hits(strip)?);
     }
     Ok(hits)
@@ -94,7 +94,7 @@ pub fn render(
     backend: &mut dyn Backend,
     region: Region,
     samples: u32,
-    cut: &Cut,
+    split: &WorkSplit,
     progress: &mut dyn FnMut(f64) -> bool,
     output: &mut dyn FnMut(Film) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
@@ -102,7 +102,7 @@ pub fn render(
     let mut bands = Bands::new(
         region,
         samples,
-        cut,
+        split,
         Order::Rows,
         backend.largest_film(),
         &mut no_checkpoint,
@@ -170,7 +170,7 @@ mod tests {
     fn rows_get_all_samples_first_or_all_pixels_some() {
         for (order, first) in [(Order::Rows, 0..16), (Order::Pixels, 0..4)] {
             let (mut notes, region) = (Notes(Vec::new()), Region::whole(64, 64));
-            let mut steps = Steps::new(&Cut::default(), CALL, order);
+            let mut steps = Steps::new(&WorkSplit::default(), DISPATCH_DURATION, order);
             steps.start(&notes, region, 16);
             while steps.step(&mut notes).unwrap().is_some() {}
             assert_eq!(notes.0[0].1, first, "{order:?}");
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_region_and_its_neighbours_get_first_looks_before_any_pixel_gets_more() {
+    fn pilot_samples_of_a_region_and_its_neighbors_come_first() {
         let (region, film) = (
             Region {
                 x0: 5,
@@ -254,10 +254,10 @@ mod tests {
                 y1: 64,
             },
         );
-        for samples_per_call in [None, Some(3)] {
-            let cut = Cut {
-                samples_per_call,
-                ..Cut::default()
+        for samples_per_dispatch in [None, Some(3)] {
+            let split = WorkSplit {
+                samples_per_dispatch,
+                ..WorkSplit::default()
             };
             let (mut backend, mut done, mut outputs) = (Looks::default(), 0.0, Vec::new());
             let mut progress = |share| {
@@ -268,7 +268,7 @@ mod tests {
                 outputs.push((film.region, film.sums.len(), film.moments.len()));
                 Ok(())
             };
-            render(&mut backend, region, 16, &cut, &mut progress, &mut output).unwrap();
+            render(&mut backend, region, 16, &split, &mut progress, &mut output).unwrap();
             assert_eq!((backend.film, outputs.len()), (Some(film), 1));
             assert_eq!(outputs[0], (region, region.pixels() as usize, region.pixels() as usize));
             let further = backend

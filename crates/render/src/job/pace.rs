@@ -18,7 +18,7 @@ impl Pace {
     /// Small enough for the slowest device and scene.
     const FIRST_CALL: f64 = 16384.0;
     /// Maximum speedup from pixels that skip samples under adaptive sampling. In the next tile none may skip.
-    const MOST_LEFT_OUT: f64 = 8.0;
+    const MAX_OUTLIER_RATIO: f64 = 8.0;
     /// Minimum work of a dispatch: one workgroup.
     const LEAST: f64 = 64.0;
 
@@ -38,7 +38,7 @@ impl Pace {
         if of_all {
             self.speed_of_all = speed;
         }
-        self.speed = Some(speed.min(Self::MOST_LEFT_OUT * self.speed_of_all));
+        self.speed = Some(speed.min(Self::MAX_OUTLIER_RATIO * self.speed_of_all));
     }
 
     /// Halves the maximum after a failed dispatch, which may have taken too long.

@@ -10,15 +10,15 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::identity::Identity;
-use super::piece::Piece;
+use super::piece::FilmPiece;
 use super::pieces_file::{self, Entry, FORMAT, Header, Key};
-use super::steps::Reached;
+use super::steps::SampleProgress;
 use crate::error::RenderError;
-use crate::film::Form;
+use crate::film::FilmLayout;
 use crate::output::{Aov, AovSource, Band, Layout, Metadata, Sink};
 use wgray_image::Pending;
 use wgray_image::Region;
-use wgray_image::waiting;
+use wgray_image::blocking_path;
 use wgray_scene::{Integrator, ViewSettings, ViewTransform};
 
 /// The contents of a part's header that the merged image needs besides the films.
@@ -154,9 +154,9 @@ pub fn write_part(
     let samples = identity.pixel_samples;
     render(&mut |Band { film, hits }| {
         let region = film.region;
-        let piece = Piece {
+        let piece = FilmPiece {
             region,
-            reached: Reached {
+            reached: SampleProgress {
                 pass: samples..samples,
                 next: [region.x0, region.y0],
             },
@@ -311,8 +311,8 @@ impl Parts {
             let Some((path, key)) = self.files.get(*number) else {
                 continue;
             };
-            let form = Form { adaptive, layers };
-            let read = File::open(path).and_then(|file| pieces_file::read_piece(&file, key, entry, form));
+            let film_layout = FilmLayout { adaptive, layers };
+            let read = File::open(path).and_then(|file| pieces_file::read_piece(&file, key, entry, film_layout));
             let (piece, hits) = read.map_err(|error| {
                 let message = format!("{}: cannot be read: {error}", path.display());
                 RenderError::Input(io::Error::new(error.kind(), message))
@@ -358,7 +358,7 @@ fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError>
         what,
     };
     let io = |error: io::Error| bad(error.to_string());
-    waiting::check(path).map_err(io)?;
+    blocking_path::reject(path).map_err(io)?;
     let mut file = File::open(path).map_err(io)?;
     let data = file.metadata().map_err(io)?;
     if !data.is_file() {
@@ -400,7 +400,7 @@ mod tests {
     use crate::film::Film;
 
     /// Returns the error of a part of 4 x 3 pixels with a modified header and piece; empty if it is valid.
-    fn told(change: impl Fn(&mut Header, &mut Piece)) -> String {
+    fn told(change: impl Fn(&mut Header, &mut FilmPiece)) -> String {
         let region = Region::whole(4, 3);
         let mut header = Header {
             format: FORMAT,
@@ -425,13 +425,13 @@ mod tests {
                 told: Vec::new(),
             }),
         };
-        let mut piece = Piece {
+        let mut piece = FilmPiece {
             region,
-            reached: Reached {
+            reached: SampleProgress {
                 pass: 16..16,
                 next: [0, 0],
             },
-            film: Film::of(region, Form::default()),
+            film: Film::of(region, FilmLayout::default()),
         };
         change(&mut header, &mut piece);
         let mut bytes = Vec::new();

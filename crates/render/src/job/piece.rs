@@ -2,18 +2,18 @@
 
 use std::time::Duration;
 
-use super::steps::Reached;
+use super::steps::SampleProgress;
 use crate::error::RenderError;
 use crate::film::Film;
 use wgray_image::Region;
 
 /// Rows of an image with the samples that they have so far. Any backend can continue it, with the same bits.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Piece {
+pub struct FilmPiece {
     /// Whole rows of the region of the job.
     pub region: Region,
     /// Samples of the film's pixels.
-    pub reached: Reached,
+    pub reached: SampleProgress,
     /// Film of the region. If the piece is unfinished, includes the neighbors that determine its sample counts.
     pub film: Film,
 }
@@ -28,7 +28,7 @@ pub struct StoredPiece {
     /// Region of its film.
     pub film: Region,
     /// Samples of the film's pixels.
-    pub reached: Reached,
+    pub reached: SampleProgress,
 }
 
 /// Storage of pieces while others are rendered.
@@ -41,10 +41,10 @@ pub trait CheckpointStore {
     /// # Errors
     ///
     /// Unreadable pieces.
-    fn load(&mut self, number: usize) -> Result<Piece, RenderError>;
+    fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError>;
 
     /// Stores a piece, and replaces one of the same rows. A failure is reported and does not stop the work.
-    fn keep(&mut self, piece: &Piece);
+    fn keep(&mut self, piece: &FilmPiece);
 
     /// Flushes all stored pieces to the disk.
     fn sync(&mut self);
@@ -68,11 +68,11 @@ impl CheckpointStore for NoCheckpoint {
         Vec::new()
     }
 
-    fn load(&mut self, _: usize) -> Result<Piece, RenderError> {
+    fn load(&mut self, _: usize) -> Result<FilmPiece, RenderError> {
         Err(RenderError::NoFilm)
     }
 
-    fn keep(&mut self, _: &Piece) {}
+    fn keep(&mut self, _: &FilmPiece) {}
 
     fn sync(&mut self) {}
 

@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use super::identity::Identity;
 use super::part::PartHeader;
-use super::piece::Piece;
-use super::steps::Reached;
-use crate::film::{Film, Form};
+use super::piece::FilmPiece;
+use super::steps::SampleProgress;
+use crate::film::{Film, FilmLayout};
 use crate::records::FirstHit;
 use wgray_image::Region;
 
@@ -28,10 +28,10 @@ use wgray_image::Region;
 pub const MAGIC: &[u8; 16] = b"\x89wgray pieces\r\n\x1a";
 
 /// Version of the format.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// Maximum length of the header in bytes.
-const LARGEST_HEADER: u32 = 1 << 20;
+const MAX_HEADER_BYTES: u32 = 1 << 20;
 
 /// Header of a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ pub struct Entry {
     pub region: Region,
     pub film: Region,
     /// Samples of the film's pixels.
-    pub reached: Reached,
+    pub reached: SampleProgress,
     /// True if the first hits of its rows follow the film.
     pub has_hits: bool,
     pub start: u64,
@@ -60,7 +60,7 @@ pub struct Entry {
 
 impl Entry {
     /// Creates the entry of a piece without first hits.
-    pub fn of(piece: &Piece, start: u64, bytes: u64) -> Entry {
+    pub fn of(piece: &FilmPiece, start: u64, bytes: u64) -> Entry {
         Entry {
             region: piece.region,
             film: piece.film.region,
@@ -87,7 +87,7 @@ const HASH: usize = blake3::OUT_LEN;
 const HEAD: u64 = (4 * WORDS + HASH) as u64;
 
 /// A reader or writer that counts and hashes its bytes.
-struct Hashed<T> {
+struct HashingStream<T> {
     inner: T,
     hasher: blake3::Hasher,
     bytes: u64,
@@ -96,19 +96,19 @@ struct Hashed<T> {
 /// Hash of a file's header, which keys the hashes of its pieces.
 pub type Key = [u8; HASH];
 
-impl<T> Hashed<T> {
-    fn new(inner: T) -> Hashed<T> {
-        Hashed {
+impl<T> HashingStream<T> {
+    fn new(inner: T) -> HashingStream<T> {
+        HashingStream {
             inner,
             hasher: blake3::Hasher::new(),
             bytes: 0,
         }
     }
 
-    fn keyed(inner: T, key: &Key) -> Hashed<T> {
-        Hashed {
+    fn keyed(inner: T, key: &Key) -> HashingStream<T> {
+        HashingStream {
             hasher: blake3::Hasher::new_keyed(key),
-            ..Hashed::new(inner)
+            ..HashingStream::new(inner)
         }
     }
 
@@ -117,7 +117,7 @@ impl<T> Hashed<T> {
     }
 }
 
-impl<W: Write> Hashed<W> {
+impl<W: Write> HashingStream<W> {
     fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.inner.write_all(bytes)?;
         self.hasher.update(bytes);
@@ -144,7 +144,7 @@ impl<W: Write> Hashed<W> {
     }
 }
 
-impl<R: Read> Hashed<R> {
+impl<R: Read> HashingStream<R> {
     fn get(&mut self, bytes: &mut [u8]) -> io::Result<()> {
         self.inner.read_exact(bytes)?;
         self.hasher.update(bytes);
@@ -171,7 +171,7 @@ impl<R: Read> Hashed<R> {
 /// Writes the magic and the header. Returns the hash and the number of bytes.
 pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u64)> {
     let text = serde_json::to_vec(header)?;
-    let mut out = Hashed::new(out);
+    let mut out = HashingStream::new(out);
     out.inner.write_all(MAGIC)?;
     out.put_words(&[text.len() as u32])?;
     out.put(&text)?;
@@ -190,10 +190,10 @@ pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
     if magic != *MAGIC {
         return Err(none(io::ErrorKind::InvalidData.into()));
     }
-    let mut input = Hashed::new(input);
+    let mut input = HashingStream::new(input);
     let mut length = [0];
     input.get_words(&mut length).map_err(cut)?;
-    if length[0] > LARGEST_HEADER {
+    if length[0] > MAX_HEADER_BYTES {
         return Err(cut(io::ErrorKind::InvalidData.into()));
     }
     let mut text = vec![0; length[0] as usize];
@@ -224,8 +224,8 @@ pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
 struct Head {
     region: Region,
     film: Region,
-    reached: Reached,
-    form: Form,
+    reached: SampleProgress,
+    film_layout: FilmLayout,
     has_hits: bool,
 }
 
@@ -233,8 +233,8 @@ impl Head {
     fn words(&self) -> [u32; WORDS] {
         let Region { x0, y0, x1, y1 } = self.region;
         let film = self.film;
-        let Reached { pass, next } = &self.reached;
-        let flags = [self.form.adaptive, self.form.layers, self.has_hits];
+        let SampleProgress { pass, next } = &self.reached;
+        let flags = [self.film_layout.adaptive, self.film_layout.layers, self.has_hits];
         let flags = (0..).zip(flags).map(|(i, flag)| u32::from(flag) << i).sum();
         let words = [x0, y0, x1, y1, film.x0, film.y0, film.x1, film.y1];
         let more = [pass.start, pass.end, next[0], next[1], flags, 0];
@@ -254,11 +254,11 @@ impl Head {
         let head = Head {
             region: region(x0, y0, x1, y1),
             film: region(fx0, fy0, fx1, fy1),
-            reached: Reached {
+            reached: SampleProgress {
                 pass: start..end,
                 next: [x, y],
             },
-            form: Form {
+            film_layout: FilmLayout {
                 adaptive: flags & 1 != 0,
                 layers: flags & 2 != 0,
             },
@@ -277,8 +277,8 @@ impl Head {
             && end <= identity.pixel_samples
             && (head.film.x0..head.film.x1).contains(&x)
             && (head.film.y0..=head.film.y1).contains(&y)
-            && head.form
-                == Form {
+            && head.film_layout
+                == FilmLayout {
                     adaptive: identity.adaptive,
                     layers: identity.layers,
                 };
@@ -287,21 +287,21 @@ impl Head {
 
     fn data(&self) -> u64 {
         let hits = if self.has_hits { self.region.pixels() } else { 0 };
-        self.film.pixels() * self.form.bytes() as u64 + hits * size_of::<FirstHit>() as u64
+        self.film.pixels() * self.film_layout.bytes() as u64 + hits * size_of::<FirstHit>() as u64
     }
 }
 
 /// Writes a piece, with the first hits of its rows if `hits` is not empty. Returns the number of bytes.
-pub fn write_piece(out: &mut impl Write, key: &Key, piece: &Piece, hits: &[FirstHit]) -> io::Result<u64> {
+pub fn write_piece(out: &mut impl Write, key: &Key, piece: &FilmPiece, hits: &[FirstHit]) -> io::Result<u64> {
     let lists: Vec<_> = piece.film.lists().collect();
     let head = Head {
         region: piece.region,
         film: piece.film.region,
         reached: piece.reached.clone(),
-        form: piece.film.form(),
+        film_layout: piece.film.film_layout(),
         has_hits: !hits.is_empty(),
     };
-    let mut out = Hashed::keyed(out, key);
+    let mut out = HashingStream::keyed(out, key);
     out.put_words(&head.words())?;
     out.put_hash()?;
     for list in lists {
@@ -344,7 +344,7 @@ fn next_entry(
     start: u64,
     length: u64,
 ) -> io::Result<Option<Entry>> {
-    let mut input = Hashed::keyed(input, key);
+    let mut input = HashingStream::keyed(input, key);
     let mut words = [0; WORDS];
     input.get_words(&mut words)?;
     if !input.is_whole()? {
@@ -375,13 +375,18 @@ fn next_entry(
 }
 
 /// Reads a piece and its first hits, if it has any.
-pub fn read_piece(file: &File, key: &Key, entry: &Entry, form: Form) -> io::Result<(Piece, Vec<FirstHit>)> {
+pub fn read_piece(
+    file: &File,
+    key: &Key,
+    entry: &Entry,
+    film_layout: FilmLayout,
+) -> io::Result<(FilmPiece, Vec<FirstHit>)> {
     let mut input = BufReader::with_capacity(1 << 20, file);
     input.seek(SeekFrom::Start(entry.start))?;
-    let mut input = Hashed::keyed(input, key);
+    let mut input = HashingStream::keyed(input, key);
     let mut head = [0; HEAD as usize];
     input.get(&mut head)?;
-    let mut film = Film::of(entry.film, form);
+    let mut film = Film::of(entry.film, film_layout);
     for list in film.lists_mut() {
         input.get_words(cast_slice_mut::<Vec4, u32>(list))?;
     }
@@ -398,7 +403,7 @@ pub fn read_piece(file: &File, key: &Key, entry: &Entry, form: Form) -> io::Resu
             "a piece has changed since the file was opened",
         ));
     }
-    let piece = Piece {
+    let piece = FilmPiece {
         region: entry.region,
         reached: entry.reached.clone(),
         film,

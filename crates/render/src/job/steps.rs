@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::Cut;
+use super::WorkSplit;
 use super::pace::Pace;
 use crate::backend::Backend;
 use crate::error::RenderError;
@@ -25,7 +25,7 @@ const ROWS: u32 = 16;
 
 /// Samples of the pixels of a film.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Reached {
+pub struct SampleProgress {
     /// Range of samples in progress; all earlier ones are complete. Empty when all samples are.
     pub pass: Range<u32>,
     /// Column and row of the first pixel without them, in row order.
@@ -35,7 +35,7 @@ pub struct Reached {
 /// The sequence of dispatches that render a film.
 #[derive(Clone, Debug)]
 pub struct Steps {
-    cut: Cut,
+    split: WorkSplit,
     order: Order,
     pace: Pace,
     region: Region,
@@ -45,18 +45,18 @@ pub struct Steps {
     /// Number of samples that all pixels get.
     of_all: u32,
     until: u32,
-    reached: Reached,
-    call: Option<Call>,
+    reached: SampleProgress,
+    call: Option<Dispatch>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Call {
+struct Dispatch {
     tile: Region,
     samples: u32,
     start: Instant,
 }
 
-impl Call {
+impl Dispatch {
     fn work(&self) -> f64 {
         self.tile.pixels() as f64 * f64::from(self.samples)
     }
@@ -64,9 +64,9 @@ impl Call {
 
 impl Steps {
     /// Creates an empty sequence. A dispatch aims to take `call`.
-    pub fn new(cut: &Cut, call: Duration, order: Order) -> Steps {
+    pub fn new(split: &WorkSplit, call: Duration, order: Order) -> Steps {
         Steps {
-            cut: *cut,
+            split: *split,
             order,
             pace: Pace::new(call),
             region: Region::whole(0, 0),
@@ -74,7 +74,7 @@ impl Steps {
             samples: 0,
             of_all: 0,
             until: 0,
-            reached: Reached {
+            reached: SampleProgress {
                 pass: 0..0,
                 next: [0; 2],
             },
@@ -95,7 +95,7 @@ impl Steps {
     }
 
     /// Continues a film of a region, possibly on another backend.
-    pub fn go_on(&mut self, backend: &dyn Backend, region: Region, samples: u32, reached: &Reached) {
+    pub fn go_on(&mut self, backend: &dyn Backend, region: Region, samples: u32, reached: &SampleProgress) {
         self.start(backend, region, samples);
         self.reached = reached.clone();
         self.next_pass_if_ended();
@@ -104,7 +104,7 @@ impl Steps {
     /// Stops when all pixels have this number of samples. A pass in progress is completed first.
     pub fn stop_at(&mut self, samples: u32) {
         self.until = samples.min(self.samples);
-        let Reached { pass, next } = &self.reached;
+        let SampleProgress { pass, next } = &self.reached;
         if *next == [self.region_of_pass().x0, self.region_of_pass().y0] {
             self.begin_pass(pass.start);
         }
@@ -116,7 +116,7 @@ impl Steps {
     }
 
     /// Returns the samples of the film's pixels, between two dispatches.
-    pub fn reached(&self) -> &Reached {
+    pub fn reached(&self) -> &SampleProgress {
         &self.reached
     }
 
@@ -148,7 +148,7 @@ impl Steps {
             return Ok(false);
         }
         let pass = self.reached.pass.clone();
-        let call = Call {
+        let call = Dispatch {
             tile: self.next_tile(),
             samples: pass.len() as u32,
             start: Instant::now(),
@@ -164,7 +164,7 @@ impl Steps {
         let width = u64::from(region.width().max(1));
         let [x, y] = self.reached.next;
         let pixels = (self.pace.work() / f64::from(self.reached.pass.len() as u32)).max(1.0) as u64;
-        let pixels = (self.cut.rows_per_call).map_or(pixels, |rows| u64::from(rows.max(1)) * width);
+        let pixels = (self.split.rows_per_dispatch).map_or(pixels, |rows| u64::from(rows.max(1)) * width);
         if x == region.x0 && pixels >= width {
             let rows = (pixels / width).min(u64::from(region.y1 - y)) as u32;
             return Region {
@@ -189,7 +189,7 @@ impl Steps {
 
     fn end_call(&mut self) -> Option<f64> {
         let call = self.call.take()?;
-        let Call { tile, samples, start } = call;
+        let Dispatch { tile, samples, start } = call;
         let of_all = self.reached.pass.end <= self.of_all;
         self.pace.took(call.work(), start.elapsed(), of_all);
         let region = self.region_of_pass();
@@ -227,7 +227,7 @@ impl Steps {
 
     /// Returns the number of samples of every pixel of a row.
     pub fn samples_of_row(&self, y: u32) -> u32 {
-        let Reached { pass, next } = &self.reached;
+        let SampleProgress { pass, next } = &self.reached;
         if y < next[1] { pass.end } else { pass.start }
     }
 
@@ -242,7 +242,7 @@ impl Steps {
             Order::Pixels => self.region.height(),
         };
         let pixels = f64::from(self.region.width()) * f64::from(rows);
-        let count = (self.cut.samples_per_call).unwrap_or_else(|| (self.pace.work() / pixels).max(1.0) as u32);
+        let count = (self.split.samples_per_dispatch).unwrap_or_else(|| (self.pace.work() / pixels).max(1.0) as u32);
         let end = if first < self.of_all { self.of_all } else { self.samples };
         let end = end.min(self.until).max(first);
         self.reached.pass = first..first + count.min(end - first);

@@ -5,7 +5,7 @@ use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use super::{Metadata, exr, flat, png};
-use wgray_image::contain::catch_panic;
+use wgray_image::panic_guard::catch_panic;
 
 /// Reads the metadata of an image that this program wrote, in any of its formats; `None` for other files. The format is
 /// detected from the first bytes.

@@ -105,7 +105,7 @@ pub struct Target {
 
 /// Result of writing images.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Saved {
+pub struct SaveReport {
     /// Files in which finite values became infinite, as 16-bit floats end at 65,504, and the number of these values.
     pub too_large: Vec<(String, u64)>,
 }
@@ -133,8 +133,8 @@ pub fn save(
     layout: &Layout,
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
-) -> Result<Saved, RenderError> {
-    let mut saved = Saved::default();
+) -> Result<SaveReport, RenderError> {
+    let mut saved = SaveReport::default();
     write(&mut targets, layout, options, &mut saved, &mut |_| Ok(()), render)?;
     let mut files: Vec<Pending> = targets.into_iter().flat_map(|target| target.files).collect();
     files.iter_mut().try_for_each(Pending::complete)?;
@@ -147,7 +147,7 @@ fn write(
     targets: &mut [Target],
     layout: &Layout,
     options: &SaveOptions,
-    saved: &mut Saved,
+    saved: &mut SaveReport,
     before: &mut Sink,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {

@@ -27,9 +27,9 @@ pub struct PackedEmitters {
 }
 
 /// Maximum number of emitters that an alias table selects by power alone; more use a light tree.
-pub const MOST_LISTED: usize = 16;
+pub const MAX_LISTED_EMITTERS: usize = 16;
 /// Maximum number of emitters in a light tree, which takes about 100 bytes each. More are selected by power alone.
-const MOST_IN_TREE: usize = 500_000;
+const MAX_TREE_EMITTERS: usize = 500_000;
 
 /// Collects all emitters: primitives, delta lights, triangles of meshes and the environment map. Sets
 /// [`Material::density`], the PDF of samples on emissive surfaces. `around` is the integral of the environment map over
@@ -110,8 +110,8 @@ pub fn emitters(
     balance(&mut powers, &places, &shining.lighting.lights);
     let is_far = |place: &(u32, u32)| is_far(&shining.lighting.lights, place);
     let near = places.iter().filter(|place| !is_far(place)).count();
-    if (MOST_LISTED + 1..=MOST_IN_TREE).contains(&near) {
-        let found = Found {
+    if (MAX_LISTED_EMITTERS + 1..=MAX_TREE_EMITTERS).contains(&near) {
+        let found = EmitterRef {
             places,
             powers,
             radiances,
@@ -215,7 +215,7 @@ fn is_far(lights: &[Light], &(instance, index): &(u32, u32)) -> bool {
     instance == 0 && matches!(lights[index as usize].kind, DIRECTIONAL | ENVIRONMENT)
 }
 
-struct Found {
+struct EmitterRef {
     /// Instance, and index of the light or triangle.
     places: Vec<(u32, u32)>,
     powers: Vec<f64>,
@@ -231,7 +231,7 @@ fn with_tree(
     materials: &mut [Material],
     primitives: &[(Primitive, bool)],
     trees: &PackedBvh,
-    found: &Found,
+    found: &EmitterRef,
 ) -> PackedEmitters {
     let is_far = |place: &(u32, u32)| is_far(&shining.lighting.lights, place);
     let (mut in_tree, mut far) = (Vec::new(), Vec::new());

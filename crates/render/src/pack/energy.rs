@@ -3,7 +3,7 @@
 
 use glam::{DVec2, UVec2, Vec2, Vec3};
 
-use super::{ENERGY_SIZE, Material, SMALLEST_ALPHA, STREAK_COLUMNS, STREAK_LINES};
+use super::{ANISO_COLUMNS, ANISO_LINES, ENERGY_SIZE, Material, SMALLEST_ALPHA};
 use crate::cpu::ggx::{ggx_g1, ggx_sample};
 use crate::cpu::lobe::{facet_alpha, facet_weight};
 use crate::cpu::math::{dot, max};
@@ -28,7 +28,7 @@ pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
             for column in 0..ENERGY_SIZE {
                 let cosine = max(column as f32 / last, 0.002);
                 table.push(if wanted(row) {
-                    kept(index, alpha, cosine, &facets)
+                    glass_albedo(index, alpha, cosine, &facets)
                 } else {
                     1.0
                 });
@@ -43,12 +43,12 @@ fn points(count: u32) -> Vec<Vec2> {
 }
 
 /// Returns the single-scattering albedo of rough glass at a cosine, from reflection and transmission.
-fn kept(index: f32, alpha: f32, cosine: f32, facets: &[Vec2]) -> f32 {
+fn glass_albedo(index: f32, alpha: f32, cosine: f32, facets: &[Vec2]) -> f32 {
     let wo = Vec3::new(max(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine);
     glass_keeps(index, Vec2::splat(alpha), wo, facets)
 }
 
-/// Like `kept`, for any direction and anisotropic alpha.
+/// Like `glass_albedo`, for any direction and anisotropic alpha.
 fn glass_keeps(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32 {
     let eta = 1.0 / index;
     let mut sum = 0.0;
@@ -104,7 +104,7 @@ const CUT: f32 = 1.004;
 
 /// Returns the table of anisotropic microfacets for `single_scatter_albedo_aniso`: the numbers of rows by roughness and
 /// by anisotropy, 1 if known; then for each part the rows, each with lines by azimuth of columns by cosine.
-pub fn streak_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
+pub fn aniso_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
     let rows = [
         if roughness.is_none() { ROWS.0 } else { 1 },
         if anisotropy.is_none() { ROWS.1 } else { 1 },
@@ -124,13 +124,13 @@ pub fn streak_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32
                 anisotropy: at(anisotropy, s, rows[1]),
                 ..bytemuck::Zeroable::zeroed()
             });
-            for line in 0..STREAK_LINES {
-                for column in 0..STREAK_COLUMNS {
+            for line in 0..ANISO_LINES {
+                for column in 0..ANISO_COLUMNS {
                     let place = Vec2::new(
-                        line as f32 / (STREAK_LINES - 1) as f32,
-                        column as f32 / (STREAK_COLUMNS - 1) as f32,
+                        line as f32 / (ANISO_LINES - 1) as f32,
+                        column as f32 / (ANISO_COLUMNS - 1) as f32,
                     );
-                    nodes.push((alpha, streak_direction(alpha, place)));
+                    nodes.push((alpha, aniso_direction(alpha, place)));
                 }
             }
         }
@@ -164,13 +164,13 @@ pub fn streak_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32
     words
 }
 
-/// Returns the direction at table coordinates. Inverse of `streak_place`.
-fn streak_direction(alpha: Vec2, place: Vec2) -> Vec3 {
+/// Returns the direction at table coordinates. Inverse of `aniso_table_position`.
+fn aniso_direction(alpha: Vec2, place: Vec2) -> Vec3 {
     let seen = alpha.y + (alpha.x - alpha.y) * (place.x * place.x);
     let between = (seen * seen - alpha.y * alpha.y) / max(alpha.x * alpha.x - alpha.y * alpha.y, 1e-12);
     let along = max(0.0, if between > 1.0 { 1.0 } else { between });
     let half_way = 0.5 * seen.sqrt();
-    // Root of the quadratic equation of `streak_place`.
+    // Root of the quadratic equation of `aniso_table_position`.
     let b = 1.0 + 2.0 * half_way - 2.0 * place.y;
     let root = (b * b + 8.0 * half_way * place.y).sqrt();
     let cosine = max(0.5 * (root - b), 1e-3);

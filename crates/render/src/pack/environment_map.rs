@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{BACKGROUND, ENVIRONMENT_BLOCKS, ENVIRONMENT_INVISIBLE, ENVIRONMENT_MAP, Environment, NORMAL_BINS};
-use wgray_scene::halves::linear;
+use wgray_scene::downsample::linear;
 use wgray_scene::{self as scene, EnvironmentImage, Scene};
 
 /// Maps with a smaller integral count as black, as their PDFs would approach the subnormal numbers.
@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_gives_the_weights_that_it_was_made_of() {
+    fn alias_tables_reproduce_their_weights() {
         let random = |i: usize| ((i as f64 * 0.618_033_988_749) % 1.0).powi(9);
         for weights in [
             vec![1.0],
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn a_distribution_has_the_widths_of_its_weights() {
+    fn cumulative_distributions_match_their_weights() {
         for weights in [
             vec![1.0],
             vec![0.0, 3.0, 0.0],
@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bin_holds_the_normal_in_its_middle() {
+    fn bins_contain_their_center_normal() {
         for bin in 0..NORMAL_BINS * NORMAL_BINS {
             // Two points on the edge of the octahedral map are the same normal.
             let normal = bin_normal(bin);
@@ -468,7 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_cosine_is_that_of_evenly_spread_heights() {
+    fn the_mean_cosine_matches_quadrature() {
         for r in [0.05, 0.2, 1.0] {
             for m in [0.0, 0.3 * r, r, 1.7 * r] {
                 let count = 10_000;
@@ -483,7 +483,7 @@ mod tests {
 
     /// Block probabilities approximate the irradiance for a normal; cell probabilities match the power.
     #[test]
-    fn blocks_have_the_light_that_they_send() {
+    fn block_probabilities_approximate_irradiance() {
         for (width, height) in [(1, 1), (2, 1), (5, 3), (64, 32), (100, 77), (1024, 512)] {
             let grid = Grid::of(width, height);
             assert!(grid.columns() <= 32 && grid.rows() <= 32, "{width} x {height}");

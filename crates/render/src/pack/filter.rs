@@ -48,14 +48,14 @@ pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
     let mut table = Vec::new();
-    let mut left = FILTER_BINS_MAX;
+    let mut remaining = FILTER_BINS_MAX;
     for (i, lobe) in lobes.iter().enumerate() {
         let share = f64::from(FILTER_BINS_MAX) * lobe.integral().abs() / total;
         let bins = match i + 1 == lobes.len() {
-            true => left,
+            true => remaining,
             false => share.round() as u32,
         };
-        left -= bins;
+        remaining -= bins;
         let weight = lobe.integral().signum() * share / f64::from(bins);
         let edge = |bin: u32| lobe.quantile(f64::from(bin) / f64::from(bins));
         for bin in 0..bins {

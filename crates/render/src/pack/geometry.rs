@@ -7,7 +7,7 @@ use bytemuck::cast_vec;
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 
 use super::primitive::bounding_box;
-use super::{BOX_PAD, CASTS_SHADOW, INSTANCE, Instance, Item, NO_INDEX, NO_SHADOW, Node, Primitive, SOME_SHADOWS};
+use super::{BOX_PAD, BvhItem, CASTS_SHADOW, INSTANCE, Instance, NO_INDEX, NO_SHADOW, Node, Primitive, SOME_SHADOWS};
 use crate::bvh::{Aabb, build};
 use crate::records::{PackedBvh, PackedMesh};
 use wgray_scene::mesh::Mesh;
@@ -74,13 +74,13 @@ pub fn trees(
     let tree = build(&boxes, 1);
     trees.items = tree.order.iter().map(|i| items[*i as usize]).collect();
     trees.nodes = cast_vec(tree.nodes);
-    let condition = trees.instances.iter().map(|i| i.condition).fold(1.0, f32::max);
+    let condition_number = trees.instances.iter().map(|i| i.condition_number).fold(1.0, f32::max);
     let farthest = boxes
         .iter()
         .map(|b| b.low.abs().max(b.high.abs()).max_element())
         .fold(0.0, f32::max);
     trees.place_rows();
-    (trees, Vec4::new(BOX_PAD * condition, farthest, 0.0, 0.0))
+    (trees, Vec4::new(BOX_PAD * condition_number, farthest, 0.0, 0.0))
 }
 
 /// Returns the meshes that need computed tangents: those with a normal map in any instance. Other tangent directions,
@@ -116,7 +116,7 @@ impl PackedBvh {
                 row = more_uvs + mesh.more_uvs.len() as u32;
                 let nodes = node_row;
                 node_row += NODE_ROWS * mesh.nodes.len() as u32;
-                let or_nothing = |row: u32, is_there: bool| if is_there { row } else { NO_INDEX };
+                let or_nothing = |row: u32, exists: bool| if exists { row } else { NO_INDEX };
                 [
                     nodes,
                     triangles,
@@ -166,11 +166,11 @@ const NODE_ROWS: u32 = (size_of::<Node>() / 16) as u32;
 const TANGENT_ROWS: u32 = (size_of::<[Vec4; 2]>() / 16) as u32;
 const INSTANCE_ROWS: u32 = (size_of::<Instance>() / 16) as u32;
 
-fn item(kind: u32, index: u32, (low, high): (DVec3, DVec3)) -> Item {
+fn item(kind: u32, index: u32, (low, high): (DVec3, DVec3)) -> BvhItem {
     // Rounded outward to f32.
     let down = |x: f64| (x as f32).next_down();
     let up = |x: f64| (x as f32).next_up();
-    Item {
+    BvhItem {
         low: Vec3::new(down(low.x), down(low.y), down(low.z)),
         kind,
         high: Vec3::new(up(high.x), up(high.y), up(high.z)),
@@ -193,7 +193,7 @@ fn instance(mesh: &PackedMesh, center: DVec3, to_world: &DAffine3) -> Instance {
         (rows.y_axis, columns.y_axis),
         (rows.z_axis, columns.z_axis),
     ];
-    let condition = pairs.map(|(row, column)| row.length() * column.length());
+    let condition_number = pairs.map(|(row, column)| row.length() * column.length());
     Instance {
         x: rows.x_axis.as_vec3(),
         y: rows.y_axis.as_vec3(),
@@ -203,7 +203,7 @@ fn instance(mesh: &PackedMesh, center: DVec3, to_world: &DAffine3) -> Instance {
         v: columns.y_axis.as_vec3(),
         w: columns.z_axis.as_vec3(),
         size: mesh.size(),
-        condition: condition.into_iter().fold(1.0, f64::max) as f32,
+        condition_number: condition_number.into_iter().fold(1.0, f64::max) as f32,
         side: if columns.determinant() < 0.0 { -1.0 } else { 1.0 },
         ..bytemuck::Zeroable::zeroed()
     }

@@ -15,7 +15,7 @@ pub(super) const DISTANT: f32 = 1e10;
 const BEFORE_LIGHT: f64 = 1e-5;
 
 /// Minimum range of the cosine over which a spot light falls off.
-const LEAST_FALLOFF: f64 = 1e-12;
+const MIN_FALLOFF: f64 = 1e-12;
 
 /// `t_max` of shadow rays, as a multiple of the vector to the sample.
 pub(super) fn t_max(shadow_epsilon: f64) -> f32 {
@@ -96,7 +96,7 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
             normal: direction.as_vec3(),
             kind: SPOT,
             cone: below_one(*cone) as f32,
-            falloff: (1.0 / (below_one(*cone) - below_one(*inner)).max(LEAST_FALLOFF)) as f32,
+            falloff: (1.0 / (below_one(*cone) - below_one(*inner)).max(MIN_FALLOFF)) as f32,
             ..unit
         },
     }

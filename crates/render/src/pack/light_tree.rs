@@ -11,7 +11,7 @@ use super::{LightNode, NO_INDEX};
 /// Number of buckets per axis for split candidates, section 4.4.
 const BUCKETS: usize = 12;
 /// Number of binary splits after which nodes are split at the median, which bounds the depth.
-const MOST_LEVELS: u32 = 48;
+const LIGHT_TREE_MAX_DEPTH: u32 = 48;
 
 /// Bounds of emission: normals within `spread` of the axis, and emission within `edge` of a normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -317,7 +317,7 @@ impl Builder<'_> {
             0,
             |longest, axis| if size[axis] > size[longest] { axis } else { longest },
         );
-        if level >= MOST_LEVELS {
+        if level >= LIGHT_TREE_MAX_DEPTH {
             order.select_nth_unstable_by(half, |a, b| middle(a)[longest].total_cmp(&middle(b)[longest]));
             return half;
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec2, Vec3};
 
-use super::energy::{Parts, energy_table, streak_table};
+use super::energy::{Parts, aniso_table, energy_table};
 use super::pyramid::pyramid;
 use super::*;
 use crate::cpu::lobe::{facet_alpha, is_polished};
@@ -272,7 +272,7 @@ impl Appearances {
         let texels = &mut self.texels;
         *self.aniso_table.entry(key).or_insert_with(|| {
             let start = texels.len() as u32;
-            texels.extend(streak_table(parts, roughness, anisotropy));
+            texels.extend(aniso_table(parts, roughness, anisotropy));
             start
         })
     }

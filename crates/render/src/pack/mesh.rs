@@ -11,7 +11,7 @@ use crate::records::PackedMesh;
 use wgray_scene::mesh::{Mesh, VertexTangents};
 
 /// Maximum number of triangles in a leaf.
-const MOST_IN_LEAF: u32 = 4;
+const MAX_LEAF_SIZE: u32 = 4;
 
 impl PackedMesh {
     /// Packs a mesh, with tangents for normal maps if it has the attributes. The result is cached in the mesh.
@@ -31,7 +31,7 @@ impl PackedMesh {
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
         let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| Aabb::around(&corners(t))).collect();
         let whole = boxes.iter().fold(Aabb::EMPTY, |all, b| all.with(b));
-        let tree = build(&boxes, MOST_IN_LEAF);
+        let tree = build(&boxes, MAX_LEAF_SIZE);
         let (triangles, copies, tangents) = match &tangents {
             Some(of) => (&of.triangles, of.copies.as_slice(), of.tangents.as_slice()),
             None => (&mesh.triangles, &[][..], &[][..]),

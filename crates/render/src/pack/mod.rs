@@ -26,7 +26,7 @@ use self::environment_map::EnvironmentMap;
 pub use self::geometry::MAX_LINEAR_PRIMITIVES;
 use self::light::{DISTANT, connect_lights, pack_lights, t_max};
 use self::materials::Appearances;
-use self::order::Ordered;
+use self::order::SortedPrimitives;
 use self::primitive::pack_shapes;
 #[cfg(test)]
 pub(crate) use self::primitive::primitive;
@@ -36,7 +36,7 @@ use wgray_scene::{PixelFilter, PixelFilterKind, Scene};
 
 /// Minimum offset of ray origins from a surface, relative to the largest coordinate: 32 ulp, the combined rounding
 /// error of the surface and a neighbor (`docs/decisions/shadow-rays.md`).
-const LEAST_EPSILON: f64 = 32.0 / 16_777_216.0;
+const MIN_EPSILON: f64 = 32.0 / 16_777_216.0;
 
 /// Packs a scene.
 pub fn pack(scene: &Scene) -> Packed {
@@ -47,7 +47,7 @@ pub fn pack(scene: &Scene) -> Packed {
     let mut materials = appearances.materials.clone();
     let mut primitives = pack_shapes(scene);
     let (mut lights, mut area_lights) = pack_lights(scene, &mut primitives, &mut materials);
-    let order = Ordered::of(scene, primitives);
+    let order = SortedPrimitives::of(scene, primitives);
     connect_lights(&mut lights[..area_lights], order.all(), scene.shapes.len());
     let (mut trees, room) = geometry::trees(scene, &order.in_bvh(), |material| {
         shadow_casters::casts_shadow(scene, material)
@@ -128,7 +128,7 @@ fn environment(scene: &Scene, around: &EnvironmentMap, share: f64) -> Environmen
     let background = environment.and_then(|environment| environment.background);
     Environment {
         ambient: scene.render.ambient.as_vec3(),
-        shadow_epsilon: scene.render.shadow_epsilon.max(LEAST_EPSILON) as f32,
+        shadow_epsilon: scene.render.shadow_epsilon.max(MIN_EPSILON) as f32,
         background: background.unwrap_or(scene.render.background).as_vec3(),
         light_weight: 1.0 / scene.render.light_samples.count as f32,
         radiance: environment.map_or(Vec3::ZERO, |environment| environment.color.as_vec3()),

@@ -5,14 +5,14 @@ use super::{MAX_LINEAR_PRIMITIVES, PLANE, Primitive};
 use wgray_scene::Scene;
 
 /// Primitives in their order, each with true if it can cast a shadow.
-pub struct Ordered {
+pub struct SortedPrimitives {
     all: Vec<(Primitive, bool)>,
     outside: usize,
 }
 
-impl Ordered {
+impl SortedPrimitives {
     /// Sorts primitives. Many bounded primitives are in the BVH.
-    pub fn of(scene: &Scene, primitives: Vec<Primitive>) -> Ordered {
+    pub fn of(scene: &Scene, primitives: Vec<Primitive>) -> SortedPrimitives {
         let bounded = primitives.iter().filter(|primitive| primitive.kind != PLANE).count();
         let is_in_bvh = |primitive: &Primitive| bounded > MAX_LINEAR_PRIMITIVES && primitive.kind != PLANE;
         let (in_bvh, linear): (Vec<Primitive>, Vec<Primitive>) = primitives.into_iter().partition(is_in_bvh);
@@ -26,7 +26,7 @@ impl Ordered {
         );
         all[..outside].sort_by_key(|(primitive, casts)| (primitive.kind, !casts));
         all[outside..].sort_by_key(|(primitive, casts)| (primitive.kind, !casts));
-        Ordered { all, outside }
+        SortedPrimitives { all, outside }
     }
 
     /// Returns all primitives.

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use wgray_image::color::linear_to_srgb;
-use wgray_scene::halves::{Level, decoded, half_of};
+use wgray_scene::downsample::{Level, decoded, half_of};
 use wgray_scene::texture::words;
 use wgray_scene::{Encoding, Image, Texels};
 

@@ -1,7 +1,7 @@
 //! Constants that the host and the shaders share.
 
 #[cfg(doc)]
-use super::{Camera, Instance, Item, Lookup, Material, Texture};
+use super::{BvhItem, Camera, Instance, Lookup, Material, Texture};
 #[cfg(doc)]
 use wgray_scene::Pattern;
 
@@ -18,9 +18,9 @@ constants! {
     /// [`Camera::projection`]: equirectangular panorama of all directions.
     pub const PANORAMA: u32 = 2;
 
-    /// [`Item::kind`]: an instance of a mesh.
+    /// [`BvhItem::kind`]: an instance of a mesh.
     pub const INSTANCE: u32 = KINDS;
-    /// Flag in [`Item::kind`]: casts shadows.
+    /// Flag in [`BvhItem::kind`]: casts shadows.
     pub const CASTS_SHADOW: u32 = 0x100;
     /// Flag in a mesh group's word: casts no shadow. The other bits are the material index.
     pub const NO_SHADOW: u32 = 0x8000_0000;
@@ -54,9 +54,9 @@ constants! {
     /// Rows and columns, for each side, of the table at [`Material::energy`].
     pub const ENERGY_SIZE: u32 = 32;
     /// Rows of the table at [`Material::aniso_table`], by azimuth.
-    pub const STREAK_LINES: u32 = 49;
+    pub const ANISO_LINES: u32 = 49;
     /// Columns of the table at [`Material::aniso_table`], by cosine.
-    pub const STREAK_COLUMNS: u32 = 48;
+    pub const ANISO_COLUMNS: u32 = 48;
     /// Minimum alpha of a microfacet lobe. A lobe whose alphas are all smaller is a delta.
     pub const SMALLEST_ALPHA: f32 = 1e-3;
     /// [`Material::kind`]: glTF's metallic-roughness material.
@@ -64,7 +64,7 @@ constants! {
     /// Reflectance of a clear coat at normal incidence, for an index of refraction of 1.5.
     pub const COAT_F0: f32 = 0.04;
     /// Minimum sheen roughness; smaller values are clamped.
-    pub const LEAST_SHEEN: f32 = 0.15;
+    pub const MIN_SHEEN_ROUGHNESS: f32 = 0.15;
     /// [`Material::alpha_mode`]: the surface is opaque.
     pub const OPAQUE: u32 = 0;
     /// [`Material::alpha_mode`]: the surface exists where its opacity is at least the cutoff.

@@ -344,7 +344,7 @@ records! {
     }
 
     /// An item of the scene's BVH: a standalone primitive or an instance of a mesh.
-    pub struct Item {
+    pub struct BvhItem {
         /// The lower corner of its box.
         pub low: Vec3,
         /// [`INSTANCE`] or the kind of the primitive, and the flag [`CASTS_SHADOW`].
@@ -388,7 +388,7 @@ records! {
         /// Largest coordinate of the mesh in object space.
         pub size: f32,
         /// Condition number of the transform, which bounds the amplification of rounding errors.
-        pub condition: f32,
+        pub condition_number: f32,
         /// 1, or -1 if the transform mirrors.
         pub side: f32,
         /// 1 if the vertices have texture coordinates, else 0.

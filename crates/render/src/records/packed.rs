@@ -8,7 +8,7 @@ use glam::{DVec3, Vec4};
 use wgray_scene::Integrator;
 
 use super::*;
-use crate::film::Form;
+use crate::film::FilmLayout;
 
 /// A packed scene: the records that both backends read.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +48,7 @@ pub struct PackedBvh {
     /// Its nodes.
     pub nodes: Vec<Node>,
     /// The contents of its leaves, in their order.
-    pub items: Vec<Item>,
+    pub items: Vec<BvhItem>,
     /// The instances of meshes.
     pub instances: Vec<Instance>,
     /// The meshes.
@@ -203,8 +203,8 @@ impl Packed {
     }
 
     /// Returns the form of its film.
-    pub fn form(&self) -> Form {
-        Form {
+    pub fn film_layout(&self) -> FilmLayout {
+        FilmLayout {
             adaptive: self.sampling.adaptive,
             layers: self.specialization.layers != 0,
         }

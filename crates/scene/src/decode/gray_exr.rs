@@ -8,7 +8,7 @@ use exr::prelude::{ReadChannels as _, ReadLayers as _};
 use image::error::DecodingError;
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat};
 
-use super::{Channels, Header, Refused};
+use super::{Channels, DecodeError, Header};
 
 const COLORS: [&str; 3] = ["R", "G", "B"];
 
@@ -17,9 +17,9 @@ const COLORS: [&str; 3] = ["R", "G", "B"];
 /// header.
 pub(super) fn gray_exr(
     bytes: &[u8],
-    check_layer: impl Fn((u32, u32), u64) -> Result<(), Refused>,
-    check: impl Fn(Header) -> Result<(), Refused>,
-) -> Result<Option<DynamicImage>, Refused> {
+    check_layer: impl Fn((u32, u32), u64) -> Result<(), DecodeError>,
+    check: impl Fn(Header) -> Result<(), DecodeError>,
+) -> Result<Option<DynamicImage>, DecodeError> {
     let damaged = |error: Error| ImageError::Decoding(DecodingError::new(ImageFormat::OpenExr.into(), error));
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
@@ -40,7 +40,7 @@ pub(super) fn gray_exr(
         return Ok(None);
     }
     let refused = || {
-        Refused::Channels(Channels {
+        DecodeError::Channels(Channels {
             names: meta.headers.iter().flat_map(names).collect(),
             are_deep: meta.headers.iter().all(|header| header.deep),
         })

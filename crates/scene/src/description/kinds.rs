@@ -48,8 +48,8 @@ kinds! {
 
     Pixels, "in pixels", whole(1, MOST);
     Count, "a whole number", whole(1, MOST);
-    MostSamples, "a whole number", whole(LEAST_ADAPTIVE, MOST);
-    Stops, "in stops", number((-ViewSettings::MOST_STOPS, ViewSettings::MOST_STOPS));
+    MostSamples, "a whole number", whole(MIN_ADAPTIVE_SAMPLES, MOST);
+    Stops, "in stops", number((-ViewSettings::MAX_STOPS, ViewSettings::MAX_STOPS));
     Depth, "a whole number", whole(0, DEEPEST);
     Seed, "a whole number", whole(0, u32::MAX);
     Clamp, "", number(CLAMPS);
@@ -121,9 +121,9 @@ impl JsonSchema for ShareColor {
 /// Copies the title of the plain value to a key that also accepts a texture.
 pub(crate) fn tell_plain(schema: &mut Schema) {
     let plain = schema.get("anyOf").and_then(|either| either.get(0)?.get("title"));
-    if let Some(told) = plain.and_then(Value::as_str) {
-        let told = told.replacen(SPLIT, &format!(", or a texture{SPLIT}"), 1);
-        schema.insert("title".to_owned(), Value::String(told));
+    if let Some(title) = plain.and_then(Value::as_str) {
+        let title = title.replacen(SPLIT, &format!(", or a texture{SPLIT}"), 1);
+        schema.insert("title".to_owned(), Value::String(title));
     }
 }
 
@@ -134,11 +134,11 @@ fn kind(words: &str, schema: Value) -> Schema {
         inner = items;
     }
     let range = range(inner);
-    let told = match range {
+    let title = match range {
         Some(range) => format!("{words}{SPLIT}{range}"),
         None => words.to_owned(),
     };
-    schema.insert("title".to_owned(), Value::String(told));
+    schema.insert("title".to_owned(), Value::String(title));
     schema
 }
 

@@ -11,12 +11,12 @@ pub(crate) type ReadError = serde_path_to_error::Error<Error>;
 
 /// Reads a description from a table.
 pub(crate) fn read<T: DeserializeOwned>(table: Table) -> Result<T, ReadError> {
-    serde_path_to_error::deserialize(Read(Value::Table(table)))
+    serde_path_to_error::deserialize(ValueReader(Value::Table(table)))
 }
 
-struct Read(Value);
+struct ValueReader(Value);
 
-impl IntoDeserializer<'_, Error> for Read {
+impl IntoDeserializer<'_, Error> for ValueReader {
     type Deserializer = Self;
 
     fn into_deserializer(self) -> Self {
@@ -24,21 +24,21 @@ impl IntoDeserializer<'_, Error> for Read {
     }
 }
 
-impl<'de> Deserializer<'de> for Read {
+impl<'de> Deserializer<'de> for ValueReader {
     type Error = Error;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
         match self.0 {
             Value::Array(list) => {
                 let length = list.len();
-                let mut values = SeqDeserializer::new(list.into_iter().map(Read));
+                let mut values = SeqDeserializer::new(list.into_iter().map(ValueReader));
                 let read = visitor.visit_seq(&mut values)?;
                 let end = values.end();
                 end.map_err(|_: Error| Error::invalid_length(length, &"fewer elements in array"))?;
                 Ok(read)
             }
             Value::Table(table) => {
-                let pairs = table.into_iter().map(|(key, value)| (key, Read(value)));
+                let pairs = table.into_iter().map(|(key, value)| (key, ValueReader(value)));
                 visitor.visit_map(MapDeserializer::new(pairs))
             }
             // `Value::deserialize_any` would generate the derived code of tables and lists again.

@@ -4,16 +4,16 @@ use gltf_json::accessor::sparse::Sparse;
 use gltf_json::accessor::{Accessor, ComponentType, Type};
 use gltf_json::validation::Checked;
 
-use super::budget::Thing;
+use super::budget::Resource;
 use super::document::Document;
-use super::error::{Fault, GltfError};
+use super::error::{GltfError, GltfFault};
 use super::extension;
 use super::json::missing;
 
 /// Maximum element count of an accessor without a buffer view.
-const MOST_ZEROS: u64 = 1 << 22;
+const MAX_ZEROS: u64 = 1 << 22;
 /// Maximum decoded size of such an accessor, in bytes.
-const LARGEST_ZEROS: u64 = 64 << 20;
+const MAX_ZEROS_BYTES: u64 = 64 << 20;
 /// Overhead per read in bytes, which limits reads of small accessors.
 const BESIDE: u64 = 64;
 
@@ -27,9 +27,9 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(key: &str, accessor: &Accessor) -> Result<Layout, Fault> {
+    fn of(key: &str, accessor: &Accessor) -> Result<Layout, GltfFault> {
         let (Checked::Valid(component), Checked::Valid(kind)) = (accessor.component_type, accessor.type_) else {
-            return Err(Fault::key(key, "unknown type"));
+            return Err(GltfFault::key(key, "unknown type"));
         };
         let (rows, columns) = match kind {
             Type::Scalar => (1, 1),
@@ -89,12 +89,12 @@ impl Elements<'_> {
         count: u64,
         stride: Option<usize>,
         layout: Layout,
-    ) -> Result<Elements<'a>, Fault> {
+    ) -> Result<Elements<'a>, GltfFault> {
         let size = layout.size();
         let stride = stride.unwrap_or(size);
         if stride < layout.used() {
             let rule = format!("the stride of {stride} bytes must be at least the {size} of an element");
-            return Err(Fault::key(key, rule));
+            return Err(GltfFault::key(key, rule));
         }
         let last = count.saturating_sub(1);
         let needed = (stride as u64).checked_mul(last);
@@ -102,7 +102,7 @@ impl Elements<'_> {
         let end = needed.and_then(|bytes| bytes.checked_add(offset));
         let has = bytes.len() as u64;
         if count > 0 && end.is_none_or(|end| end > has) || offset > has {
-            return Err(Fault::key(
+            return Err(GltfFault::key(
                 key,
                 format!(
                     "{count} elements of {size} bytes, {stride} apart, from byte {offset} on; {place} has {has} bytes"
@@ -194,18 +194,18 @@ impl Document {
         self.whole(accessor).map_err(|fault| fault.of(&self.path))
     }
 
-    fn accessor(&self, index: usize) -> Result<(String, &Accessor), Fault> {
+    fn accessor(&self, index: usize) -> Result<(String, &Accessor), GltfFault> {
         let all = &self.json.accessors;
         let accessor = all.get(index).ok_or_else(|| missing("accessors", index, all.len()))?;
         Ok((format!("accessors[{index}]"), accessor))
     }
 
-    fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>, Fault> {
+    fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>, GltfFault> {
         let (key, accessor) = self.accessor(index)?;
         let layout = Layout::of(&key, accessor)?;
         if layout.count() != N {
             let rule = format!("its elements have {} components; {N} are expected", layout.count());
-            return Err(Fault::key(format!("{key}.type"), rule));
+            return Err(GltfFault::key(format!("{key}.type"), rule));
         }
         let elements = self.elements(&key, accessor, layout)?;
         self.may_read(&key, accessor, 4 * N)?;
@@ -222,7 +222,7 @@ impl Document {
         Ok(vectors)
     }
 
-    fn whole(&self, index: usize) -> Result<Vec<u32>, Fault> {
+    fn whole(&self, index: usize) -> Result<Vec<u32>, GltfFault> {
         let (key, accessor) = self.accessor(index)?;
         let layout = Layout::of(&key, accessor)?;
         let restart = match layout.component {
@@ -231,11 +231,11 @@ impl Document {
             ComponentType::U32 => u32::MAX,
             _ => {
                 let rule = "indices must be unsigned bytes, shorts or ints";
-                return Err(Fault::key(format!("{key}.componentType"), rule));
+                return Err(GltfFault::key(format!("{key}.componentType"), rule));
             }
         };
         if layout.count() != 1 {
-            return Err(Fault::key(format!("{key}.type"), "indices must be SCALAR"));
+            return Err(GltfFault::key(format!("{key}.type"), "indices must be SCALAR"));
         }
         let elements = self.elements(&key, accessor, layout)?;
         self.may_read(&key, accessor, size_of::<u32>())?;
@@ -253,20 +253,20 @@ impl Document {
             None => Ok(indices),
             Some(i) => {
                 let rule = "which would restart a strip: an index must be smaller";
-                Err(Fault::key(key, format!("element {i} is {restart}, {rule}")))
+                Err(GltfFault::key(key, format!("element {i} is {restart}, {rule}")))
             }
         }
     }
 
     /// Charges elements of `size` bytes to the budget.
-    fn may_read(&self, key: &str, accessor: &Accessor, size: usize) -> Result<(), Fault> {
+    fn may_read(&self, key: &str, accessor: &Accessor, size: usize) -> Result<(), GltfFault> {
         let bytes = accessor.count.0.saturating_mul(size as u64).saturating_add(BESIDE);
-        let room = self.budget.take(Thing::Read, bytes);
-        room.map_err(|rule| Fault::key(format!("{key}.count"), rule))
+        let room = self.budget.take(Resource::Read, bytes);
+        room.map_err(|rule| GltfFault::key(format!("{key}.count"), rule))
     }
 
     /// Returns the elements of the buffer view; `None` for zeros.
-    fn elements(&self, key: &str, accessor: &Accessor, layout: Layout) -> Result<Option<Elements<'_>>, Fault> {
+    fn elements(&self, key: &str, accessor: &Accessor, layout: Layout) -> Result<Option<Elements<'_>>, GltfFault> {
         let count = accessor.count.0;
         let Some(view) = accessor.buffer_view else {
             let others = accessor
@@ -276,10 +276,10 @@ impl Document {
             if let Some(name) = others.filter(|_| accessor.sparse.is_none()) {
                 return Err(extension::only_in(key, name));
             }
-            let most = MOST_ZEROS.min(LARGEST_ZEROS / (4 * layout.count() as u64));
+            let most = MAX_ZEROS.min(MAX_ZEROS_BYTES / (4 * layout.count() as u64));
             if count > most {
                 let rule = format!("{count} elements without a bufferView; there must be at most {most}");
-                return Err(Fault::key(format!("{key}.count"), rule));
+                return Err(GltfFault::key(format!("{key}.count"), rule));
             }
             return Ok(None);
         };
@@ -297,18 +297,18 @@ impl Document {
         accessor: &Accessor,
         sparse: &Sparse,
         layout: Layout,
-    ) -> Result<(Vec<u32>, Elements<'_>), Fault> {
+    ) -> Result<(Vec<u32>, Elements<'_>), GltfFault> {
         let count = sparse.count.0;
         if count > accessor.count.0 {
             let rule = format!(
                 "{count} must be at most {}, the count of all elements",
                 accessor.count.0
             );
-            return Err(Fault::key(format!("{key}.sparse.count"), rule));
+            return Err(GltfFault::key(format!("{key}.sparse.count"), rule));
         }
         let key = format!("{key}.sparse.indices");
         let Checked::Valid(component) = sparse.indices.component_type else {
-            return Err(Fault::key(key, "unknown type"));
+            return Err(GltfFault::key(key, "unknown type"));
         };
         let places = Layout {
             component: component.0,
@@ -322,14 +322,14 @@ impl Document {
         for (i, place) in places.iter().enumerate() {
             if i > 0 && *place <= places[i - 1] {
                 let rule = format!("element {i} is {place}, which must be greater than the one before it");
-                return Err(Fault::key(key, rule));
+                return Err(GltfFault::key(key, rule));
             }
             if u64::from(*place) >= accessor.count.0 {
                 let rule = format!(
                     "element {i} is {place}, which is not there; there are {}",
                     accessor.count.0
                 );
-                return Err(Fault::key(key, rule));
+                return Err(GltfFault::key(key, rule));
             }
         }
         let key = key.replace("indices", "values");

@@ -11,10 +11,10 @@ use super::error::GltfError;
 use super::node::{Pose, quaternion};
 
 /// Maximum number of morph weights of all animated nodes.
-const MOST_WEIGHTS: usize = 1 << 24;
+const MAX_WEIGHTS: usize = 1 << 24;
 
 /// Maximum number of animations named in a warning.
-const MOST_NAMED: usize = 5;
+const MAX_NAMED: usize = 5;
 
 impl Document {
     /// Returns the animations whose properties no earlier one drives. The others are named in `notes`.
@@ -41,9 +41,9 @@ impl Document {
                 Some(name) => format!("{i} ({name:?})"),
                 None => i.to_string(),
             };
-            let mut named: Vec<String> = others.iter().take(MOST_NAMED).map(name).collect();
-            if others.len() > MOST_NAMED {
-                named.push(format!("{} more", others.len() - MOST_NAMED));
+            let mut named: Vec<String> = others.iter().take(MAX_NAMED).map(name).collect();
+            if others.len() > MAX_NAMED {
+                named.push(format!("{} more", others.len() - MAX_NAMED));
             }
             let (what, verb) = match others.len() {
                 1 => ("animation", "drives"),
@@ -93,7 +93,7 @@ impl Document {
             let Checked::Valid(interpolation) = sampler.interpolation else {
                 return Err(self.fault(place(i), "its interpolation is unknown".to_owned()));
             };
-            let between = Between::of(&times, time, interpolation);
+            let between = KeyInterval::of(&times, time, interpolation);
             let fault = |got: usize| {
                 let wanted = between.values(times.len());
                 self.fault(place(i), format!("its output must have {wanted} values; it has {got}"))
@@ -123,8 +123,8 @@ impl Document {
                     let values = self.vectors::<1>(sampler.output.value())?;
                     let found = between.list(&values, times.len()).ok_or_else(|| fault(values.len()))?;
                     weights += found.len();
-                    if weights > MOST_WEIGHTS {
-                        let rule = format!("all nodes together must have at most {MOST_WEIGHTS} weights");
+                    if weights > MAX_WEIGHTS {
+                        let rule = format!("all nodes together must have at most {MAX_WEIGHTS} weights");
                         return Err(self.fault(place(i), rule));
                     }
                     pose.weights = Some(found);
@@ -158,7 +158,7 @@ impl Pose {
 }
 
 /// The keys around a time.
-struct Between {
+struct KeyInterval {
     interpolation: Interpolation,
     /// Key indices.
     keys: [usize; 2],
@@ -168,8 +168,8 @@ struct Between {
     seconds: f64,
 }
 
-impl Between {
-    fn of(times: &[f64], time: f64, interpolation: Interpolation) -> Between {
+impl KeyInterval {
+    fn of(times: &[f64], time: f64, interpolation: Interpolation) -> KeyInterval {
         let last = times.len() - 1;
         let next = times.partition_point(|key| *key <= time);
         let keys = match next {
@@ -183,7 +183,7 @@ impl Between {
         } else {
             0.0
         };
-        Between {
+        KeyInterval {
             interpolation,
             keys,
             share,

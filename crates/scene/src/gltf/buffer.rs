@@ -7,14 +7,14 @@ use std::sync::OnceLock;
 
 use gltf_json::Root;
 
-use super::budget::{Budget, Thing};
-use super::error::Fault;
+use super::budget::{Budget, Resource};
+use super::error::GltfFault;
 use super::json::missing;
 use super::meshopt::{self, Compressed};
 use super::uri::{self, Folder};
 
 /// Maximum size of a file, and of all buffers together.
-pub(super) const MOST_BYTES: u64 = 8 << 30;
+pub(super) const MAX_BUFFER_BYTES: u64 = 8 << 30;
 
 /// Storage of a buffer.
 enum Bytes {
@@ -46,7 +46,7 @@ impl Buffers {
         chunk: Option<Range<usize>>,
         folder: &Folder,
         files: &mut BTreeSet<PathBuf>,
-    ) -> Result<Buffers, Fault> {
+    ) -> Result<Buffers, GltfFault> {
         let mut used = vec![false; root.buffers.len()];
         let mut compressed = Vec::with_capacity(root.buffer_views.len());
         for (i, view) in root.buffer_views.iter().enumerate() {
@@ -73,14 +73,14 @@ impl Buffers {
             let key = || format!("buffers[{i}]");
             let (bytes, has) = match (buffer.uri.take(), &chunk) {
                 (Some(data), _) if uri::is_data(&data) => {
-                    let bytes = uri::data(&data).map_err(|rule| Fault::key(format!("buffers[{i}].uri"), rule))?;
+                    let bytes = uri::data(&data).map_err(|rule| GltfFault::key(format!("buffers[{i}].uri"), rule))?;
                     let has = bytes.len();
                     (Bytes::Read(bytes), has)
                 }
                 (Some(name), _) => {
-                    let fault = |rule| Fault::key(format!("buffers[{i}].uri"), rule);
+                    let fault = |rule| GltfFault::key(format!("buffers[{i}].uri"), rule);
                     let path = folder.find(&name).map_err(|unfound| fault(unfound.into()))?;
-                    let left = MOST_BYTES.saturating_sub(total);
+                    let left = MAX_BUFFER_BYTES.saturating_sub(total);
                     let bytes =
                         uri::read(&path, left).map_err(|error| fault(format!("{name:?} cannot be read: {error}")))?;
                     files.insert(path);
@@ -89,16 +89,16 @@ impl Buffers {
                     (Bytes::Read(bytes), has)
                 }
                 (None, Some(chunk)) if i == 0 => (Bytes::Chunk(chunk.clone()), chunk.len()),
-                (None, _) => return Err(Fault::key(key(), "has no uri, but buffer views refer to it")),
+                (None, _) => return Err(GltfFault::key(key(), "has no uri, but buffer views refer to it")),
             };
             total = total.saturating_add(has as u64);
-            if total > MOST_BYTES {
-                let rule = format!("all buffers together must have at most {MOST_BYTES} bytes");
-                return Err(Fault::key(key(), rule));
+            if total > MAX_BUFFER_BYTES {
+                let rule = format!("all buffers together must have at most {MAX_BUFFER_BYTES} bytes");
+                return Err(GltfFault::key(key(), rule));
             }
             if length > has as u64 {
                 let rule = format!("{length} bytes; its data has {has}");
-                return Err(Fault::key(format!("buffers[{i}].byteLength"), rule));
+                return Err(GltfFault::key(format!("buffers[{i}].byteLength"), rule));
             }
             list.push(bytes);
         }
@@ -117,17 +117,17 @@ impl Buffers {
     }
 
     /// Charges the decompressed views to `budget`.
-    pub fn check(&self, budget: &Budget) -> Result<(), Fault> {
+    pub fn check(&self, budget: &Budget) -> Result<(), GltfFault> {
         for (i, how) in self.compressed.iter().enumerate() {
             let size = how.map_or(0, |how| how.size());
-            let room = budget.take(Thing::Decompressed, size);
-            room.map_err(|rule| Fault::key(format!("bufferViews[{i}]"), rule))?;
+            let room = budget.take(Resource::Decompressed, size);
+            room.map_err(|rule| GltfFault::key(format!("bufferViews[{i}]"), rule))?;
         }
         Ok(())
     }
 
     /// Returns the first `byteLength` bytes of a buffer.
-    fn buffer(&self, root: &Root, index: usize) -> Result<&[u8], Fault> {
+    fn buffer(&self, root: &Root, index: usize) -> Result<&[u8], GltfFault> {
         let key = || format!("buffers[{index}]");
         let (Some(bytes), Some(buffer)) = (self.list.get(index), root.buffers.get(index)) else {
             return Err(missing(key(), index, root.buffers.len()));
@@ -140,11 +140,11 @@ impl Buffers {
         let length = usize::try_from(buffer.byte_length.0).ok();
         bytes
             .and_then(|bytes| bytes.get(..length?))
-            .ok_or_else(|| Fault::key(key(), "has no data"))
+            .ok_or_else(|| GltfFault::key(key(), "has no data"))
     }
 
     /// Returns a buffer view, decompressed.
-    pub fn view(&self, root: &Root, index: usize) -> Result<&[u8], Fault> {
+    pub fn view(&self, root: &Root, index: usize) -> Result<&[u8], GltfFault> {
         let view =
             (root.buffer_views.get(index)).ok_or_else(|| missing("bufferViews", index, root.buffer_views.len()))?;
         if let (Some(Some(how)), Some(decoded)) = (self.compressed.get(index), self.decoded.get(index)) {
@@ -153,7 +153,7 @@ impl Buffers {
             }
             let key = format!("bufferViews[{index}].extensions.{}", how.name);
             let stream = self.part(root, &key, how.buffer, how.offset, how.length)?;
-            let bytes = how.decode(stream).map_err(|rule| Fault::key(key, rule))?;
+            let bytes = how.decode(stream).map_err(|rule| GltfFault::key(key, rule))?;
             return Ok(decoded.get_or_init(|| bytes));
         }
         let offset = view.byte_offset.unwrap_or_default().0;
@@ -167,12 +167,12 @@ impl Buffers {
     }
 
     /// Returns a range of a buffer. `key` is for errors.
-    fn part(&self, root: &Root, key: &str, buffer: usize, offset: u64, length: u64) -> Result<&[u8], Fault> {
+    fn part(&self, root: &Root, key: &str, buffer: usize, offset: u64, length: u64) -> Result<&[u8], GltfFault> {
         let bytes = self.buffer(root, buffer)?;
         let end = offset.checked_add(length).filter(|end| *end <= bytes.len() as u64);
         let end = end.ok_or_else(|| {
             let has = bytes.len();
-            Fault::key(
+            GltfFault::key(
                 key,
                 format!("{length} bytes from byte {offset} on; buffers[{buffer}] has {has}"),
             )

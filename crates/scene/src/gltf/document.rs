@@ -9,18 +9,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use gltf_json::Root;
 
 use super::budget::Budget;
-use super::buffer::{Buffers, MOST_BYTES};
-use super::error::{Fault, GltfError};
+use super::buffer::{Buffers, MAX_BUFFER_BYTES};
+use super::error::{GltfError, GltfFault};
 use super::json::missing;
 use super::uri::{self, Folder, Unfound};
 use super::{extension, glb, json};
 
 /// Maximum size of an image file in bytes.
-const LARGEST_IMAGE: u64 = 512 << 20;
+const MAX_IMAGE_BYTES: u64 = 512 << 20;
 /// Texture extensions with further image formats, in three.js's order of precedence.
 const SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 /// Maximum size of all image reads in bytes.
-const MOST_OF_IMAGES: u64 = 4 << 30;
+const MAX_IMAGES_BYTES: u64 = 4 << 30;
 
 /// An open file. JSON indices (except in raw extension data) and enumerations are valid, and numbers finite. The node
 /// hierarchy and values are not validated.
@@ -43,12 +43,12 @@ enum ImageFault {
     /// Missing or unreadable.
     Missing(String),
     /// Violates a rule.
-    Refused(Fault),
+    DecodeError(GltfFault),
 }
 
-impl From<Fault> for ImageFault {
-    fn from(fault: Fault) -> Self {
-        ImageFault::Refused(fault)
+impl From<GltfFault> for ImageFault {
+    fn from(fault: GltfFault) -> Self {
+        ImageFault::DecodeError(fault)
     }
 }
 
@@ -60,7 +60,7 @@ impl Document {
     /// Unreadable or invalid files, unsupported required extensions, and missing or truncated buffers.
     pub fn open(path: &Path, root: &Path, files: &mut BTreeSet<PathBuf>) -> Result<Document, GltfError> {
         files.insert(path.to_owned());
-        let file = uri::read(path, MOST_BYTES).map_err(|error| GltfError::Read {
+        let file = uri::read(path, MAX_BUFFER_BYTES).map_err(|error| GltfError::Read {
             path: path.to_owned(),
             error,
         })?;
@@ -72,7 +72,7 @@ impl Document {
         path: &Path,
         root: &Path,
         files: &mut BTreeSet<PathBuf>,
-    ) -> Result<Document, Fault> {
+    ) -> Result<Document, GltfFault> {
         let here = |path: &Path| match path.as_os_str().is_empty() {
             true => PathBuf::from("."),
             false => path.to_owned(),
@@ -82,7 +82,7 @@ impl Document {
             root: here(root),
         };
         if file.is_empty() {
-            return Err(Fault::file("the file is empty"));
+            return Err(GltfFault::file("the file is empty"));
         }
         let mut notes = Vec::new();
         let (mut json, text, file, chunk) = match glb::is_container(&file) {
@@ -117,7 +117,7 @@ impl Document {
 
     /// Returns an error about a value of the JSON.
     pub fn fault(&self, key: impl Into<String>, message: impl Into<String>) -> GltfError {
-        Fault::key(key, message).of(&self.path)
+        GltfFault::key(key, message).of(&self.path)
     }
 
     /// Returns a buffer view, decompressed.
@@ -126,7 +126,7 @@ impl Document {
         self.bytes_of(view).map_err(|fault| fault.of(&self.path))
     }
 
-    pub(super) fn bytes_of(&self, view: usize) -> Result<&[u8], Fault> {
+    pub(super) fn bytes_of(&self, view: usize) -> Result<&[u8], GltfFault> {
         self.buffers.view(&self.json, view)
     }
 
@@ -135,7 +135,7 @@ impl Document {
         self.source_of(texture).map_err(|fault| fault.of(&self.path))
     }
 
-    fn source_of(&self, index: usize) -> Result<usize, Fault> {
+    fn source_of(&self, index: usize) -> Result<usize, GltfFault> {
         let textures = &self.json.textures;
         let texture = (textures.get(index)).ok_or_else(|| missing("textures", index, textures.len()))?;
         let key = format!("textures[{index}]");
@@ -148,7 +148,7 @@ impl Document {
             let source = source.as_u64().and_then(|source| usize::try_from(source).ok());
             return source.filter(|source| *source < count).ok_or_else(|| {
                 let rule = format!("must be the index of an image; the file has {count}");
-                Fault::key(format!("{key}.extensions.{name}.source"), rule)
+                GltfFault::key(format!("{key}.extensions.{name}.source"), rule)
             });
         }
         // In the crate, a missing source is an index out of range.
@@ -156,7 +156,7 @@ impl Document {
             Some(_) => Ok(texture.source.value()),
             None => Err(match others.and_then(extension::unknown) {
                 Some(name) => extension::only_in(&key, name),
-                None => Fault::key(key, "has no source"),
+                None => GltfFault::key(key, "has no source"),
             }),
         }
     }
@@ -170,7 +170,7 @@ impl Document {
         match self.encoded(image) {
             Ok(bytes) => Ok(Ok(bytes)),
             Err(ImageFault::Missing(why)) => Ok(Err(format!("images[{image}].uri: {why}"))),
-            Err(ImageFault::Refused(fault)) => Err(fault.of(&self.path)),
+            Err(ImageFault::DecodeError(fault)) => Err(fault.of(&self.path)),
         }
     }
 
@@ -179,7 +179,7 @@ impl Document {
         let image = images
             .get(index)
             .ok_or_else(|| missing("images", index, images.len()))?;
-        let fault = |rule| Fault::key(format!("images[{index}].uri"), rule);
+        let fault = |rule| GltfFault::key(format!("images[{index}].uri"), rule);
         if let Some(view) = image.buffer_view {
             let bytes = self.bytes_of(view.value())?;
             self.has_room(index, bytes.len() as u64)?;
@@ -191,9 +191,9 @@ impl Document {
                 .extensions
                 .as_ref()
                 .and_then(|all| extension::unknown(&all.others));
-            return Err(ImageFault::Refused(match others {
+            return Err(ImageFault::DecodeError(match others {
                 Some(name) => extension::only_in(&key, name),
-                None => Fault::key(key, "has neither a uri nor a bufferView"),
+                None => GltfFault::key(key, "has neither a uri nor a bufferView"),
             }));
         };
         let bytes = match uri::is_data(name) {
@@ -201,12 +201,12 @@ impl Document {
             false => {
                 let path = self.folder.find(name).map_err(|unfound| match unfound {
                     Unfound::Absent(why) => ImageFault::Missing(why),
-                    Unfound::Refused(rule) => ImageFault::Refused(fault(rule)),
+                    Unfound::DecodeError(rule) => ImageFault::DecodeError(fault(rule)),
                 })?;
-                uri::read(&path, LARGEST_IMAGE).map_err(|error| {
+                uri::read(&path, MAX_IMAGE_BYTES).map_err(|error| {
                     let why = format!("{} cannot be read: {error}", super::error::shown(name));
                     match error.kind() {
-                        io::ErrorKind::FileTooLarge => ImageFault::Refused(fault(why)),
+                        io::ErrorKind::FileTooLarge => ImageFault::DecodeError(fault(why)),
                         _ => ImageFault::Missing(why),
                     }
                 })?
@@ -217,12 +217,14 @@ impl Document {
     }
 
     /// Limits the size of an image and of all image reads. A small file may repeat references.
-    fn has_room(&self, index: usize, bytes: u64) -> Result<(), Fault> {
+    fn has_room(&self, index: usize, bytes: u64) -> Result<(), GltfFault> {
         let given = self.given.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
-        let fault = |rule: String| Err(Fault::key(format!("images[{index}]"), rule));
-        match (bytes > LARGEST_IMAGE, given > MOST_OF_IMAGES) {
-            (true, _) => fault(format!("{bytes} bytes; an image must have at most {LARGEST_IMAGE}")),
-            (_, true) => fault(format!("all images together must have at most {MOST_OF_IMAGES} bytes")),
+        let fault = |rule: String| Err(GltfFault::key(format!("images[{index}]"), rule));
+        match (bytes > MAX_IMAGE_BYTES, given > MAX_IMAGES_BYTES) {
+            (true, _) => fault(format!("{bytes} bytes; an image must have at most {MAX_IMAGE_BYTES}")),
+            (_, true) => fault(format!(
+                "all images together must have at most {MAX_IMAGES_BYTES} bytes"
+            )),
             _ => Ok(()),
         }
     }

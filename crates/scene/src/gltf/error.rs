@@ -110,14 +110,14 @@ impl GltfError {
 
 /// An error without its file.
 #[derive(Debug)]
-pub(super) struct Fault {
-    pub place: Place,
+pub(super) struct GltfFault {
+    pub place: Location,
     pub message: String,
 }
 
 /// A location in a file.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum Location {
     File,
     /// In the JSON, from 1.
     Line(usize, usize),
@@ -130,34 +130,34 @@ pub(super) enum Place {
 /// Maximum length of messages and keys in characters.
 const LONGEST: usize = 1000;
 
-impl Fault {
-    pub fn new(place: Place, message: impl Into<String>) -> Fault {
-        Fault {
+impl GltfFault {
+    pub fn new(place: Location, message: impl Into<String>) -> GltfFault {
+        GltfFault {
             place,
             message: cut(message.into()),
         }
     }
 
-    pub fn key(key: impl Into<String>, message: impl Into<String>) -> Fault {
-        Fault::new(Place::Key(cut(key.into())), message)
+    pub fn key(key: impl Into<String>, message: impl Into<String>) -> GltfFault {
+        GltfFault::new(Location::Key(cut(key.into())), message)
     }
 
-    pub fn file(message: impl Into<String>) -> Fault {
-        Fault::new(Place::File, message)
+    pub fn file(message: impl Into<String>) -> GltfFault {
+        GltfFault::new(Location::File, message)
     }
 
     pub fn of(self, path: &Path) -> GltfError {
         let (path, message) = (path.to_owned(), self.message);
         match self.place {
-            Place::File => GltfError::File { path, message },
-            Place::Line(line, column) => GltfError::Syntax {
+            Location::File => GltfError::File { path, message },
+            Location::Line(line, column) => GltfError::Syntax {
                 path,
                 line,
                 column,
                 message,
             },
-            Place::Byte(offset) => GltfError::Byte { path, offset, message },
-            Place::Key(key) => GltfError::Key { path, key, message },
+            Location::Byte(offset) => GltfError::Byte { path, offset, message },
+            Location::Key(key) => GltfError::Key { path, key, message },
         }
     }
 }

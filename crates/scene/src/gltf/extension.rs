@@ -8,7 +8,7 @@ use gltf_json::mesh::Semantic;
 use gltf_json::validation::Checked;
 use serde_json::{Map, Value};
 
-use super::error::{Fault, shown};
+use super::error::{GltfFault, shown};
 
 pub(super) const KNOWN: &[&str] = &[
     "EXT_mesh_gpu_instancing",
@@ -39,11 +39,11 @@ fn is_known(name: &str) -> bool {
 }
 
 /// Rejects unsupported extensions that are required or hold the only data of a primitive; notes others.
-pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), Fault> {
+pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), GltfFault> {
     for (i, name) in root.extensions_required.iter().enumerate() {
         if !is_known(name) {
             let rule = "is required but not supported";
-            return Err(Fault::key(
+            return Err(GltfFault::key(
                 format!("extensionsRequired[{i}]"),
                 format!("{} {rule}{}", shown(name), remedy(name)),
             ));
@@ -85,9 +85,9 @@ fn remedy(name: &str) -> &'static str {
 }
 
 /// Returns the error for data that only an unsupported extension has.
-pub(super) fn only_in(key: &str, name: &str) -> Fault {
+pub(super) fn only_in(key: &str, name: &str) -> GltfFault {
     let rule = "holds its only data and is not supported";
-    Fault::key(key, format!("{} {rule}{}", shown(name), remedy(name)))
+    GltfFault::key(key, format!("{} {rule}{}", shown(name), remedy(name)))
 }
 
 /// Returns the first unsupported extension of an object.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::changed::changed;
 use super::everything::everything;
-use super::{Choice, Imported, import};
+use super::{ImportOptions, Imported, import};
 use crate::Selection;
 use crate::gltf::made::container;
 
@@ -62,13 +62,13 @@ fn check(imported: &Imported) {
 fn read(bytes: &[u8], path: &std::path::Path) -> usize {
     std::fs::write(path, bytes).unwrap();
     let root = path.parent().unwrap();
-    let none = Choice {
+    let none = ImportOptions {
         scene: None,
         time: None,
         animation: None,
         variant: None,
     };
-    let all = Choice {
+    let all = ImportOptions {
         time: Some(0.7),
         animation: Some(Selection::Number(0)),
         variant: Some(Selection::Number(1)),

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::error::{Fault, Place};
+use super::error::{GltfFault, Location};
 
 const MAGIC: &[u8] = b"glTF";
 const HEADER: usize = 12;
@@ -22,23 +22,23 @@ pub(super) fn is_container(bytes: &[u8]) -> bool {
 }
 
 /// Finds the chunks. Other and repeated chunks, and bytes beyond the declared length, are skipped.
-pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, Fault> {
+pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfFault> {
     if bytes.len() < HEADER {
         let rule = format!(
             "the file is truncated: it has {} bytes, and its header {HEADER}",
             bytes.len()
         );
-        return Err(Fault::new(Place::Byte(0), rule));
+        return Err(GltfFault::new(Location::Byte(0), rule));
     }
     let version = word(bytes, 4);
     if version != 2 {
         let rule = format!("the version of the container is {version}; it must be 2");
-        return Err(Fault::new(Place::Byte(4), rule));
+        return Err(GltfFault::new(Location::Byte(4), rule));
     }
     let length = word(bytes, 8) as usize;
     if length > bytes.len() {
         let rule = format!("the file is truncated: it has {} of {length} bytes", bytes.len());
-        return Err(Fault::new(Place::Byte(8), rule));
+        return Err(GltfFault::new(Location::Byte(8), rule));
     }
     let mut json = None;
     let mut binary = None;
@@ -49,18 +49,23 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, Fault> {
         let start = at + CHUNK_HEADER;
         if size > length - start {
             let rule = format!("the chunk has {size} bytes; {} are left", length - start);
-            return Err(Fault::new(Place::Byte(at as u64), rule));
+            return Err(GltfFault::new(Location::Byte(at as u64), rule));
         }
         let range = start..start + size;
         match (kind, &json) {
             (JSON, None) => json = Some(range),
-            (_, None) => return Err(Fault::new(Place::Byte(at as u64), "the first chunk must be JSON")),
+            (_, None) => {
+                return Err(GltfFault::new(
+                    Location::Byte(at as u64),
+                    "the first chunk must be JSON",
+                ));
+            }
             (BIN, Some(_)) if binary.is_none() => binary = Some(range),
             _ => {}
         }
         at = start + size;
     }
-    let json = json.ok_or_else(|| Fault::new(Place::Byte(HEADER as u64), "there must be a chunk of JSON"))?;
+    let json = json.ok_or_else(|| GltfFault::new(Location::Byte(HEADER as u64), "there must be a chunk of JSON"))?;
     Ok(Chunks { json, binary })
 }
 
@@ -86,7 +91,7 @@ mod tests {
         bytes
     }
 
-    fn told(bytes: &[u8]) -> (Place, String) {
+    fn told(bytes: &[u8]) -> (Location, String) {
         let fault = chunks(bytes).unwrap_err();
         (fault.place, fault.message)
     }
@@ -112,7 +117,7 @@ mod tests {
 
     #[test]
     fn every_length_is_checked() {
-        let byte = |offset: u64, rule: &str| (Place::Byte(offset), rule.to_owned());
+        let byte = |offset: u64, rule: &str| (Location::Byte(offset), rule.to_owned());
         assert_eq!(
             told(b"glTF"),
             byte(0, "the file is truncated: it has 4 bytes, and its header 12")

@@ -6,12 +6,12 @@ use serde_json::Value;
 use super::document::Document;
 use super::error::GltfError;
 use super::node::quaternion;
-use super::{Choice, STILL, unknown};
+use super::{ImportOptions, STILL, unknown};
 use crate::Selection;
 
 impl Document {
     /// Returns the selected or default scene; `None` shows all nodes.
-    pub(super) fn scene(&self, choice: &Choice) -> Result<Option<usize>, GltfError> {
+    pub(super) fn scene(&self, choice: &ImportOptions) -> Result<Option<usize>, GltfError> {
         let scenes = &self.json.scenes;
         let Some(wanted) = &choice.scene else {
             let named = self
@@ -27,7 +27,7 @@ impl Document {
     }
 
     /// Returns the selected animations; all if only a time is given.
-    pub(super) fn animations(&self, choice: &Choice) -> Result<Vec<usize>, GltfError> {
+    pub(super) fn animations(&self, choice: &ImportOptions) -> Result<Vec<usize>, GltfError> {
         let animations = &self.json.animations;
         let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
         match (&choice.animation, choice.time) {
@@ -42,7 +42,7 @@ impl Document {
     }
 
     /// Returns the selected variant (KHR_materials_variants).
-    pub(super) fn variant(&self, choice: &Choice) -> Result<Option<usize>, GltfError> {
+    pub(super) fn variant(&self, choice: &ImportOptions) -> Result<Option<usize>, GltfError> {
         let Some(wanted) = &choice.variant else {
             return Ok(None);
         };

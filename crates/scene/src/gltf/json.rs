@@ -5,14 +5,14 @@ use gltf_json::validation::{Checked, Error, Validate as _};
 use gltf_json::{Path, Root};
 use serde_json::{Map, Number, Value};
 
-use super::error::{Fault, Place, plain, shown};
+use super::error::{GltfFault, Location, plain, shown};
 
 /// Maximum length in bytes; data URIs are long.
-pub(super) const LARGEST_TEXT: usize = 512 << 20;
+pub(super) const MAX_JSON_BYTES: usize = 512 << 20;
 /// Maximum number of objects, which take up to 1 KiB each.
-const MOST_OBJECTS: usize = 2 << 20;
+const MAX_OBJECTS: usize = 2 << 20;
 /// Maximum number of elements of objects and arrays.
-const MOST_VALUES: usize = 32 << 20;
+const MAX_VALUES: usize = 32 << 20;
 
 /// Keys of indices and OpenGL codes. The crate truncates their 64-bit values to 32 bits.
 const INDICES: &[&str] = &[
@@ -48,13 +48,13 @@ const INDICES: &[&str] = &[
     "wrapT",
 ];
 
-pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, Fault> {
+pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, GltfFault> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     // Some exporters pad the JSON chunk with zeros.
     let text = text.trim_ascii_end().trim_suffix_zeros();
-    if text.len() > LARGEST_TEXT {
-        return Err(Fault::file(format!(
-            "the JSON has {} bytes; it must have at most {LARGEST_TEXT}",
+    if text.len() > MAX_JSON_BYTES {
+        return Err(GltfFault::file(format!(
+            "the JSON has {} bytes; it must have at most {MAX_JSON_BYTES}",
             text.len()
         )));
     }
@@ -66,17 +66,17 @@ pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, Fault> 
             "recursion limit exceeded" => "lists and objects must be nested at most 127 levels deep",
             other => other,
         };
-        Fault::new(Place::Line(error.line().max(1), error.column().max(1)), message)
+        GltfFault::new(Location::Line(error.line().max(1), error.column().max(1)), message)
     })?;
     let Value::Object(top) = &mut value else {
-        return Err(Fault::new(Place::Line(1, 1), "the JSON must be an object"));
+        return Err(GltfFault::new(Location::Line(1, 1), "the JSON must be an object"));
     };
     check_version(top)?;
-    tidy(&mut value, None).map_err(|(key, rule)| Fault::key(key.trim_start_matches('.'), rule))?;
+    tidy(&mut value, None).map_err(|(key, rule)| GltfFault::key(key.trim_start_matches('.'), rule))?;
     repair(&mut value, notes);
     let root: Root = serde_path_to_error::deserialize(value).map_err(|error| {
         let key = error.path().to_string();
-        Fault::key(key, plain(error.inner()))
+        GltfFault::key(key, plain(error.inner()))
     })?;
     check(&root)?;
     Ok(root)
@@ -94,7 +94,7 @@ impl TrimZeros for [u8] {
 }
 
 /// Rejects texts that take far more memory once parsed.
-fn check_size(text: &[u8]) -> Result<(), Fault> {
+fn check_size(text: &[u8]) -> Result<(), GltfFault> {
     let (mut objects, mut values) = (0usize, 0usize);
     let mut bytes = text.iter();
     while let Some(byte) = bytes.next() {
@@ -114,34 +114,34 @@ fn check_size(text: &[u8]) -> Result<(), Fault> {
             _ => {}
         }
     }
-    let told = |count: usize, what: &str, most: usize| {
-        Fault::file(format!("the JSON has {count} {what}; it must have at most {most}"))
+    let too_many = |count: usize, what: &str, most: usize| {
+        GltfFault::file(format!("the JSON has {count} {what}; it must have at most {most}"))
     };
-    if objects > MOST_OBJECTS {
-        return Err(told(objects, "objects", MOST_OBJECTS));
+    if objects > MAX_OBJECTS {
+        return Err(too_many(objects, "objects", MAX_OBJECTS));
     }
-    match values > MOST_VALUES {
-        true => Err(told(values, "values", MOST_VALUES)),
+    match values > MAX_VALUES {
+        true => Err(too_many(values, "values", MAX_VALUES)),
         false => Ok(()),
     }
 }
 
 /// Checks the version (specification, section 3.2), on which all else depends.
-fn check_version(top: &Map<String, Value>) -> Result<(), Fault> {
+fn check_version(top: &Map<String, Value>) -> Result<(), GltfFault> {
     let asset = top.get("asset").and_then(Value::as_object);
-    let asset = asset.ok_or_else(|| Fault::key("asset", "is required: an object with the version"))?;
+    let asset = asset.ok_or_else(|| GltfFault::key("asset", "is required: an object with the version"))?;
     let number = |text: &str| {
         let (major, minor) = text.split_once('.')?;
         Some((major.parse::<u32>().ok()?, minor.parse::<u32>().ok()?))
     };
     let said = |key: &str| asset.get(key).filter(|value| !value.is_null());
-    let version = said("version").ok_or_else(|| Fault::key("asset.version", "is required"))?;
+    let version = said("version").ok_or_else(|| GltfFault::key("asset.version", "is required"))?;
     match version.as_str().and_then(number) {
         Some((2, _)) => {}
         _ => {
-            return Err(Fault::key(
+            return Err(GltfFault::key(
                 "asset.version",
-                format!("{} is not supported; convert the file to glTF 2.0", told(version)),
+                format!("{} is not supported; convert the file to glTF 2.0", text_of(version)),
             ));
         }
     }
@@ -149,15 +149,15 @@ fn check_version(top: &Map<String, Value>) -> Result<(), Fault> {
         None => Ok(()),
         Some(least) => match least.as_str().and_then(number) {
             Some(least) if least <= (2, 0) => Ok(()),
-            _ => Err(Fault::key(
+            _ => Err(GltfFault::key(
                 "asset.minVersion",
-                format!("{} must be at most \"2.0\", the supported version", told(least)),
+                format!("{} must be at most \"2.0\", the supported version", text_of(least)),
             )),
         },
     }
 }
 
-fn told(value: &Value) -> String {
+fn text_of(value: &Value) -> String {
     match value {
         Value::String(text) => shown(text),
         Value::Object(_) => "an object".to_owned(),
@@ -265,7 +265,7 @@ fn default(of: &mut Value, key: &str, value: Value) {
 }
 
 /// Checks indices and enumerations.
-fn check(root: &Root) -> Result<(), Fault> {
+fn check(root: &Root) -> Result<(), GltfFault> {
     // The crate's validation assumes these.
     for (i, mesh) in root.meshes.iter().enumerate() {
         for (k, primitive) in mesh.primitives.iter().enumerate() {
@@ -286,7 +286,7 @@ fn check(root: &Root) -> Result<(), Fault> {
             }
             if matches!(channel.target.path, Checked::Invalid) {
                 let key = format!("animations[{i}].channels[{k}].target.path");
-                return Err(Fault::key(key, "must be translation, rotation, scale or weights"));
+                return Err(GltfFault::key(key, "must be translation, rotation, scale or weights"));
             }
         }
     }
@@ -297,7 +297,7 @@ fn check(root: &Root) -> Result<(), Fault> {
             Checked::Invalid => continue,
         };
         if !is_there {
-            return Err(Fault::key(
+            return Err(GltfFault::key(
                 format!("cameras[{i}].{name}"),
                 "is required by the type of the camera",
             ));
@@ -314,7 +314,7 @@ fn check(root: &Root) -> Result<(), Fault> {
     });
     match first {
         None => Ok(()),
-        Some((path, error)) => Err(Fault::key(
+        Some((path, error)) => Err(GltfFault::key(
             path,
             match error {
                 Error::IndexOutOfBounds => "the index is out of range",
@@ -327,8 +327,8 @@ fn check(root: &Root) -> Result<(), Fault> {
     }
 }
 
-pub(super) fn missing(key: impl Into<String>, index: usize, count: usize) -> Fault {
-    Fault::key(key, format!("{index} is out of range; the file has {count}"))
+pub(super) fn missing(key: impl Into<String>, index: usize, count: usize) -> GltfFault {
+    GltfFault::key(key, format!("{index} is out of range; the file has {count}"))
 }
 
 /// Returns true for acceptable findings of the crate's validation.

@@ -23,19 +23,19 @@ struct Light {
     kind: String,
     range: Option<f64>,
     #[serde(default)]
-    spot: Spot,
+    spot: SpotCone,
 }
 
 #[derive(Deserialize)]
 #[serde(default, rename_all = "camelCase")]
-struct Spot {
+struct SpotCone {
     inner_cone_angle: f64,
     outer_cone_angle: f64,
 }
 
-impl Default for Spot {
+impl Default for SpotCone {
     fn default() -> Self {
-        Spot {
+        SpotCone {
             inner_cone_angle: 0.0,
             outer_cone_angle: std::f64::consts::FRAC_PI_4,
         }

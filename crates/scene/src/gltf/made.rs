@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::document::Document;
-use super::error::Fault;
+use super::error::GltfFault;
 
 /// A container with this JSON and this binary chunk.
 pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
@@ -27,7 +27,7 @@ pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
 }
 
 /// Reads a file from memory, in a folder that is empty.
-pub fn read(bytes: Vec<u8>) -> Result<Document, Fault> {
+pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     Document::read(
         bytes,
         Path::new("/none/a.gltf"),

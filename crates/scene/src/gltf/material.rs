@@ -155,7 +155,7 @@ impl Converter<'_> {
             None => ColorDescription::Plain([r, g, b].into()),
             Some(name) => ColorDescription::texture(name),
         };
-        let is_veiled = match &base_texture {
+        let has_alpha = match &base_texture {
             None => false,
             Some(slot) => self.has_alpha(slot)?,
         };
@@ -164,12 +164,12 @@ impl Converter<'_> {
             Checked::Valid(JsonAlphaMode::Blend) => AlphaMode::Blend,
             _ => AlphaMode::Opaque,
         };
-        if of.alpha_mode == AlphaMode::Blend && a == 1.0 && !is_veiled && !is_colored {
+        if of.alpha_mode == AlphaMode::Blend && a == 1.0 && !has_alpha && !is_colored {
             of.alpha_mode = AlphaMode::Opaque; // exporters write opaque materials as BLEND
         }
         if of.alpha_mode != AlphaMode::Opaque {
             of.alpha = match name {
-                Some(name) if is_veiled => ValueDescription::channel(name, A),
+                Some(name) if has_alpha => ValueDescription::channel(name, A),
                 _ => a.into(),
             };
             let cutoff = json.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0.into());
@@ -218,7 +218,7 @@ impl Converter<'_> {
                 "ior: {ior} must be 0 or from {} to {}; {} stands for it",
                 IORS.0, IORS.1, of.ior
             );
-            note(self.notes, format!("{}: {rule}", self.told()));
+            note(self.notes, format!("{}: {rule}", self.display_name()));
         }
         Ok(())
     }
@@ -423,12 +423,12 @@ impl Converter<'_> {
         let inside = color.map(|x| x.clamp(0.0, most));
         if inside != color {
             let rule = format!("{key} must be from 0 to {most}; it is clamped");
-            note(self.notes, format!("{}: {rule}", self.told()));
+            note(self.notes, format!("{}: {rule}", self.display_name()));
         }
         Ok(inside)
     }
 
-    fn told(&self) -> String {
+    fn display_name(&self) -> String {
         format!("{} ({:?})", self.place, self.name)
     }
 }

@@ -21,10 +21,10 @@ pub struct Materials<'a> {
     variant: Option<usize>,
     /// Indices into `used` by material of the file; `None` is the default.
     numbers: BTreeMap<Option<usize>, usize>,
-    used: Vec<Used>,
+    used: Vec<MaterialUse>,
 }
 
-pub struct Used {
+pub struct MaterialUse {
     /// Material index of the file.
     index: Option<usize>,
     /// Used with vertex colours.
@@ -58,7 +58,7 @@ impl<'a> Materials<'a> {
         let number = match self.numbers.get(&index) {
             Some(number) => *number,
             None => {
-                self.used.push(Used::of(self.document, index)?);
+                self.used.push(MaterialUse::of(self.document, index)?);
                 self.numbers.insert(index, self.used.len() - 1);
                 self.used.len() - 1
             }
@@ -67,7 +67,7 @@ impl<'a> Materials<'a> {
         Ok(number)
     }
 
-    pub fn get(&self, number: usize) -> &Used {
+    pub fn get(&self, number: usize) -> &MaterialUse {
         &self.used[number]
     }
 
@@ -153,9 +153,9 @@ const EXTENSION_TEXTURES: [(&str, &str); 14] = [
     ("KHR_materials_volume", "thicknessTexture"),
 ];
 
-impl Used {
-    fn of(document: &Document, index: Option<usize>) -> Result<Used, GltfError> {
-        let mut used = Used {
+impl MaterialUse {
+    fn of(document: &Document, index: Option<usize>) -> Result<MaterialUse, GltfError> {
+        let mut used = MaterialUse {
             index,
             is_colored: false,
             sets: BTreeSet::new(),

@@ -7,17 +7,17 @@ use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::validation::Checked;
 
-use super::budget::Thing;
+use super::budget::Resource;
 use super::document::Document;
 use super::error::GltfError;
-use super::materials::{Materials, Used};
+use super::materials::{MaterialUse, Materials};
 use super::node::{Nodes, Pose};
 use super::skin::Skin;
 use super::tangent::{generated, unturned};
 use super::texture::LAST_SET;
 use super::vertices::{Frames, Source, attribute};
-use super::{Damage, LONGEST_AXIS};
-use crate::mesh::{Draft, Group, MAX_COORDINATE, Mesh, unit};
+use super::{Damage, MAX_AXIS_LENGTH};
+use crate::mesh::{Group, MAX_COORDINATE, Mesh, RawMesh, unit};
 
 /// Identity of a mesh.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -51,7 +51,7 @@ impl Key {
 
     /// Returns true if an axis is too short rather than too long.
     pub fn is_flat(&self) -> bool {
-        let is_small = |axis: DVec3| axis.length() <= LONGEST_AXIS;
+        let is_small = |axis: DVec3| axis.length() <= MAX_AXIS_LENGTH;
         self.flat().is_some_and(|map| {
             let DMat3 { x_axis, y_axis, z_axis } = map.matrix3;
             [x_axis, y_axis, z_axis].into_iter().all(is_small)
@@ -74,7 +74,7 @@ impl Key {
 }
 
 /// A mesh, and its groups' materials.
-pub struct Built {
+pub struct BuiltMesh {
     pub mesh: Mesh,
     pub materials: Vec<usize>,
 }
@@ -162,7 +162,7 @@ impl<'a> Meshes<'a> {
     }
 
     pub fn notes(&self) -> impl Iterator<Item = String> {
-        let told = |count: usize, of: &str| match count {
+        let ignored = |count: usize, of: &str| match count {
             0 => None,
             1 => Some(format!("1 primitive of {of} is left out: only triangles are rendered")),
             _ => Some(format!(
@@ -177,7 +177,7 @@ impl<'a> Meshes<'a> {
                 count => format!("{rule} (and {} more primitives)", count - 1),
             }
         });
-        [told(self.points, "points"), told(self.lines, "lines"), bare]
+        [ignored(self.points, "points"), ignored(self.lines, "lines"), bare]
             .into_iter()
             .flatten()
     }
@@ -249,10 +249,10 @@ impl<'a> Meshes<'a> {
     }
 
     /// Builds a mesh; `None` if it has no triangles.
-    pub fn build(&self, key: &Key, nodes: &Nodes, materials: &Materials) -> Result<Option<Built>, GltfError> {
+    pub fn build(&self, key: &Key, nodes: &Nodes, materials: &Materials) -> Result<Option<BuiltMesh>, GltfError> {
         let parts = self.parts.get(&key.mesh).map_or(&[][..], Vec::as_slice);
         let skin = key.skin.map(|skin| Skin::of(self.document, skin, nodes)).transpose()?;
-        let mut whole = Whole::default();
+        let mut whole = MeshBuilder::default();
         let mut numbers = Vec::new();
         for part in parts {
             let used = materials.get(part.material);
@@ -299,7 +299,7 @@ impl<'a> Meshes<'a> {
             extent.max_element() >= 1e-9
         };
         let mesh = mesh.filter(|mesh| !key.is_flat() || has_size(mesh));
-        let built = mesh.map(|mesh| Built {
+        let built = mesh.map(|mesh| BuiltMesh {
             mesh,
             materials: numbers,
         });
@@ -319,7 +319,7 @@ impl<'a> Meshes<'a> {
             Mode::TriangleStrip | Mode::TriangleFan => indices.len(),
             _ => indices.len() / 3,
         };
-        let room = self.document.budget.take(Thing::Triangles, most as u64);
+        let room = self.document.budget.take(Resource::Triangles, most as u64);
         room.map_err(|rule| self.document.fault(&part.place, rule))?;
         let windows = indices.windows(3);
         Ok(match part.mode {
@@ -338,8 +338,8 @@ impl<'a> Meshes<'a> {
 
 /// A mesh under construction.
 #[derive(Default)]
-struct Whole {
-    draft: Draft,
+struct MeshBuilder {
+    draft: RawMesh,
     /// Texture coordinate sets, each up to the last primitive that has it.
     uvs: Vec<Vec<Vec2>>,
     /// First vertices by accessors, which primitives may share.
@@ -349,13 +349,13 @@ struct Whole {
     unplaced: HashSet<usize>,
 }
 
-impl Whole {
+impl MeshBuilder {
     /// Adds the vertices of a primitive unless known. Returns the first.
     fn vertices(
         &mut self,
         meshes: &Meshes,
         part: &Part,
-        used: &Used,
+        used: &MaterialUse,
         key: &Key,
         skin: Option<&Skin>,
     ) -> Result<usize, GltfError> {
@@ -399,7 +399,7 @@ impl Whole {
         self.draft.positions.extend(positions.iter().map(|p| *p + DVec3::ZERO));
     }
 
-    fn add_frames(&mut self, first: usize, frames: Frames, used: &Used) {
+    fn add_frames(&mut self, first: usize, frames: Frames, used: &MaterialUse) {
         if let Some(normals) = frames.normals {
             self.draft.normals.resize(first, Vec3::ZERO);
             self.draft
@@ -443,7 +443,7 @@ impl Whole {
     fn with_tangents(
         &mut self,
         part: &Part,
-        used: &Used,
+        used: &MaterialUse,
         first: usize,
         triangles: Vec<[u32; 3]>,
     ) -> (usize, Vec<[u32; 3]>) {

@@ -44,7 +44,7 @@ use std::time::SystemTime;
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
-use self::budget::Thing;
+use self::budget::Resource;
 use self::document::Document;
 use self::materials::Materials;
 use self::mesh::{Key, Meshes};
@@ -59,10 +59,10 @@ pub use self::contents::ModelContents;
 pub use self::error::GltfError;
 
 /// Maximum number of instances, and of their groups. Each takes more than 1 KiB in a scene.
-const MOST_INSTANCES: usize = 1 << 20;
+const MAX_INSTANCES: usize = 1 << 20;
 
 /// Maximum axis length of an instance's transform.
-const LONGEST_AXIS: f64 = 1e6;
+const MAX_AXIS_LENGTH: f64 = 1e6;
 
 const STILL: &str = "the file has no animations";
 
@@ -74,22 +74,22 @@ pub const UPRIGHT: DAffine3 = DAffine3 {
 
 /// The parts of a file to import.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Choice {
+pub struct ImportOptions {
     scene: Option<Selection>,
     time: Option<f64>,
     animation: Option<Selection>,
     variant: Option<Selection>,
 }
 
-impl Choice {
+impl ImportOptions {
     /// Returns the choice of a shape.
-    pub fn of(shape: &GltfDescription) -> Result<Choice, Problem> {
+    pub fn of(shape: &GltfDescription) -> Result<ImportOptions, Problem> {
         if let Some(time) = shape.time
             && !(TIMES.0..=TIMES.1).contains(&time)
         {
             return Err(Problem::of("time", format!("{time} must be from 0 to 1e9 seconds")));
         }
-        Ok(Choice {
+        Ok(ImportOptions {
             scene: shape.scene.clone(),
             time: shape.time,
             animation: shape.animation.clone(),
@@ -104,7 +104,7 @@ pub struct Imported {
     /// The meshes.
     pub meshes: Vec<Arc<Mesh>>,
     /// Mesh instances.
-    pub instances: Vec<Placed>,
+    pub instances: Vec<MeshInstance>,
     /// Encoded images, by name.
     pub images: BTreeMap<String, Arc<[u8]>>,
     /// Reasons for missing images, by name.
@@ -137,7 +137,7 @@ pub struct Damage {
 
 /// An instance of a mesh.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Placed {
+pub struct MeshInstance {
     /// Index of the mesh.
     pub mesh: usize,
     /// Object to world transform.
@@ -202,11 +202,11 @@ impl Imported {
 /// Returns the message about an unavailable selection, with the available ones.
 pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String {
     const MOST: usize = 20;
-    let told = |(i, name): (usize, &Option<&str>)| match name {
+    let listed = |(i, name): (usize, &Option<&str>)| match name {
         Some(name) => format!("{i} ({name:?})"),
         None => i.to_string(),
     };
-    let mut all: Vec<String> = names.iter().enumerate().take(MOST).map(told).collect();
+    let mut all: Vec<String> = names.iter().enumerate().take(MOST).map(listed).collect();
     if names.len() > MOST {
         all.push(format!("{} more", names.len() - MOST));
     }
@@ -224,11 +224,11 @@ pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String
 pub fn load(
     path: &Path,
     root: &Path,
-    choice: &Choice,
+    choice: &ImportOptions,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<Arc<Imported>, GltfError> {
-    static IN_USE: Mutex<Vec<Known>> = Mutex::new(Vec::new());
-    let same = |known: &Known| known.path == path && known.root == root && known.choice == *choice;
+    static IN_USE: Mutex<Vec<CachedImport>> = Mutex::new(Vec::new());
+    let same = |known: &CachedImport| known.path == path && known.root == root && known.choice == *choice;
     {
         let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
         in_use.retain(|known| known.imported.strong_count() > 0);
@@ -251,7 +251,7 @@ pub fn load(
     let imported = Arc::new(imported);
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     in_use.retain(|known| !same(known));
-    in_use.push(Known {
+    in_use.push(CachedImport {
         path: path.to_owned(),
         root: root.to_owned(),
         choice: choice.clone(),
@@ -262,18 +262,18 @@ pub fn load(
 }
 
 /// Length and modification time.
-type Stamp = Option<(u64, SystemTime)>;
+type FileStamp = Option<(u64, SystemTime)>;
 
 /// A cached import.
-struct Known {
+struct CachedImport {
     path: PathBuf,
     root: PathBuf,
-    choice: Choice,
-    stamps: Vec<(PathBuf, Stamp)>,
+    choice: ImportOptions,
+    stamps: Vec<(PathBuf, FileStamp)>,
     imported: Weak<Imported>,
 }
 
-impl Known {
+impl CachedImport {
     fn is_fresh(&self) -> bool {
         self.stamps
             .iter()
@@ -281,12 +281,17 @@ impl Known {
     }
 }
 
-fn stamp(path: &Path) -> Stamp {
+fn stamp(path: &Path) -> FileStamp {
     let data = fs::metadata(path).ok()?;
     Some((data.len(), data.modified().ok()?))
 }
 
-fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBuf>) -> Result<Imported, GltfError> {
+fn import(
+    path: &Path,
+    root: &Path,
+    choice: &ImportOptions,
+    files: &mut BTreeSet<PathBuf>,
+) -> Result<Imported, GltfError> {
     let document = Document::open(path, root, files)?;
     let animations = document.animations(choice)?;
     let mut poses: Vec<Pose> = document.json.nodes.iter().map(Pose::of).collect();
@@ -310,7 +315,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
         };
         let mut own_key = None;
         let own_maps = document.instances(number)?;
-        let room = document.budget.take(Thing::Instances, own_maps.len() as u64);
+        let room = document.budget.take(Resource::Instances, own_maps.len() as u64);
         room.map_err(|rule| document.fault(format!("nodes[{number}]"), rule))?;
         for own in own_maps {
             let to_world = UPRIGHT * global * own;
@@ -340,7 +345,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
     let mut materials = Materials::of(&document, document.variant(choice)?);
     let meshes = Meshes::of(&document, &mut materials, keys.iter())?;
     let built = keys.par_iter().map(|key| meshes.build(key, &nodes, &materials));
-    let built: Vec<Option<mesh::Built>> = built.collect::<Result<_, GltfError>>()?;
+    let built: Vec<Option<mesh::BuiltMesh>> = built.collect::<Result<_, GltfError>>()?;
     let mut places = vec![None; keys.len()];
     let mut imported = Imported {
         contents: ModelContents::of(&document),
@@ -365,11 +370,11 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
         if let Some(mesh) = places[key] {
             let materials: Vec<usize> = groups[mesh].clone();
             count += materials.len();
-            if count > MOST_INSTANCES {
-                let rule = format!("all instances of meshes together must have at most {MOST_INSTANCES} primitives");
+            if count > MAX_INSTANCES {
+                let rule = format!("all instances of meshes together must have at most {MAX_INSTANCES} primitives");
                 return Err(document.fault("nodes", rule));
             }
-            imported.instances.push(Placed {
+            imported.instances.push(MeshInstance {
                 mesh,
                 to_world,
                 materials,
@@ -415,5 +420,5 @@ fn is_placeable(map: &DAffine3) -> bool {
     let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
     let lengths = [x, y, z].map(DVec3::length);
     let volume = x.cross(y).dot(z).abs() / (lengths[0] * lengths[1] * lengths[2]);
-    map.is_finite() && lengths.iter().all(|length| (1e-6..=LONGEST_AXIS).contains(length)) && volume > 1e-6
+    map.is_finite() && lengths.iter().all(|length| (1e-6..=MAX_AXIS_LENGTH).contains(length)) && volume > 1e-6
 }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::texture::Slot;
 
 /// Vertices with generated tangents.
-pub struct Made {
+pub struct TangentVertices {
     pub triangles: Vec<[u32; 3]>,
     /// Original index of each vertex.
     pub origins: Vec<u32>,
@@ -62,7 +62,12 @@ impl Geometry for Corners<'_> {
 }
 
 /// Generates the tangents of a primitive.
-pub fn generated(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> Option<Made> {
+pub fn generated(
+    positions: &[DVec3],
+    normals: &[Vec3],
+    uvs: &[Vec2],
+    triangles: &[[u32; 3]],
+) -> Option<TangentVertices> {
     let parts = parts(positions, normals, uvs, triangles);
     let parts: Vec<Vec<[Vec4; 3]>> = (parts.into_par_iter())
         .map(|part| {
@@ -77,7 +82,7 @@ pub fn generated(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles:
             Some(corners.tangents[part.own].to_vec())
         })
         .collect::<Option<_>>()?;
-    let mut made = Made {
+    let mut made = TangentVertices {
         triangles: Vec::with_capacity(triangles.len()),
         origins: Vec::new(),
         tangents: Vec::new(),

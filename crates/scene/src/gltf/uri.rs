@@ -47,19 +47,19 @@ pub(super) enum Unfound {
     /// Missing or unreadable.
     Absent(String),
     /// Violates a rule.
-    Refused(String),
+    DecodeError(String),
 }
 
 impl From<String> for Unfound {
     fn from(rule: String) -> Self {
-        Unfound::Refused(rule)
+        Unfound::DecodeError(rule)
     }
 }
 
 impl From<Unfound> for String {
     fn from(unfound: Unfound) -> Self {
         match unfound {
-            Unfound::Absent(why) | Unfound::Refused(why) => why,
+            Unfound::Absent(why) | Unfound::DecodeError(why) => why,
         }
     }
 }
@@ -201,7 +201,7 @@ mod tests {
             let path = folder.find(uri).unwrap();
             assert_eq!(read(&path, 3).unwrap(), b"yes", "{uri}");
         }
-        let told = |uri: &str| String::from(folder.find(uri).unwrap_err());
+        let error_of = |uri: &str| String::from(folder.find(uri).unwrap_err());
         let outside = "must not leave the folder";
         for uri in [
             "../secret.bin",
@@ -210,7 +210,7 @@ mod tests {
             "sub dir/../../secret.bin",
             "..\\secret.bin",
         ] {
-            assert!(told(uri).contains(outside), "{uri}: {}", told(uri));
+            assert!(error_of(uri).contains(outside), "{uri}: {}", error_of(uri));
         }
         for uri in [
             "/etc/passwd",
@@ -219,7 +219,11 @@ mod tests {
             "\\\\host\\file",
             "\\file",
         ] {
-            assert!(told(uri).ends_with("must be a relative path"), "{uri}: {}", told(uri));
+            assert!(
+                error_of(uri).ends_with("must be a relative path"),
+                "{uri}: {}",
+                error_of(uri)
+            );
         }
         for uri in [
             "file:///etc/passwd",
@@ -228,15 +232,15 @@ mod tests {
             "c:\\a.bin",
             "blob:x",
         ] {
-            assert!(told(uri).contains("begins with"), "{uri}: {}", told(uri));
+            assert!(error_of(uri).contains("begins with"), "{uri}: {}", error_of(uri));
         }
         for uri in ["none.bin", "a\0b", "a b.bin/x", "%00"] {
-            assert!(told(uri).contains("cannot be read"), "{uri}: {}", told(uri));
+            assert!(error_of(uri).contains("cannot be read"), "{uri}: {}", error_of(uri));
         }
-        assert!(told("%ff").contains("UTF-8"));
-        assert!(told("").contains("path of a file"));
-        assert!(told("sub%20dir").ends_with("must be a file"));
-        assert!(told(".").ends_with("must be a file"));
+        assert!(error_of("%ff").contains("UTF-8"));
+        assert!(error_of("").contains("path of a file"));
+        assert!(error_of("sub%20dir").ends_with("must be a file"));
+        assert!(error_of(".").ends_with("must be a file"));
         assert!(read(&root.join("a b.bin"), 2).is_err());
         assert!(read(&root, 9).is_err());
         let wide = Folder {
@@ -248,7 +252,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_pipes_are_seen_through() {
+    fn links_out_of_the_root_and_pipes_are_rejected() {
         let outer = tempfile::tempdir().unwrap();
         let root = outer.path().join("model");
         fs::create_dir(&root).unwrap();

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::decode::{Format, Header, LONGEST_SIDE, decode};
+use super::super::decode::{Format, Header, MAX_IMAGE_SIDE, decode};
 use super::super::texture::{levels, words};
 use super::super::validate::TEXEL_MEMORY;
 use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
@@ -14,7 +14,7 @@ const TEXELS: (u64, u64) = (1 << 28, 64);
 const OTHERS: u64 = 128 << 20;
 
 /// An image, and its copies as colours, data and alpha.
-struct Kept {
+struct ImportedImage {
     header: Header,
     /// Encoded size in bytes.
     length: u64,
@@ -22,7 +22,7 @@ struct Kept {
     has_levels: bool,
 }
 
-impl Kept {
+impl ImportedImage {
     /// Returns the memory in bytes, halved until no side exceeds `longest`.
     fn bytes(&self, longest: u32) -> u64 {
         let Header { width, height, is_deep } = self.header;
@@ -37,7 +37,7 @@ impl Kept {
 /// the rule.
 pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option<(u32, u64)>, String> {
     let kept = kept(description, assets);
-    let texels = |of: &Kept| u64::from(of.header.width) * u64::from(of.header.height) * of.times;
+    let texels = |of: &ImportedImage| u64::from(of.header.width) * u64::from(of.header.height) * of.times;
     let (texels, bytes) = kept.iter().fold((0_u64, 0_u64), |(texels_before, bytes), image| {
         (texels_before.saturating_add(texels(image)), bytes + image.length)
     });
@@ -48,18 +48,18 @@ pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option
         ));
     }
     let all = |longest: u32| kept.iter().map(|image| image.bytes(longest)).sum::<u64>();
-    let whole = all(LONGEST_SIDE);
+    let whole = all(MAX_IMAGE_SIDE);
     if whole <= TEXEL_MEMORY - OTHERS {
         return Ok(None);
     }
-    let mut longest = LONGEST_SIDE;
+    let mut longest = MAX_IMAGE_SIDE;
     while longest > 1 && all(longest) > TEXEL_MEMORY - OTHERS {
         longest /= 2;
     }
     Ok(Some((longest, whole)))
 }
 
-fn kept(description: &Description, assets: &Assets) -> Vec<Kept> {
+fn kept(description: &Description, assets: &Assets) -> Vec<ImportedImage> {
     let values = description.materials.values().flat_map(MaterialDescription::values);
     let opaque: BTreeSet<&str> = values
         .filter_map(|value| match value {
@@ -81,7 +81,7 @@ fn kept(description: &Description, assets: &Assets) -> Vec<Kept> {
     }
     let kept = files.into_iter().filter_map(|(file, (parts, has_levels))| {
         let bytes = assets.encoded.get(file)?;
-        Some(Kept {
+        Some(ImportedImage {
             header: header(bytes)?,
             length: bytes.len() as u64,
             times: parts.len() as u64,

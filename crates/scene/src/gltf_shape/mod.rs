@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use self::fitting::longest_side;
-use super::image_file::Place;
+use super::image_file::AssetKey;
 use super::key_path::Segment;
 use super::key_path::list;
 use super::problem::{At, Problem};
@@ -20,11 +20,11 @@ use super::{
     Assets, ColorDescription, Description, GltfDescription, InstanceDescription, LightDescription, MaterialDescription,
     MeshFileDescription, NormalMapDescription, ShapeDescription, TextureDescription, ValueDescription,
 };
-use crate::gltf::{Choice, Imported, load};
+use crate::gltf::{ImportOptions, Imported, load};
 use crate::note::Note;
 
 /// A description without `gltf` shapes, and its assets.
-pub struct Expanded {
+pub struct ExpandedScene {
     pub description: Description,
     pub assets: Assets,
     /// Warnings for the user.
@@ -40,9 +40,9 @@ pub struct Expanded {
 }
 
 /// Maximum number of instances, meshes, materials and lights of all shapes.
-const MOST_BROUGHT: usize = 1 << 21;
+const MAX_IMPORTED_INSTANCES: usize = 1 << 21;
 /// Maximum number of these of repeated files. Each takes 1 KiB or more.
-const MOST_AGAIN: usize = 1 << 18;
+const MAX_REPEATED_IMPORTS: usize = 1 << 18;
 /// Cost of a shape in these counts.
 const SHAPE: usize = 16;
 
@@ -55,9 +55,13 @@ struct Origin {
     lights: Range<usize>,
 }
 
-impl Expanded {
-    pub fn of(description: &Description, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Expanded, Problem> {
-        let mut expanded = Expanded {
+impl ExpandedScene {
+    pub fn of(
+        description: &Description,
+        assets: &Assets,
+        files: &mut BTreeSet<PathBuf>,
+    ) -> Result<ExpandedScene, Problem> {
+        let mut expanded = ExpandedScene {
             description: description.clone(),
             assets: assets.clone(),
             notes: Vec::new(),
@@ -124,13 +128,13 @@ impl Expanded {
 
     fn add(&mut self, shape: usize, gltf: &GltfDescription, files: &mut BTreeSet<PathBuf>) -> Result<(), Problem> {
         let transform = placement(gltf.translate, gltf.rotate, gltf.scale, gltf.matrix.as_ref())?;
-        let Place::File(path) = self.assets.find(&gltf.file).at("file")? else {
+        let AssetKey::File(path) = self.assets.find(&gltf.file).at("file")? else {
             return Err(Problem::of(
                 "file",
                 format!("{:?} is in memory, and no glTF file", gltf.file),
             ));
         };
-        let choice = Choice::of(gltf)?;
+        let choice = ImportOptions::of(gltf)?;
         let read = load(&path, &self.assets.root, &choice, files);
         let imported = read.map_err(|error| Problem::new(error.to_string())).at("file")?;
         let counts = [
@@ -144,12 +148,14 @@ impl Expanded {
         let what = "instances, meshes, materials and lights";
         self.brought[0] += brought;
         self.brought[1] += if is_again { brought } else { 0 };
-        if self.brought[0] > MOST_BROUGHT {
-            let rule = format!("all shapes of type \"gltf\" together must bring at most {MOST_BROUGHT} {what}");
+        if self.brought[0] > MAX_IMPORTED_INSTANCES {
+            let rule =
+                format!("all shapes of type \"gltf\" together must bring at most {MAX_IMPORTED_INSTANCES} {what}");
             return Err(Problem::of("file", rule));
         }
-        if self.brought[1] > MOST_AGAIN {
-            let rule = format!("shapes that name a glTF file again together must bring at most {MOST_AGAIN} {what}");
+        if self.brought[1] > MAX_REPEATED_IMPORTS {
+            let rule =
+                format!("shapes that name a glTF file again together must bring at most {MAX_REPEATED_IMPORTS} {what}");
             return Err(Problem::of("file", rule));
         }
         let prefix = self.prefix(&gltf.file);

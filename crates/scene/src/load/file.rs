@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::error::SceneError;
 use crate::parse::{NOT_UTF8, encoding, syntax_error};
-use wgray_image::waiting;
+use wgray_image::blocking_path;
 
 /// Maximum size of a scene file in bytes: far above any that people write, far below the memory of a machine.
 const MAX_FILE_BYTES: u64 = 64 << 20;
@@ -41,7 +41,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
 
 /// Reads a file of at most 64 MiB; pipes and devices that may block are refused.
 pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
-    waiting::check(path)?;
+    blocking_path::reject(path)?;
     if path.is_dir() {
         return Err(io::Error::new(
             io::ErrorKind::IsADirectory,

@@ -12,7 +12,7 @@ use super::model::{self, SIDE};
 use super::overrides::Overrides;
 use crate::error::SceneError;
 use crate::framing::check_extent;
-use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, ModelContents, UPRIGHT, load};
+use crate::gltf::{GltfError, ImportOptions, Imported, ImportedCamera, ModelContents, UPRIGHT, load};
 use crate::problem::Problem;
 use crate::{CameraDescription, Description, Framing, GltfDescription, Scene, Selection, framed};
 
@@ -70,7 +70,7 @@ pub(crate) fn describe(
         path: path.to_owned(),
         error,
     })?;
-    let choice = Choice::of(&shape).map_err(SceneError::Override)?;
+    let choice = ImportOptions::of(&shape).map_err(SceneError::Override)?;
     let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.error(error.at(path)))?;
     let presentation = &overrides.presentation;
     let camera = match view.is_some() || presentation.orbit.is_some() {

@@ -173,11 +173,11 @@ fn parse_beside(
     overrides: &Overrides,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<(Scene, Description), SceneError> {
-    Draft::read(text, origin, folder, overrides)?.check(files)
+    PendingScene::read(text, origin, folder, overrides)?.check(files)
 }
 
 /// A parsed scene file that is not validated.
-pub struct Draft<'a> {
+pub struct PendingScene<'a> {
     text: &'a str,
     origin: &'a str,
     folder: &'a Path,
@@ -187,17 +187,17 @@ pub struct Draft<'a> {
     pub description: Description,
 }
 
-impl<'a> Draft<'a> {
+impl<'a> PendingScene<'a> {
     /// Parses the text of a file `origin`; file names are relative to `folder`.
     pub fn read(
         text: &'a str,
         origin: &'a str,
         folder: &'a Path,
         overrides: &'a Overrides,
-    ) -> Result<Draft<'a>, SceneError> {
+    ) -> Result<PendingScene<'a>, SceneError> {
         let mut defines = Defines::new(&overrides.define);
         let description = Description::parse_with(text, origin, &mut defines)?;
-        let draft = Draft {
+        let draft = PendingScene {
             text,
             origin,
             folder,
@@ -217,12 +217,12 @@ impl<'a> Draft<'a> {
         folder: &'a Path,
         overrides: &'a Overrides,
         (before, at): (&Description, &KeyPath),
-    ) -> Result<(Draft<'a>, Option<Places>), SceneError> {
+    ) -> Result<(PendingScene<'a>, Option<Places>), SceneError> {
         let mut defines = Defines::new(&overrides.define);
         let Some(change) = Description::parse_change(text, origin, &mut defines, before, at)? else {
-            return Ok((Draft::read(text, origin, folder, overrides)?, None));
+            return Ok((PendingScene::read(text, origin, folder, overrides)?, None));
         };
-        let mut draft = Draft {
+        let mut draft = PendingScene {
             text,
             origin,
             folder,
@@ -237,7 +237,7 @@ impl<'a> Draft<'a> {
         Ok((draft, Some(change.places)))
     }
 
-    fn overridden(mut self) -> Result<Draft<'a>, SceneError> {
+    fn overridden(mut self) -> Result<PendingScene<'a>, SceneError> {
         let applied = self.overrides.apply(&mut self.description);
         applied.map_err(SceneError::Override)?;
         let gltf = self.overrides.gltf.first();
@@ -250,7 +250,7 @@ impl<'a> Draft<'a> {
 
     /// Validates the scene. Adds its files to `files`, even if it fails.
     pub fn check(self, files: &mut BTreeSet<PathBuf>) -> Result<(Scene, Description), SceneError> {
-        let Draft {
+        let PendingScene {
             text,
             origin,
             folder,

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::gltf_choice::GltfChoice;
-use crate::around::{Background, of_option, surround};
 use crate::define::Define;
+use crate::environment_override::{Background, of_option, surround};
 use crate::error::SceneError;
 use crate::key_path::KeyPath;
 use crate::problem::{At, Problem, Problems};

@@ -1,6 +1,6 @@
 //! Damage to mesh files for which a stand-in exists: it is reported, and the rest of the file is used.
 
-use super::error::{Fault, Place};
+use super::error::{Location, MeshFault};
 use crate::note::Note;
 
 pub(super) const VERTEX: &str = "faces with this vertex were removed";
@@ -18,14 +18,14 @@ pub(super) struct Damages(Vec<Damage>);
 
 struct Damage {
     stand_in: &'static str,
-    first: Fault,
+    first: MeshFault,
     count: usize,
 }
 
 impl Damages {
     /// Records damage. The message is made for the first of a kind only.
     #[cold]
-    pub fn add(&mut self, stand_in: &'static str, fault: impl FnOnce() -> Fault) {
+    pub fn add(&mut self, stand_in: &'static str, fault: impl FnOnce() -> MeshFault) {
         match self.0.iter_mut().find(|damage| damage.stand_in == stand_in) {
             Some(damage) => damage.count += 1,
             None => self.0.push(Damage {
@@ -37,13 +37,13 @@ impl Damages {
     }
 
     /// Returns the first fault of each kind, and all of them as notes.
-    pub fn into_parts(self) -> (Vec<Fault>, Vec<Note>) {
+    pub fn into_parts(self) -> (Vec<MeshFault>, Vec<Note>) {
         let notes = self.0.iter().map(Damage::note).collect();
         (self.0.into_iter().map(|damage| damage.first).collect(), notes)
     }
 
     /// Returns the fault that was recorded first.
-    pub fn first(&self) -> Option<&Fault> {
+    pub fn first(&self) -> Option<&MeshFault> {
         self.0.first().map(|damage| &damage.first)
     }
 }
@@ -51,9 +51,9 @@ impl Damages {
 impl Damage {
     fn note(&self) -> Note {
         let (line, place) = match self.first.place {
-            Place::File => (None, String::new()),
-            Place::Line(line) => (Some(line), String::new()),
-            Place::Byte(offset) => (None, format!("byte {offset}: ")),
+            Location::File => (None, String::new()),
+            Location::Line(line) => (Some(line), String::new()),
+            Location::Byte(offset) => (None, format!("byte {offset}: ")),
         };
         let more = match self.count {
             1 => String::new(),

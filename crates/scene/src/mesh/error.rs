@@ -79,8 +79,8 @@ impl MeshError {
 
 /// An error without its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Fault {
-    pub place: Place,
+pub(crate) struct MeshFault {
+    pub place: Location,
     pub message: String,
     /// No triangles to render.
     pub is_empty: bool,
@@ -88,7 +88,7 @@ pub(crate) struct Fault {
 
 /// A location in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum Location {
     File,
     /// Line from 1.
     Line(usize),
@@ -96,9 +96,9 @@ pub(crate) enum Place {
     Byte(usize),
 }
 
-impl Place {
-    pub fn fault(self, message: impl Into<String>) -> Fault {
-        Fault {
+impl Location {
+    pub fn fault(self, message: impl Into<String>) -> MeshFault {
+        MeshFault {
             place: self,
             message: message.into(),
             is_empty: false,
@@ -106,21 +106,21 @@ impl Place {
     }
 }
 
-impl Fault {
+impl MeshFault {
     /// Returns the error for a file without triangles; `reason` is appended.
-    pub fn empty(reason: &str) -> Fault {
-        Fault {
+    pub fn empty(reason: &str) -> MeshFault {
+        MeshFault {
             is_empty: true,
-            ..Place::File.fault(format!("has no triangles{reason}"))
+            ..Location::File.fault(format!("has no triangles{reason}"))
         }
     }
 
     pub fn of(self, path: &Path) -> MeshError {
         let (path, message) = (path.to_owned(), self.message);
         match self.place {
-            Place::File => MeshError::File { path, message },
-            Place::Line(line) => MeshError::Line { path, line, message },
-            Place::Byte(offset) => MeshError::Byte { path, offset, message },
+            Location::File => MeshError::File { path, message },
+            Location::Line(line) => MeshError::Line { path, line, message },
+            Location::Byte(offset) => MeshError::Byte { path, offset, message },
         }
     }
 }

@@ -1,19 +1,19 @@
 //! Triangle meshes and their files. [`Mesh::load`] reads Wavefront OBJ, PLY and STL files.
 
+mod build;
 mod cache;
 mod check;
 mod damage;
-mod draft;
 mod error;
-mod finish;
 mod mtl;
 mod neighbours;
 mod obj;
 mod ply;
 mod polygon;
+mod raw_mesh;
 mod stl;
 mod tangents;
-mod words;
+mod tokens;
 
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -27,16 +27,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::cache::Cache;
-pub(crate) use self::draft::{Draft, unit};
 pub use self::error::MeshError;
-use self::error::{Fault, Place};
+use self::error::{Location, MeshFault};
+pub(crate) use self::raw_mesh::{RawMesh, unit};
 pub use self::tangents::{Tangents, VertexTangents};
 use crate::note::Note;
 
 /// Maximum size of a mesh file in bytes.
-const LARGEST_FILE: u64 = 8 << 30;
+const MAX_FILE_BYTES: u64 = 8 << 30;
 /// Maximum size of an MTL file in bytes.
-const LARGEST_LIBRARY: u64 = 16 << 20;
+const MAX_LIBRARY_BYTES: u64 = 16 << 20;
 /// Maximum number of triangles and of vertices; three times as many fit 32-bit indices.
 const MOST: usize = 1 << 30;
 /// Maximum colour component of a vertex.
@@ -78,7 +78,7 @@ pub struct Mesh {
     /// Warnings, with the action taken: `1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
     /// Damage, which is an error in strict mode.
-    pub(crate) damage: Vec<Fault>,
+    pub(crate) damage: Vec<MeshFault>,
     /// Bounding box, BVH and other derived data.
     cache: Cache,
 }
@@ -204,18 +204,18 @@ impl Mesh {
             Some("stl") => Format::Stl,
             _ => {
                 let rule = "the name of a mesh must end in .obj, .ply or .stl";
-                return Err(Place::File.fault(rule).of(path));
+                return Err(Location::File.fault(rule).of(path));
             }
         };
         let read_error = |error| MeshError::Read {
             path: path.to_owned(),
             error,
         };
-        let bytes = match read_file(path, LARGEST_FILE).map_err(read_error)? {
+        let bytes = match read_file(path, MAX_FILE_BYTES).map_err(read_error)? {
             Some(bytes) => bytes,
             None => {
-                let rule = format!("must not be larger than {} GiB", LARGEST_FILE >> 30);
-                return Err(Place::File.fault(rule).of(path));
+                let rule = format!("must not be larger than {} GiB", MAX_FILE_BYTES >> 30);
+                return Err(Location::File.fault(rule).of(path));
             }
         };
         let (mut mesh, libraries, damage) = read(&bytes, format, normals).map_err(|fault| fault.of(path))?;
@@ -236,7 +236,7 @@ impl Mesh {
         if file_beside(folder, names).is_file() {
             self.load_library(folder, names);
         } else {
-            let names = names.split(' ').take(obj::MOST_LIBRARIES);
+            let names = names.split(' ').take(obj::MAX_LIBRARIES);
             names.for_each(|name| self.load_library(folder, name));
         }
     }
@@ -249,7 +249,7 @@ impl Mesh {
         };
         // Each file is read once, and their number is limited.
         let is_known = self.libraries.iter().any(|known| known.file == library.file);
-        if is_known || self.libraries.len() >= obj::MOST_LIBRARIES {
+        if is_known || self.libraries.len() >= obj::MAX_LIBRARIES {
             return;
         }
         let read = read_library(folder, &library.file).and_then(|bytes| mtl::read(&bytes));
@@ -314,14 +314,18 @@ enum Format {
 }
 
 /// Returns the mesh, its MTL files and the damage.
-fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh, Vec<String>, Vec<Fault>), Fault> {
+fn read(
+    bytes: &[u8],
+    format: Format,
+    normals: Option<Normals>,
+) -> Result<(Mesh, Vec<String>, Vec<MeshFault>), MeshFault> {
     if bytes.is_empty() {
-        return Err(Place::File.fault("the file is empty"));
+        return Err(Location::File.fault("the file is empty"));
     }
     let are_wanted = matches!(normals, None | Some(Normals::File));
     let (mut draft, libraries) = match format {
         Format::Obj => {
-            let obj = obj::read(&words::utf8(bytes), are_wanted)?;
+            let obj = obj::read(&tokens::utf8(bytes), are_wanted)?;
             (obj.draft, obj.libraries)
         }
         Format::Ply => (ply::read(bytes, are_wanted)?, Vec::new()),
@@ -332,7 +336,7 @@ fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh,
     }
     let (damage, notes) = std::mem::take(&mut draft.damages).into_parts();
     draft.notes.splice(0..0, notes);
-    let mesh = finish::finish(draft, normals).map_err(|fault| match damage.first() {
+    let mesh = build::build_mesh(draft, normals).map_err(|fault| match damage.first() {
         Some(first) if fault.is_empty => first.clone(),
         _ => fault,
     })?;
@@ -356,14 +360,14 @@ fn read_file(path: &Path, largest: u64) -> io::Result<Option<Vec<u8>>> {
 
 /// Reads an MTL file in the folder of the mesh.
 fn read_library(folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
-    let told = |error: io::Error| error.to_string();
-    let path = file.canonicalize().map_err(told)?;
-    if !path.starts_with(folder.canonicalize().map_err(told)?) {
+    let message = |error: io::Error| error.to_string();
+    let path = file.canonicalize().map_err(message)?;
+    if !path.starts_with(folder.canonicalize().map_err(message)?) {
         return Err("it must be in the folder of the mesh".to_string());
     }
-    match read_file(&path, LARGEST_LIBRARY).map_err(told)? {
+    match read_file(&path, MAX_LIBRARY_BYTES).map_err(message)? {
         Some(bytes) => Ok(bytes),
-        None => Err(format!("it must not be larger than {} MiB", LARGEST_LIBRARY >> 20)),
+        None => Err(format!("it must not be larger than {} MiB", MAX_LIBRARY_BYTES >> 20)),
     }
 }
 

@@ -2,8 +2,8 @@
 //! Invalid lines are reported and ignored. Keywords are case-insensitive, as exporters differ.
 
 use super::MtlMaterial;
-use super::error::{Fault, shown};
-use super::words::{Words, number};
+use super::error::{MeshFault, shown};
+use super::tokens::{Tokens, number};
 
 /// Maximum number of materials of a file. A material takes hundreds of bytes in memory but as few as nine in the file.
 pub(super) const MAX_MATERIALS: usize = 1 << 16;
@@ -24,7 +24,7 @@ pub(super) struct Mtl {
 
 /// Parses a file. Problems begin with the line; the error is of the whole file.
 pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
-    let mut words = Words::new(bytes);
+    let mut words = Tokens::new(bytes);
     let mut materials: Vec<MtlMaterial> = Vec::new();
     let (mut problems, mut problem_count) = (Vec::new(), 0);
     while let Some(keyword) = words.anywhere() {
@@ -84,14 +84,14 @@ const KEYWORDS: [(&str, &str); 24] = [
 ];
 
 /// Applies a line. The error is the line, keyword and rule.
-fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<(), String> {
+fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Tokens) -> Result<(), String> {
     let is_keyword = |(lower, _): &&(&str, &str)| lower.as_bytes().eq_ignore_ascii_case(keyword);
     let Some((_, keyword)) = KEYWORDS.iter().find(is_keyword) else {
         return Ok(());
     };
     let line = words.line();
-    let message = |fault: Fault| format!("{line}: {}", fault.message);
-    let finite = |words: &mut Words| -> Result<f64, String> {
+    let message = |fault: MeshFault| format!("{line}: {}", fault.message);
+    let finite = |words: &mut Tokens| -> Result<f64, String> {
         let x = words.number(keyword).map_err(message)?;
         match x.is_finite() {
             true => Ok(x),
@@ -99,7 +99,7 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
         }
     };
     // A single number is a grey value.
-    let color = |words: &mut Words| -> Result<[f64; 3], String> {
+    let color = |words: &mut Tokens| -> Result<[f64; 3], String> {
         let red = finite(words)?;
         match words.on_line() {
             None => Ok([red; 3]),
@@ -140,7 +140,7 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
     Ok(())
 }
 
-fn map(material: &mut MtlMaterial, words: &mut Words, keyword: &str) -> Option<String> {
+fn map(material: &mut MtlMaterial, words: &mut Tokens, keyword: &str) -> Option<String> {
     let line = words.line();
     let (file, options) = map_file(&words.name());
     for option in options {

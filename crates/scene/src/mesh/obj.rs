@@ -10,27 +10,27 @@ use std::hash::BuildHasher;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use hashbrown::{DefaultHashBuilder, HashTable};
 
-use super::draft::{Draft, coordinate, counted, texture_coordinate, unit};
-use super::error::{Fault, Place, shown};
-use super::words::Words;
+use super::error::{Location, MeshFault, shown};
+use super::raw_mesh::{RawMesh, coordinate, counted, texture_coordinate, unit};
+use super::tokens::Tokens;
 use super::{Group, MOST};
-use super::{damage, words};
+use super::{damage, tokens};
 use wgray_image::color::srgb_to_linear;
 
 /// Missing index of a vertex attribute.
 const NONE: u32 = u32::MAX;
 /// Maximum number of unknown keywords counted.
-const MOST_KEYWORDS: usize = 100;
+const MAX_KEYWORDS: usize = 100;
 /// Maximum number of `mtllib` lines, and of names per line.
-pub(super) const MOST_LIBRARIES: usize = 100;
+pub(super) const MAX_LIBRARIES: usize = 100;
 
 pub(super) struct Obj {
-    pub draft: Draft,
+    pub draft: RawMesh,
     pub libraries: Vec<String>,
 }
 
-pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Obj, Fault> {
-    let mut words = Words::new(bytes);
+pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Obj, MeshFault> {
+    let mut words = Tokens::new(bytes);
     let mut reader = Reader {
         normals_wanted,
         ..Reader::default()
@@ -54,7 +54,7 @@ struct Reader {
     /// Corners of the current face.
     corners: Vec<[u32; 3]>,
     face: Vec<u32>,
-    draft: Draft,
+    draft: RawMesh,
     numbers: HashMap<Group, u32>,
     /// Group of the following faces.
     group: Group,
@@ -65,7 +65,7 @@ struct Reader {
 }
 
 impl Reader {
-    fn statement(&mut self, keyword: &[u8], words: &mut Words) -> Result<(), Fault> {
+    fn statement(&mut self, keyword: &[u8], words: &mut Tokens) -> Result<(), MeshFault> {
         match keyword {
             b"v" => {
                 let position = position(words).unwrap_or_else(|fault| {
@@ -105,15 +105,15 @@ impl Reader {
             b"mtllib" => {
                 let names = words.name();
                 if !names.is_empty() && !self.libraries.contains(&names) {
-                    if self.libraries.len() >= MOST_LIBRARIES {
-                        return Err(words.fault(format!("there must be at most {MOST_LIBRARIES} files of materials")));
+                    if self.libraries.len() >= MAX_LIBRARIES {
+                        return Err(words.fault(format!("there must be at most {MAX_LIBRARIES} files of materials")));
                     }
                     self.libraries.push(names);
                 }
             }
             _ => {
                 let name = shown(keyword);
-                if self.unknown.len() < MOST_KEYWORDS || self.unknown.contains_key(&name) {
+                if self.unknown.len() < MAX_KEYWORDS || self.unknown.contains_key(&name) {
                     *self.unknown.entry(name).or_default() += 1;
                 }
             }
@@ -121,7 +121,7 @@ impl Reader {
         Ok(())
     }
 
-    fn face(&mut self, words: &mut Words) -> Result<(), Fault> {
+    fn face(&mut self, words: &mut Tokens) -> Result<(), MeshFault> {
         if self.is_new || self.draft.runs.is_empty() {
             self.begin();
         }
@@ -150,12 +150,12 @@ impl Reader {
     }
 
     /// Reads the colour after a position, in sRGB as MeshLab and Blender write it.
-    fn color(&mut self, words: &mut Words) {
+    fn color(&mut self, words: &mut Tokens) {
         let mut values = [0.0; 3];
         let mut count = 0;
         while let Some(word) = words.on_line() {
             if let Some(value) = values.get_mut(count) {
-                *value = words::number(word).unwrap_or(f64::NAN);
+                *value = tokens::number(word).unwrap_or(f64::NAN);
             }
             count += 1;
         }
@@ -194,7 +194,7 @@ impl Reader {
 
     /// Returns the position, texture coordinate and normal indices of a corner. The error is the value and the rule.
     #[inline]
-    fn corner(&mut self, word: &[u8], place: Place) -> Result<[u32; 3], String> {
+    fn corner(&mut self, word: &[u8], place: Location) -> Result<[u32; 3], String> {
         let mut parts = [&word[..0]; 3];
         for (i, part) in word.split(|byte| *byte == b'/').enumerate() {
             match parts.get_mut(i) {
@@ -265,7 +265,7 @@ impl Reader {
     }
 }
 
-fn position(words: &mut Words) -> Result<DVec3, Fault> {
+fn position(words: &mut Tokens) -> Result<DVec3, MeshFault> {
     let mut x = [0.0; 3];
     for (x, name) in x.iter_mut().zip(["x", "y", "z"]) {
         let value = words.number(name)?;
@@ -274,22 +274,24 @@ fn position(words: &mut Words) -> Result<DVec3, Fault> {
     Ok(x.into())
 }
 
-fn numbers(words: &mut Words) -> Result<DVec3, Fault> {
+fn numbers(words: &mut Tokens) -> Result<DVec3, MeshFault> {
     Ok(DVec3::new(words.number("x")?, words.number("y")?, words.number("z")?))
 }
 
-fn uv(words: &mut Words) -> Result<Vec2, Fault> {
+fn uv(words: &mut Tokens) -> Result<Vec2, MeshFault> {
     let u = words.number("u")?;
     // v is optional (1D textures).
     let v = match words.on_line() {
-        Some(word) => words::number(word).ok_or_else(|| words.fault(format!("v: {} must be a number", shown(word))))?,
+        Some(word) => {
+            tokens::number(word).ok_or_else(|| words.fault(format!("v: {} must be a number", shown(word))))?
+        }
         None => 0.0,
     };
     let check = |name: &str, x| texture_coordinate(x).map_err(|rule| words.fault(format!("{name}: {rule}")));
     Ok(Vec2::new(check("u", u)?, check("v", v)?))
 }
 
-fn has_room(count: usize, words: &Words) -> Result<(), Fault> {
+fn has_room(count: usize, words: &Tokens) -> Result<(), MeshFault> {
     match count < MOST {
         true => Ok(()),
         false => Err(words.fault(format!("there must be at most {MOST} vertices"))),

@@ -11,14 +11,14 @@ use glam::{DVec3, Vec2, Vec4};
 use self::header::{Element, Format, Header, Property, Scalar, header};
 use self::values::{Ascii, Binary, Values};
 use super::damage::{self, Damages};
-use super::draft::{Draft, coordinate, texture_coordinate, unit};
-use super::error::{Fault, Place, shown_number};
-use super::words::Words;
+use super::error::{Location, MeshFault, shown_number};
+use super::raw_mesh::{RawMesh, coordinate, texture_coordinate, unit};
+use super::tokens::Tokens;
 use super::{Group, MOST};
 use wgray_image::color::srgb_to_linear;
 
-pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
-    let mut words = Words::new(bytes);
+pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<RawMesh, MeshFault> {
+    let mut words = Tokens::new(bytes);
     let mut damages = Damages::default();
     let header = header(&mut words, &mut damages)?;
     match header.format {
@@ -34,11 +34,17 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
     }
 }
 
-fn body(header: &Header, mut values: impl Values, normals_wanted: bool, damages: Damages) -> Result<Draft, Fault> {
+fn body(
+    header: &Header,
+    mut values: impl Values,
+    normals_wanted: bool,
+    damages: Damages,
+) -> Result<RawMesh, MeshFault> {
     let element = |name: &str| header.elements.iter().find(|element| element.name == name);
-    let vertices = element("vertex").ok_or_else(|| Place::File.fault("the header must have an element \"vertex\""))?;
+    let vertices =
+        element("vertex").ok_or_else(|| Location::File.fault("the header must have an element \"vertex\""))?;
     if element("face").is_none_or(|faces| faces.count == 0) {
-        return Err(Place::File.fault(match element("tristrips") {
+        return Err(Location::File.fault(match element("tristrips") {
             Some(_) => "has tristrips, which are not read: it must have an element \"face\"",
             None => "has no triangles: points and lines are not rendered",
         }));
@@ -47,9 +53,9 @@ fn body(header: &Header, mut values: impl Values, normals_wanted: bool, damages:
         let rule = format!("{} vertices; there must be at most {MOST}", vertices.count);
         return Err(vertices.place.fault(rule));
     }
-    let mut draft = Draft {
+    let mut draft = RawMesh {
         damages,
-        ..Draft::default()
+        ..RawMesh::default()
     };
     draft.groups.push(Group::default());
     draft.begin(0);
@@ -85,7 +91,7 @@ fn body(header: &Header, mut values: impl Values, normals_wanted: bool, damages:
 }
 
 /// Rejects counts beyond the rest of the file.
-fn check_size(element: &Element, values: &impl Values) -> Result<(), Fault> {
+fn check_size(element: &Element, values: &impl Values) -> Result<(), MeshFault> {
     let fewest = |property: &Property| values.fewest_bytes(property.count.unwrap_or(property.scalar));
     let row = element.properties.iter().map(fewest).sum::<usize>();
     let all = row as u128 * element.count as u128;
@@ -102,14 +108,14 @@ fn check_size(element: &Element, values: &impl Values) -> Result<(), Fault> {
 
 /// Ends a row; extra values on its line are damage.
 #[inline]
-fn end_row(values: &mut impl Values, draft: &mut Draft) {
+fn end_row(values: &mut impl Values, draft: &mut RawMesh) {
     if let Some(place) = values.end_row() {
         let rule = "the line has more values than the header declares";
         draft.damages.add(damage::REST, || place.fault(rule));
     }
 }
 
-fn skip(property: &Property, values: &mut impl Values) -> Result<(), Fault> {
+fn skip(property: &Property, values: &mut impl Values) -> Result<(), MeshFault> {
     let count = match property.count {
         Some(count) => list_length(count, property, values)?,
         None => 1,
@@ -118,7 +124,7 @@ fn skip(property: &Property, values: &mut impl Values) -> Result<(), Fault> {
 }
 
 #[inline]
-fn list_length(count: Scalar, property: &Property, values: &mut impl Values) -> Result<usize, Fault> {
+fn list_length(count: Scalar, property: &Property, values: &mut impl Values) -> Result<usize, MeshFault> {
     let place = values.place();
     let length = values.next(count)?;
     // Larger than any file.
@@ -165,8 +171,8 @@ fn read_vertices(
     element: &Element,
     values: &mut impl Values,
     normals_wanted: bool,
-    draft: &mut Draft,
-) -> Result<(), Fault> {
+    draft: &mut RawMesh,
+) -> Result<(), MeshFault> {
     // Column of each property, and presence of each column.
     let mut has = [false; 12];
     let columns: Vec<Option<usize>> = element
@@ -249,7 +255,12 @@ fn read_vertices(
     Ok(())
 }
 
-fn read_faces(element: &Element, values: &mut impl Values, vertices: usize, draft: &mut Draft) -> Result<(), Fault> {
+fn read_faces(
+    element: &Element,
+    values: &mut impl Values,
+    vertices: usize,
+    draft: &mut RawMesh,
+) -> Result<(), MeshFault> {
     let is_list = |property: &Property| property.count.is_some() && property.scalar.is_whole();
     let named = |property: &Property| ["vertex_indices", "vertex_index"].contains(&property.name.as_str());
     let indices = element

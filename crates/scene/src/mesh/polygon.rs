@@ -8,7 +8,7 @@ use earcut::Earcut;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::draft::{Draft, counted};
+use super::raw_mesh::{RawMesh, counted};
 
 /// Largest area of fan triangles outside of the polygon, relative to its area, at which the fan is kept.
 const AREA_TOLERANCE: f64 = 1e-6;
@@ -41,7 +41,7 @@ struct Form {
 }
 
 /// Replaces the fans of concave polygons, and adds notes about polygons that have no unique triangulation.
-pub(super) fn triangulate(draft: &mut Draft) {
+pub(super) fn triangulate(draft: &mut RawMesh) {
     let forms: Vec<Form> = (draft.polygons.par_iter())
         .map(|polygon| form(fan(&draft.triangles, polygon), &draft.positions))
         .collect();

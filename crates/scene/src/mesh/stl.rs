@@ -10,20 +10,20 @@ use hashbrown::{DefaultHashBuilder, HashTable};
 
 use super::Group;
 use super::damage;
-use super::draft::{Draft, coordinate, counted, unit};
-use super::error::{Fault, Place, shown};
-use super::words::Words;
+use super::error::{Location, MeshFault, shown};
+use super::raw_mesh::{RawMesh, coordinate, counted, unit};
+use super::tokens::Tokens;
 
 /// Sizes in bytes: the binary header, which ends with the triangle count, and a triangle.
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
-pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
+pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<RawMesh, MeshFault> {
     let count = bytes
         .get(HEADER - 4..HEADER)
         .map(|count| u32::from_le_bytes([count[0], count[1], count[2], count[3]]) as usize);
     let size = count.map(|count| HEADER as u64 + TRIANGLE as u64 * count as u64);
-    let is_text = Words::new(bytes)
+    let is_text = Tokens::new(bytes)
         .anywhere()
         .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     let mut facets = Facets {
@@ -45,14 +45,14 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
         }
         _ if is_text => text(bytes, &mut facets)?,
         Some(size) => {
-            return Err(Place::Byte(HEADER - 4).fault(format!(
+            return Err(Location::Byte(HEADER - 4).fault(format!(
                 "{} triangles take {size} bytes, and the file has {}: it is truncated, or not an STL file",
                 count.unwrap_or_default(),
                 bytes.len()
             )));
         }
         None => {
-            return Err(Place::File.fault(format!(
+            return Err(Location::File.fault(format!(
                 "must begin with \"solid\" or a header of {HEADER} bytes; it has {} bytes",
                 bytes.len()
             )));
@@ -61,7 +61,7 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
     Ok(facets.draft)
 }
 
-fn binary(bytes: &[u8], facets: &mut Facets) -> Result<(), Fault> {
+fn binary(bytes: &[u8], facets: &mut Facets) -> Result<(), MeshFault> {
     facets.draft.groups.push(Group::default());
     facets.draft.begin(0);
     let count = bytes.len() / TRIANGLE;
@@ -72,7 +72,7 @@ fn binary(bytes: &[u8], facets: &mut Facets) -> Result<(), Fault> {
     for (i, bytes) in bytes.chunks_exact(TRIANGLE).enumerate() {
         let number = |k: usize| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|byte| bytes[4 * k + byte])));
         let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
-        let place = |k: usize| Place::Byte(HEADER + TRIANGLE * i + 4 * k);
+        let place = |k: usize| Location::Byte(HEADER + TRIANGLE * i + 4 * k);
         let normal = vector(0);
         let vertices = [3, 6, 9].map(|k| facets.position(vector(k), |axis, rule| place(k + axis).fault(rule)));
         facets.push(normal, vertices, place(0))?;
@@ -80,8 +80,8 @@ fn binary(bytes: &[u8], facets: &mut Facets) -> Result<(), Fault> {
     Ok(())
 }
 
-fn text(bytes: &[u8], facets: &mut Facets) -> Result<(), Fault> {
-    let mut words = Words::new(bytes);
+fn text(bytes: &[u8], facets: &mut Facets) -> Result<(), MeshFault> {
+    let mut words = Tokens::new(bytes);
     while let Some(word) = words.anywhere() {
         if !word.eq_ignore_ascii_case(b"solid") {
             return Err(words.fault(format!("{} must be \"solid\", or the end of the file", shown(word))));
@@ -97,7 +97,7 @@ fn text(bytes: &[u8], facets: &mut Facets) -> Result<(), Fault> {
     Ok(())
 }
 
-fn solid(words: &mut Words, facets: &mut Facets) -> Result<(), Fault> {
+fn solid(words: &mut Tokens, facets: &mut Facets) -> Result<(), MeshFault> {
     loop {
         match words.anywhere() {
             Some(word) if word.eq_ignore_ascii_case(b"endsolid") => return Ok(()),
@@ -127,11 +127,11 @@ fn solid(words: &mut Words, facets: &mut Facets) -> Result<(), Fault> {
     }
 }
 
-fn vector(words: &mut Words) -> Result<DVec3, Fault> {
+fn vector(words: &mut Tokens) -> Result<DVec3, MeshFault> {
     Ok(DVec3::new(words.number("x")?, words.number("y")?, words.number("z")?))
 }
 
-fn expect(words: &mut Words, keyword: &str) -> Result<(), Fault> {
+fn expect(words: &mut Tokens, keyword: &str) -> Result<(), MeshFault> {
     match words.anywhere() {
         Some(word) if word.eq_ignore_ascii_case(keyword.as_bytes()) => Ok(()),
         Some(word) => Err(words.fault(format!("{} must be \"{keyword}\"", shown(word)))),
@@ -143,14 +143,14 @@ fn expect(words: &mut Words, keyword: &str) -> Result<(), Fault> {
 #[derive(Default)]
 struct Facets {
     normals_wanted: bool,
-    draft: Draft,
+    draft: RawMesh,
     vertices: HashTable<u32>,
     hasher: DefaultHashBuilder,
 }
 
 impl Facets {
     /// Returns a vertex; NaN skips the facet. `fault` gets the axis and the rule.
-    fn position(&mut self, p: DVec3, fault: impl FnOnce(usize, String) -> Fault) -> DVec3 {
+    fn position(&mut self, p: DVec3, fault: impl FnOnce(usize, String) -> MeshFault) -> DVec3 {
         for axis in 0..3 {
             if let Err(rule) = coordinate(p[axis]) {
                 self.draft.damages.add(damage::FACE, || fault(axis, rule));
@@ -160,7 +160,7 @@ impl Facets {
         p + DVec3::ZERO // -0 becomes +0, so that equal positions have equal bits
     }
 
-    fn push(&mut self, normal: DVec3, vertices: [DVec3; 3], place: Place) -> Result<(), Fault> {
+    fn push(&mut self, normal: DVec3, vertices: [DVec3; 3], place: Location) -> Result<(), MeshFault> {
         if !vertices.iter().all(|vertex| vertex.is_finite()) {
             return Ok(());
         }
@@ -170,7 +170,7 @@ impl Facets {
     }
 
     fn number(&mut self, position: DVec3, normal: Vec3) -> u32 {
-        let Draft { positions, normals, .. } = &mut self.draft;
+        let RawMesh { positions, normals, .. } = &mut self.draft;
         let bits = |p: DVec3, n: Vec3| {
             (
                 p.x.to_bits(),

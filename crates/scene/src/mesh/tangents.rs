@@ -12,7 +12,7 @@ use super::Mesh;
 use super::neighbours::Neighbours;
 
 /// Maximum number of vertices at a point to join, which compares all pairs.
-const MOST_JOINED: usize = 64;
+const MAX_JOINED: usize = 64;
 /// Cosine of the maximum angle between equal normals: 1 degree.
 const ONE_NORMAL: f64 = 0.9998;
 /// Cosine of the maximum angle between joined tangents: 60 degrees.
@@ -204,7 +204,7 @@ fn at_point(mesh: &Mesh, triangles: &[[u32; 3]], neighbours: &Neighbours, point:
     let joined = |sum: &Sum| {
         let others = sums
             .iter()
-            .filter(|other| other.vertex != sum.vertex && sums.len() <= MOST_JOINED && sum.goes_on_in(other));
+            .filter(|other| other.vertex != sum.vertex && sums.len() <= MAX_JOINED && sum.goes_on_in(other));
         (sum.vertex, others.fold(*sum, Sum::with).tangents())
     };
     sums.iter().map(joined).collect()
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn neither_size_nor_number_of_triangles_counts() {
+    fn tangents_do_not_depend_on_triangle_size_or_number() {
         // The texture direction changes at x = 0.
         let at_origin = |rim: &[Vec3]| {
             let positions: Vec<Vec3> = [Vec3::ZERO].iter().chain(rim).copied().collect();
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seam_of_the_normals_parts_tangents() {
+    fn normal_seams_split_tangents() {
         let with_normal = |normal: Vec3| {
             let mut mesh = bow(|p| Vec2::new(p.x, p.y - p.x.min(0.0)));
             mesh.triangles[1][0] = 5;
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn where_very_many_vertices_meet_each_is_by_itself() {
+    fn too_many_vertices_at_a_point_are_not_joined() {
         // A disk of triangles with separate centre vertices.
         let at_middle = |count: u32| {
             let rim = |i: u32| Vec2::from_angle(std::f32::consts::TAU * i as f32 / count as f32).extend(0.0);
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_meshes_and_those_without_texture_coordinates_have_none() {
+    fn flat_or_unmapped_meshes_have_no_tangents() {
         let mesh = bow(|p| p.truncate());
         let without = |uvs: bool| Mesh {
             uvs: if uvs { vec![] } else { mesh.uvs.clone() },

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
-use super::parts::{Broken, Kind, Part, Parts, Rest};
+use super::parts::{Kind, Part, Parts, Rest, SyntaxFault};
 use super::{Problems, Read, invalid, is_course, read, read_camera, read_file, tagged};
 use crate::defines::Defines;
 use crate::error::SceneError;
@@ -25,7 +25,7 @@ impl Description {
         if is_course(Path::new(origin)) {
             return Ok(None);
         }
-        let broken = |broken: Broken| broken.into_error(text, origin);
+        let broken = |broken: SyntaxFault| broken.into_error(text, origin);
         let parts = Parts::of(text);
         if let Some(large) = parts.too_large() {
             return Err(broken(large));
@@ -87,7 +87,7 @@ fn read_changed_part(
     at: &KeyPath,
     defines: &mut Defines,
     before: &Description,
-) -> Result<Option<Result<Description, Problems>>, Broken> {
+) -> Result<Option<Result<Description, Problems>>, SyntaxFault> {
     let (Some((_, mut table)), Some(step)) = (parts.read(part)?, at.0.get(1)) else {
         return Ok(None);
     };
@@ -121,7 +121,7 @@ fn read_changed_rest(
     parts: &Parts,
     defines: &mut Defines,
     before: &Description,
-) -> Result<Option<Result<Description, Problems>>, Broken> {
+) -> Result<Option<Result<Description, Problems>>, SyntaxFault> {
     let mut rest = parts.read_rest()?;
     if Kind::ALL.into_iter().any(|kind| rest.contains_key(kind.name())) {
         return Ok(None);

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-use self::parts::{Broken, Kind, LARGEST, Parts};
+use self::parts::{Kind, LARGEST, Parts, SyntaxFault};
 use self::table::{Read, read, read_tagged, remove, tagged};
 use super::defines::Defines;
 use super::description::tables;
@@ -42,7 +42,7 @@ impl Description {
 
     /// Parses a scene file in TOML with the defined values.
     pub(crate) fn parse_toml(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
-        let broken = |broken: Broken| broken.into_error(text, origin);
+        let broken = |broken: SyntaxFault| broken.into_error(text, origin);
         let parts = Parts::of(text);
         if let Some(large) = parts.too_large() {
             return Err(broken(large));
@@ -51,10 +51,10 @@ impl Description {
             Some(read) => read,
             None if text.len() > LARGEST => match defines.left() {
                 Some(key) => Err(defines.not_there(key).into()),
-                None => return Err(broken(Broken::whole(text))),
+                None => return Err(broken(SyntaxFault::whole(text))),
             },
             None => {
-                let mut file = toml::from_str(text).map_err(|error| broken(Broken::of(0, &error)))?;
+                let mut file = toml::from_str(text).map_err(|error| broken(SyntaxFault::of(0, &error)))?;
                 defines.restart();
                 let put = defines.put(&[], &mut file, |_| false);
                 put.map_err(Problems::from).and_then(|()| read_file(file))
@@ -217,7 +217,7 @@ fn read_camera(mut camera: Table) -> Read<CameraDescription> {
 }
 
 /// Parses a file part by part. Returns `None` if the parts depend on each other, so that the file must be parsed at once.
-fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Description, Problems>>, Broken> {
+fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Description, Problems>>, SyntaxFault> {
     let rest = parts.read_rest();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut names = BTreeSet::new();

@@ -2,7 +2,7 @@
 
 use crate::error::SceneError;
 use crate::key_path::cut;
-use wgray_image::visible::visible;
+use wgray_image::sanitize::escape_control;
 
 /// The message about bytes that are not text.
 pub const NOT_UTF8: &str = "not valid UTF-8";
@@ -24,7 +24,7 @@ pub fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> Scene
         origin: origin.to_owned(),
         line: line_number(text, at),
         column: text[line_start(text, at)..at].chars().count() + 1,
-        message: visible(message).into_owned(),
+        message: escape_control(message).into_owned(),
     }
 }
 

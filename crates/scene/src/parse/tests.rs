@@ -27,10 +27,10 @@ fn message(text: &str) -> String {
 }
 
 #[test]
-fn bad_text_is_told_with_its_line() {
+fn invalid_text_is_reported_with_its_line() {
     Scene::parse(START, "s.toml").unwrap();
     // The appended text, the line of the error in it, and the message.
-    for (added, line, told) in [
+    for (added, line, rule) in [
         (
             "far = 3",
             1,
@@ -256,12 +256,12 @@ fn bad_text_is_told_with_its_line() {
     ] {
         let line = START.lines().count() + line;
         let found = message(&format!("{START}{added}"));
-        assert_eq!(found.lines().next(), Some(&*format!("s.toml:{line}: {told}")));
+        assert_eq!(found.lines().next(), Some(&*format!("s.toml:{line}: {rule}")));
     }
 }
 
 #[test]
-fn a_missing_section_or_key_is_told_at_the_table_it_belongs_to() {
+fn missing_keys_are_reported_at_their_table() {
     assert_eq!(message(""), "s.toml:1: the scene has no [image] table");
     assert_eq!(
         message(&START.replace("fov = 45", "")),
@@ -272,8 +272,8 @@ fn a_missing_section_or_key_is_told_at_the_table_it_belongs_to() {
 }
 
 #[test]
-fn text_that_is_no_toml_is_told_with_line_and_column() {
-    for (added, told) in [
+fn invalid_toml_is_reported_with_line_and_column() {
+    for (added, rule) in [
         ("é = 3", "8:1: "),
         ("up = [0, 1", "8:11: "),
         ("fov = 46", "8:1: duplicate key: fov = 46"),
@@ -281,13 +281,13 @@ fn text_that_is_no_toml_is_told_with_line_and_column() {
         ("focal_length = 1e999", "8:16: "),
     ] {
         let message = message(&format!("{START}{added}"));
-        assert!(message.starts_with(&format!("s.toml:{told}")), "{message}");
+        assert!(message.starts_with(&format!("s.toml:{rule}")), "{message}");
         assert_eq!(message.lines().count(), 1, "{message}");
     }
 }
 
 #[test]
-fn every_prefix_of_a_scene_is_read_or_refused_without_panic() {
+fn truncated_scenes_do_not_panic() {
     let text = include_str!("../../../../scenes/cornell.toml");
     let good = |end: usize| Scene::parse(&text[..end], "s.toml").is_ok();
     let count = (0..text.len())
@@ -441,7 +441,7 @@ fn a_number_of_samples_stands_for_a_table() {
             .unwrap()
             .render
     );
-    for (line, told) in [
+    for (line, rule) in [
         (
             "pixel_samples = 0",
             "s.toml:4: render.pixel_samples.count: 0 must be from 1 to 65536",
@@ -467,12 +467,12 @@ fn a_number_of_samples_stands_for_a_table() {
             "s.toml:4: render.pixel_samples: [4] must be a whole number from 1 to 65536, or a table such as {",
         ),
         (
-            "pixel_samples = { count = 4, pattrn = 'grid' }",
-            "s.toml:4: render.pixel_samples.pattrn: unknown key; did you",
+            "pixel_samples = { count = 4, pattxrn = 'grid' }",
+            "s.toml:4: render.pixel_samples.pattxrn: unknown key; did you",
         ),
     ] {
         let message = scene(line).unwrap_err();
-        assert!(message.starts_with(told), "{message}\n{told}");
+        assert!(message.starts_with(rule), "{message}\n{rule}");
     }
     let define = |define: &str| {
         let overrides = Overrides {
@@ -493,7 +493,7 @@ fn a_number_of_samples_stands_for_a_table() {
 }
 
 #[test]
-fn tangents_are_along_x_or_y_where_a_shape_names_none() {
+fn default_tangents_are_along_x_or_y() {
     let scene = |normal: &str, tangent: &str| {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\
@@ -521,8 +521,8 @@ fn tangents_are_along_x_or_y_where_a_shape_names_none() {
 }
 
 #[test]
-fn misspelled_names_are_answered_with_similar_ones() {
-    let told = |more: &str| {
+fn misspelled_names_get_suggestions() {
+    let error_of = |more: &str| {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\
              materials.yellow = {{ type = 'mirror' }}\n{more}"
@@ -540,8 +540,8 @@ fn misspelled_names_are_answered_with_similar_ones() {
             "s.toml:4: shapes[0].material: there is no material \"yellwo\"; did you mean \"yellow\"?",
         ),
     ] {
-        assert_eq!(told(more), message);
+        assert_eq!(error_of(more), message);
     }
-    let message = told("shapes = [{ type = 'spher' }]");
+    let message = error_of("shapes = [{ type = 'spher' }]");
     assert!(message.ends_with("\"gltf\"; did you mean \"sphere\"?"), "{message}");
 }

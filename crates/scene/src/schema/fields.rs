@@ -87,9 +87,9 @@ pub struct Names {
 }
 
 /// Maximum number of choices.
-const MOST_CHOICES: usize = 200;
+const MAX_CHOICES: usize = 200;
 /// Maximum number of elements of a list of lists or tables that get fields.
-const MOST_ELEMENTS: usize = 32;
+const MAX_ELEMENTS: usize = 32;
 
 impl Names {
     /// Returns the section that contains the allowed names of a key.
@@ -131,7 +131,7 @@ pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
     let Some(schema) = schema_of(whole, object, table) else {
         return Vec::new();
     };
-    let mut found = Found {
+    let mut found = FieldList {
         names,
         object: object.0.len(),
         fields: Vec::new(),
@@ -140,7 +140,7 @@ pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
     found.look(
         schema,
         &mut path,
-        &Place {
+        &FieldContext {
             value: Some(table),
             default: None,
             required: true,
@@ -171,22 +171,22 @@ fn schema_of<'a>(whole: &'a Json, object: &KeyPath, table: &Value) -> Option<&'a
     whole.get("$defs")?.get(definition(section.trim_end_matches('s'), tag))
 }
 
-struct Place<'a> {
+struct FieldContext<'a> {
     value: Option<&'a Value>,
     default: Option<&'a Json>,
     required: bool,
     about: &'a str,
 }
 
-struct Found<'a> {
+struct FieldList<'a> {
     names: &'a Names,
     /// Length of the object's path.
     object: usize,
     fields: Vec<Field>,
 }
 
-impl Found<'_> {
-    fn look(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &Place) {
+impl FieldList<'_> {
+    fn look(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &FieldContext) {
         let mut branches = Vec::new();
         alternatives(schema, &mut branches);
         let Some(chosen) = choose(&branches, place) else {
@@ -196,7 +196,7 @@ impl Found<'_> {
             Some(own) => own,
             None => place.about,
         };
-        let place = Place { about, ..*place };
+        let place = FieldContext { about, ..*place };
         match chosen.get("type").and_then(Json::as_str) {
             Some("object") => self.look_into(chosen, path, &place),
             Some("array") => self.look_at_list(chosen, path, &place),
@@ -217,7 +217,7 @@ impl Found<'_> {
         }
     }
 
-    fn look_into(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &Place) {
+    fn look_into(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &FieldContext) {
         let table = place.value.and_then(Value::as_table);
         let required = required_keys(schema, table);
         for (key, of_key) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
@@ -233,7 +233,7 @@ impl Found<'_> {
                 (own, _) => own,
             };
             path.push(Segment::from(key.as_str()));
-            let place = Place {
+            let place = FieldContext {
                 value: table.and_then(|table| table.get(key)),
                 default,
                 required: table.is_some() && required.contains(&key.as_str()),
@@ -243,9 +243,9 @@ impl Found<'_> {
             path.pop();
         }
         if let Some(of_key) = schema.get("additionalProperties").filter(|of_key| of_key.is_object()) {
-            for (key, value) in table.into_iter().flatten().take(MOST_ELEMENTS) {
+            for (key, value) in table.into_iter().flatten().take(MAX_ELEMENTS) {
                 path.push(Segment::from(key.as_str()));
-                let place = Place {
+                let place = FieldContext {
                     value: Some(value),
                     default: None,
                     required: false,
@@ -257,7 +257,7 @@ impl Found<'_> {
         }
     }
 
-    fn look_at_list(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &Place) {
+    fn look_at_list(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &FieldContext) {
         let Some(items) = schema.get("items") else { return };
         if let Some("number" | "integer") = items.get("type").and_then(Json::as_str) {
             let is_color = kind_of(schema).0.starts_with(COLOR);
@@ -265,13 +265,13 @@ impl Found<'_> {
             return self.add(kind, schema, path, place);
         }
         let elements = place.value.and_then(Value::as_array);
-        for (i, value) in elements.into_iter().flatten().enumerate().take(MOST_ELEMENTS) {
+        for (i, value) in elements.into_iter().flatten().enumerate().take(MAX_ELEMENTS) {
             path.push(Segment::from(i));
             let about = place.about;
             self.look(
                 items,
                 path,
-                &Place {
+                &FieldContext {
                     value: Some(value),
                     default: None,
                     required: true,
@@ -282,7 +282,7 @@ impl Found<'_> {
         }
     }
 
-    fn add(&mut self, kind: Kind, schema: &Json, path: &[Segment], place: &Place) {
+    fn add(&mut self, kind: Kind, schema: &Json, path: &[Segment], place: &FieldContext) {
         let key = KeyPath(path.to_vec());
         let numbers = schema.get("items").unwrap_or(schema);
         let value = place.value.map(json_of);
@@ -301,7 +301,7 @@ impl Found<'_> {
             None if kind == Kind::Text => self
                 .names
                 .of(path)
-                .map(|names| names.iter().take(MOST_CHOICES).cloned().collect()),
+                .map(|names| names.iter().take(MAX_CHOICES).cloned().collect()),
             None => None,
         };
         let is_choice = choices.is_some();
@@ -427,7 +427,7 @@ fn alternatives<'a>(schema: &'a Json, found: &mut Vec<&'a Json>) {
 }
 
 /// Returns the alternative for a value or its default, else the first.
-fn choose<'a>(branches: &[&'a Json], place: &Place) -> Option<&'a Json> {
+fn choose<'a>(branches: &[&'a Json], place: &FieldContext) -> Option<&'a Json> {
     let named = |branch: &Json, names: &[&str]| {
         let name = branch.get("type").and_then(Json::as_str);
         name.is_some_and(|name| names.contains(&name))

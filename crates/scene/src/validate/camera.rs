@@ -282,9 +282,9 @@ mod tests {
     fn without_a_frame_the_camera_is_that_of_the_first_keys() {
         let path = "[camera.path]\ninterpolation = 'smooth'\nkeys = [{ frame = 3, look_at = [1, 0, 0] }, \
                     { frame = 4, position = [0, -4, 2], fov = 30, look_at = [2, 0, 0] }]\n";
-        let by_itself = scene(path).unwrap();
-        assert_eq!(by_itself.camera, by_itself.camera_at(3.0).unwrap());
-        assert_eq!(by_itself.camera.look_at, DVec3::X);
+        let standalone_prim = scene(path).unwrap();
+        assert_eq!(standalone_prim.camera, standalone_prim.camera_at(3.0).unwrap());
+        assert_eq!(standalone_prim.camera.look_at, DVec3::X);
         let partly = scene(&format!("[camera]\nfov = 60\n{path}")).unwrap();
         assert_eq!(
             partly.camera.projection,
@@ -292,7 +292,7 @@ mod tests {
                 fov: 60_f64.to_radians()
             }
         );
-        assert_eq!(partly.camera_at(0.0).unwrap(), by_itself.camera);
+        assert_eq!(partly.camera_at(0.0).unwrap(), standalone_prim.camera);
         let parallel = "[camera]\ntype = 'orthographic'\n[[camera.path.keys]]\nframe = 0\nposition = [0, -1, 0]\n\
                         look_at = [0, 0, 0]\nheight = 2\n[[camera.path.keys]]\nframe = 1\nheight = 4\n";
         let parallel = scene(parallel).unwrap();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{BTreeMap, Checked, Problem};
 use crate::decode::Header;
-use crate::image_file::{File, Part, Place};
+use crate::image_file::{AssetKey, File, Part};
 use crate::texture::{levels, words, words_around};
 use crate::{Assets, Image, ImageTextureDescription, Texels};
 
@@ -17,7 +17,7 @@ pub(super) struct Images<'a> {
     /// False if the scene is invalid already: 1 x 1 images then replace those of files.
     pub(super) reads_files: bool,
     /// Images by location, each with its size in 32-bit words.
-    files: BTreeMap<Place, Vec<(File, u64)>>,
+    files: BTreeMap<AssetKey, Vec<(File, u64)>>,
     /// Size of all images in bytes.
     taken: u64,
     /// Warnings about damaged files, without duplicates.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-use super::super::image_file::Place;
+use super::super::image_file::AssetKey;
 use super::super::key_path::cut;
 use super::super::limits::{FARTHEST, LENGTHS, SCALES, TURNS};
 use super::super::mesh_file;
@@ -21,7 +21,7 @@ use super::{At, Checked, Collector, FLATTEST, Problem, between, check, list, num
 use crate::mesh::{Group, Mesh, Normals};
 
 /// Maximum number of groups of all shapes.
-const MOST_GROUPS: usize = 1 << 24;
+const MAX_GROUPS: usize = 1 << 24;
 
 /// The materials and files that shapes refer to.
 pub(super) struct SceneLookup<'a> {
@@ -114,8 +114,8 @@ pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
         _ => 0,
     });
     let groups: usize = groups.sum();
-    check(groups <= MOST_GROUPS, || {
-        format!("the meshes have {groups} groups together; they must be at most {MOST_GROUPS}")
+    check(groups <= MAX_GROUPS, || {
+        format!("the meshes have {groups} groups together; they must be at most {MAX_GROUPS}")
     })
 }
 
@@ -152,7 +152,7 @@ fn load(file: &str, normals: Option<Normals>, known: &mut SceneLookup) -> Checke
         };
     }
     let place = known.assets.find(file).at("file")?;
-    let Place::File(path) = place else {
+    let AssetKey::File(path) = place else {
         return Err(Problem::new(format!("{file:?} is an image in memory, and no mesh"))).at("file");
     };
     if !known.reads_files {
@@ -264,14 +264,14 @@ fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Sc
 /// Returns the warning about materials that are named in a file but not defined.
 fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String {
     /// Maximum number of names in the message.
-    const MOST_NAMES: usize = 8;
-    let shown = missing.iter().take(MOST_NAMES);
+    const MAX_NAMES: usize = 8;
+    let shown = missing.iter().take(MAX_NAMES);
     let mut names = shown
         .map(|name| format!("{:?}", cut(name)))
         .collect::<Vec<_>>()
         .join(", ");
-    if missing.len() > MOST_NAMES {
-        names += &format!(" and {} more", missing.len() - MOST_NAMES);
+    if missing.len() > MAX_NAMES {
+        names += &format!(" and {} more", missing.len() - MAX_NAMES);
     }
     let why = match mesh.libraries.as_slice() {
         [] => "the file names no MTL file".to_owned(),

@@ -31,7 +31,7 @@ use self::texture::Textures;
 use super::key_path::cut;
 use super::key_path::list;
 use super::limits::{
-    CLAMPS, COLORS, DEEPEST, FARTHEST, FILTER_RADII, LEAST_ADAPTIVE, LENGTHS, MOST, SHADOW_EPSILONS, SHARES,
+    CLAMPS, COLORS, DEEPEST, FARTHEST, FILTER_RADII, LENGTHS, MIN_ADAPTIVE_SAMPLES, MOST, SHADOW_EPSILONS, SHARES,
 };
 use super::problem::{At, Collector, Problem, Problems, both};
 use super::suggest::Suggestions;
@@ -322,7 +322,7 @@ pub(super) fn adaptive(
     let error = adaptive_error(description.error).at("error")?;
     let most = description.max_samples;
     let most = most.unwrap_or(count.saturating_mul(16).min(MOST));
-    let least = count.max(LEAST_ADAPTIVE); // one sample gives no error estimate
+    let least = count.max(MIN_ADAPTIVE_SAMPLES); // one sample gives no error estimate
     check((least..=MOST).contains(&most), || {
         format!("{most} must be from {least} to {MOST}, and at least the count of pixel_samples")
     })

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::image_file::{Part, Place};
+use super::super::image_file::{AssetKey, Part};
 use super::super::key_path::{cut, cut_to};
 use super::super::limits::{BRIGHTEST, SHININESS};
 use super::super::{Color, ImageTextureDescription, Integrator, Material, Reflection, Texture};
@@ -36,12 +36,12 @@ pub(super) struct Looks<'a> {
     /// The folder that paths in messages are relative to, with symbolic links resolved.
     folder: PathBuf,
     /// The materials of each mesh, by its address.
-    meshes: HashMap<usize, Described>,
+    meshes: HashMap<usize, GroupMaterials>,
     integrator: Integrator,
     /// The materials by their file, line and attributes.
     known: HashMap<(PathBuf, usize, Traits), usize>,
     /// The textures of maps.
-    maps: BTreeMap<(Place, Part), usize>,
+    maps: BTreeMap<(AssetKey, Part), usize>,
     /// The first warning about each keyword of a file, and the number of materials that it applies to.
     warnings: BTreeMap<(PathBuf, String), (String, usize)>,
     /// The material of groups that have none, for meshes without and with colors; and its index once it is used.
@@ -60,7 +60,7 @@ struct Traits {
 }
 
 /// The materials of a mesh's groups.
-struct Described {
+struct GroupMaterials {
     /// For each group a file of materials and a material in it, if there is one.
     places: Vec<Option<(usize, usize)>>,
     /// For each group the scene's material, once requested.
@@ -111,7 +111,7 @@ impl<'a> Looks<'a> {
         if self.meshes.contains_key(&address) {
             return;
         }
-        self.meshes.insert(address, Described::of(mesh));
+        self.meshes.insert(address, GroupMaterials::of(mesh));
         for library in &mesh.libraries {
             let maps = library.materials.iter().flat_map(MtlMaterial::maps);
             let maps: BTreeSet<&String> = maps.collect();
@@ -346,8 +346,8 @@ impl Warnings {
     }
 }
 
-impl Described {
-    fn of(mesh: &Mesh) -> Described {
+impl GroupMaterials {
+    fn of(mesh: &Mesh) -> GroupMaterials {
         let mut by_name = HashMap::new();
         for (i, library) in mesh.libraries.iter().enumerate() {
             for (j, material) in library.materials.iter().enumerate() {
@@ -355,7 +355,7 @@ impl Described {
             }
         }
         let place = |name: &String| by_name.get(name.as_str()).copied();
-        Described {
+        GroupMaterials {
             places: mesh
                 .groups
                 .iter()

@@ -7,7 +7,7 @@ use super::super::{
 use super::{Checked, Color, DVec3, Material, Texture, check, cut, number};
 
 /// Maximum number of materials in a warning.
-const MOST_NAMES: usize = 8;
+const MAX_NAMES: usize = 8;
 /// Tolerance of a sum of two fractions, for rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -113,7 +113,7 @@ fn that(names: &[String], materials: &[Material], is_true: impl Fn(&Principled) 
 
 /// Joins names as `a, b and c`, truncated if they are many; `None` if empty.
 fn several(mut all: impl Iterator<Item = String>) -> Option<String> {
-    let mut shown: Vec<String> = all.by_ref().take(MOST_NAMES).collect();
+    let mut shown: Vec<String> = all.by_ref().take(MAX_NAMES).collect();
     match all.count() {
         0 => {}
         more => shown.push(format!("{more} more")),

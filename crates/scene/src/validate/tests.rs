@@ -96,7 +96,7 @@ fn with(line: &str, changed: &str) -> String {
 }
 
 #[test]
-fn a_good_scene_is_what_its_file_says() {
+fn a_valid_scene_has_the_values_of_its_file() {
     let scene = parse(GOOD).unwrap();
     assert_eq!((scene.width, scene.height), (8, 4));
     let camera = Camera {
@@ -158,7 +158,7 @@ fn a_good_scene_is_what_its_file_says() {
 }
 
 #[test]
-fn faces_of_a_tetrahedron_look_outwards_however_it_is_given() {
+fn tetrahedron_faces_point_outwards_for_any_vertex_order() {
     let line = "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]";
     let mirrored = "vertices = [[0, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 1]]";
     for text in [GOOD.to_owned(), with(line, mirrored)] {
@@ -369,11 +369,11 @@ const BAD: &[(&str, &str, &str)] = &[
 
 #[test]
 fn bad_values_are_told_with_line_key_value_and_rule() {
-    for &(line, bad, told) in BAD {
+    for &(line, bad, rule) in BAD {
         let text = with(line, bad);
         let place = text[..text.find(bad).unwrap()].lines().count() + 1;
         let message = parse(&text).unwrap_err().to_string();
-        assert_eq!(message, format!("s.toml:{place}: {told}"));
+        assert_eq!(message, format!("s.toml:{place}: {rule}"));
     }
 }
 
@@ -411,17 +411,17 @@ fn a_factor_without_color_is_missing() {
         .position(|line| line.starts_with("[materials.\"dark"))
         .unwrap()
         + 1;
-    let told = "is missing; set it or color";
-    assert_eq!(message, format!("s.toml:{line}: materials.\"dark red\".diffuse {told}"));
+    let rule = "is missing; set it or color";
+    assert_eq!(message, format!("s.toml:{line}: materials.\"dark red\".diffuse {rule}"));
 }
 
 #[test]
-fn a_scene_may_be_empty_but_not_name_a_material_that_is_not_there() {
+fn empty_scenes_are_valid_but_unknown_materials_are_not() {
     let empty = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
     assert_eq!(parse(empty).unwrap().shapes, []);
     let text = format!("{empty}[[shapes]]\ntype = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'a'\n");
-    let told = "s.toml:7: shapes[0].material: there is no material \"a\"; the scene has none";
-    assert_eq!(parse(&text).unwrap_err().to_string(), told);
+    let rule = "s.toml:7: shapes[0].material: there is no material \"a\"; the scene has none";
+    assert_eq!(parse(&text).unwrap_err().to_string(), rule);
 }
 
 #[test]
@@ -476,8 +476,8 @@ fn a_disk_has_the_radii_that_lengths_have() {
             assert!((disk.u.length() / radius - 1.0).abs() < 1e-12 && (disk.v.length() / radius - 1.0).abs() < 1e-12);
         }
     }
-    let told = scene("1.1e9", "[0, 0, 1]").unwrap_err();
-    assert!(told.contains("shapes[0].radius: 1.1e9 must be"), "{told}");
+    let rule = scene("1.1e9", "[0, 0, 1]").unwrap_err();
+    assert!(rule.contains("shapes[0].radius: 1.1e9 must be"), "{rule}");
 }
 
 #[test]
@@ -638,16 +638,16 @@ fn keys_and_types_of_all_entries_are_reported() {
     let text = "\
 [image]
 width = 4
-hight = 4
+heightt = 4
 [camera]
 fovv = 40
 [render]
 seed = 'x'
 [[shapes]]
 type = 'sphere'
-raduis = 1
+radiuss = 1
 [[shapes]]
-type = 'spere'
+type = 'spheree'
 [materials.a]
 color = [1, 1, 1]
 [[lights]]
@@ -656,11 +656,11 @@ position = [0, 0]
 color = [1, 1, 1]
 ";
     let wanted = [
-        "s.toml:3: image.hight: unknown key; did you mean \"height\"?",
+        "s.toml:3: image.heightt: unknown key; did you mean \"height\"?",
         "s.toml:5: camera.fovv: unknown key; did you mean \"fov\"?",
         "s.toml:7: render.seed: \"x\" must be a whole number from 0 to 4294967295",
-        "s.toml:10: shapes[0].raduis: unknown key; did you mean \"radius\"?",
-        "s.toml:12: shapes[1].type: \"spere\" must be one of",
+        "s.toml:10: shapes[0].radiuss: unknown key; did you mean \"radius\"?",
+        "s.toml:12: shapes[1].type: \"spheree\" must be one of",
         "s.toml:13: materials.a.type is missing",
         "s.toml:17: lights[0].position: [0, 0] must be a list of 3 numbers",
     ];
@@ -670,7 +670,7 @@ color = [1, 1, 1]
         assert!(found.starts_with(wanted), "{found}\n{wanted}");
     }
     // Without headers, the file is parsed as a whole.
-    let text = format!("{SMALL}shapes = [{{ type = 'a' }}, {{ type = 'sphere', raduis = 1 }}]\n[render]\nseeds = 3\n");
+    let text = format!("{SMALL}shapes = [{{ type = 'a' }}, {{ type = 'sphere', radiuss = 1 }}]\n[render]\nseeds = 3\n");
     assert_eq!(errors(&text).len(), 3);
 }
 

@@ -156,6 +156,6 @@ fn store(plane: &mut Plane, start: usize, line: &[u8]) {
         Plane::Whole(values) => put(&mut values[start..], line, u32::from_ne_bytes),
         Plane::Halves(values) => put(&mut values[start..], line, u16::from_ne_bytes),
         Plane::Floats(values) => put(&mut values[start..], line, f32::from_ne_bytes),
-        Plane::Bytes(_) | Plane::Words(_) | Plane::One => {} // not in OpenEXR
+        Plane::Bytes(_) | Plane::Shorts(_) | Plane::One => {} // not in OpenEXR
     }
 }

@@ -52,7 +52,7 @@ pub enum Plane {
     /// 255 is 1.
     Bytes(Vec<u8>),
     /// 65,535 is 1.
-    Words(Vec<u16>),
+    Shorts(Vec<u16>),
     /// Unscaled integers.
     Whole(Vec<u32>),
     /// Bits of half-precision floats.
@@ -68,7 +68,7 @@ impl Plane {
     pub fn values(&self, pixels: Range<usize>, to: &mut [f64]) {
         match self {
             Plane::Bytes(values) => copy(&values[pixels], to, |value| f64::from(value) / 255.0),
-            Plane::Words(values) => copy(&values[pixels], to, |value| f64::from(value) / 65_535.0),
+            Plane::Shorts(values) => copy(&values[pixels], to, |value| f64::from(value) / 65_535.0),
             Plane::Whole(values) => copy(&values[pixels], to, f64::from),
             Plane::Halves(values) => copy(&values[pixels], to, |value| f64::from(f16::from_bits(value).to_f32())),
             Plane::Floats(values) => copy(&values[pixels], to, f64::from),
@@ -88,7 +88,7 @@ impl Plane {
     pub fn is_plainly(&self, other: &Plane, pixels: Range<usize>) -> bool {
         match (self, other) {
             (Plane::Bytes(a), Plane::Bytes(b)) => a[pixels.clone()] == b[pixels],
-            (Plane::Words(a), Plane::Words(b)) => a[pixels.clone()] == b[pixels],
+            (Plane::Shorts(a), Plane::Shorts(b)) => a[pixels.clone()] == b[pixels],
             (Plane::One, Plane::One) => true,
             _ => false,
         }
@@ -191,6 +191,6 @@ fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8,
     if bits == 8 {
         Plane::Bytes(bytes)
     } else {
-        Plane::Words(words)
+        Plane::Shorts(words)
     }
 }

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
 
 use super::{Channel, Kind, Picture, Plane};
+use crate::blocking_path;
 use crate::memory::fallible;
-use crate::waiting;
 
 /// Memory limit of a decoder in addition to the image, in bytes.
 const BESIDE: usize = 64 << 20;
@@ -96,7 +96,7 @@ impl Picture {
             io::stdin().lock().read_to_end(&mut bytes)?;
             return Picture::decode(bytes, u64::MAX);
         }
-        waiting::check(path)?;
+        blocking_path::reject(path)?;
         let mut file = File::open(path)?;
         let data = file.metadata()?;
         if data.is_dir() {
@@ -274,7 +274,7 @@ impl Planes {
         let bits = if self.bytes.is_empty() { 16 } else { 8 };
         let bytes = self.bytes.into_iter().map(Plane::Bytes);
         let planes: Vec<_> = bytes
-            .chain(self.words.into_iter().map(Plane::Words))
+            .chain(self.words.into_iter().map(Plane::Shorts))
             .map(Arc::new)
             .collect();
         // Gray images share one plane among R, G and B.

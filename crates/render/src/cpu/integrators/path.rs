@@ -101,16 +101,16 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     if hit.primitive == NO_INDEX {
         state.ended = true;
         let shown = ((s.alpha == 0) & (s.environment_flags & ENVIRONMENT_INVISIBLE == 0)) | (path.depth > 0);
-        let arriving = if s.environment_flags & ENVIRONMENT_MAP != 0 {
+        let environment_light = if s.environment_flags & ENVIRONMENT_MAP != 0 {
             environment_mis(scene, path.ray.direction, state.pdf, state.prev_normal)
         } else {
             scene.environment.radiance
         };
-        let arriving = match s.environment_flags & BACKGROUND != 0 && path.depth == 0 {
+        let environment_light = match s.environment_flags & BACKGROUND != 0 && path.depth == 0 {
             true => scene.environment.background,
-            false => arriving,
+            false => environment_light,
         };
-        let found = path.throughput * arriving;
+        let found = path.throughput * environment_light;
         return add_radiance(scene, state, found, shown, path.depth);
     }
     let prim = fetch_hit_primitive(scene, hit);
@@ -141,7 +141,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
             surface.side,
         )
     {
-        return past(scene, state, surface, at, hit.t);
+        return continue_through(scene, state, surface, at, hit.t);
     }
     if s.absorption != 0 {
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
@@ -292,35 +292,35 @@ pub fn add_emission(
     hit: Hit,
     surface: Surface,
     material: &Material,
-    met: bool,
+    is_hit: bool,
 ) {
     let one_sided = material.kind == EMITTER;
-    let shines = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
-    if !(met & shines) {
+    let is_emissive = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
+    if !(is_hit & is_emissive) {
         return;
     }
     let mut weight = 1.0;
-    let mut weighs = (state.pdf > 0.0) & (scene.specialization.emitters != 0);
+    let mut uses_mis = (state.pdf > 0.0) & (scene.specialization.emitters != 0);
     let mut density = material.density;
     if scene.specialization.light_tree != 0 {
-        density = light_tree_pdf(scene, hit, weighs, state.prev_position, state.prev_normal);
-        weighs &= density > 0.0;
+        density = light_tree_pdf(scene, hit, uses_mis, state.prev_position, state.prev_normal);
+        uses_mis &= density > 0.0;
     }
-    if weighs {
+    if uses_mis {
         let mut ray = state.path.ray;
-        let mut seen = hit;
+        let mut from_previous = hit;
         if scene.specialization.alpha_surfaces != 0 {
             ray.origin -= ray.direction * state.skipped_distance;
-            seen.t += state.skipped_distance;
+            from_previous.t += state.skipped_distance;
         }
-        let other = emitter_pdf(prim, seen, density, ray, surface.normal);
+        let other = emitter_pdf(prim, from_previous, density, ray, surface.normal);
         weight = power_heuristic(state.pdf, other);
     }
     let found = state.path.throughput * material.emission * weight;
     add_radiance(scene, state, found, true, state.path.depth)
 }
 
-pub fn past(scene: &Packed, state: &mut PathState, surface: Surface, at: HitDifferential, t: f32) {
+pub fn continue_through(scene: &Packed, state: &mut PathState, surface: Surface, at: HitDifferential, t: f32) {
     state.path = pass_through_path(state.path, surface, at);
     if scene.specialization.camera_invisible != 0 && state.path.depth == 0 {
         let start = state.path.ray;
@@ -374,12 +374,12 @@ pub fn sample_delta_bsdf(
             reflected_path(state.path, surface, at, state.path.throughput)
         }
     } else {
-        let mut onward = mirrored_path(state.path, surface, at, material).primary;
+        let mut continued = mirrored_path(state.path, surface, at, material).primary;
         if material.kind == METAL {
             let cosine = dot(surface.wo, surface.shading_normal);
-            onward.throughput = state.path.throughput * metal_fresnel(material, cosine);
+            continued.throughput = state.path.throughput * metal_fresnel(material, cosine);
         }
-        onward
+        continued
     };
     path.ray.direction = normalize(path.ray.direction);
     state.path = path;
@@ -426,13 +426,13 @@ pub fn add_direct_light(
         power_heuristic(light.pdf, reflected.pdf)
     };
     let most = largest(found);
-    let dark = !(wanted && most > 0.0 && most < INFINITE_T);
+    let is_dark = !(wanted && most > 0.0 && most < INFINITE_T);
     if scene.specialization.alpha_surfaces != 0 {
         let bounce = state.path.depth + 1;
         let (t_max, target_prim) = (light.t_max, light.primitive);
         let occluded = is_occluded_alpha(
             scene,
-            dark,
+            is_dark,
             from_side,
             to,
             t_max,
@@ -443,7 +443,7 @@ pub fn add_direct_light(
         );
         return add_radiance(scene, state, found, !occluded, bounce);
     }
-    let occluded = is_occluded(scene, dark, from_side, to, light.t_max, light.primitive);
+    let occluded = is_occluded(scene, is_dark, from_side, to, light.t_max, light.primitive);
     add_radiance(scene, state, found, !occluded, state.path.depth + 1)
 }
 

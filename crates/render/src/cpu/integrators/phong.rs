@@ -45,9 +45,9 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
     }
     let mut sum = Vec3::ZERO;
     let mut pending = [path; MAX_SPLIT_DEPTH as usize];
-    let mut waiting = 0;
+    let mut pending_count = 0;
     for _ in 0..MAX_PATH_LEAVES {
-        let mut seen = scene.environment.background;
+        let mut radiance = scene.environment.background;
         while path.depth <= bounces {
             let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
             if hit.primitive == NO_INDEX {
@@ -55,25 +55,25 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
             }
             let prim = fetch_hit_primitive(scene, hit);
             if !is_specular(material_of(scene, &prim)) {
-                seen = radiance_from(scene, &prim, hit, path, pixel, sample);
+                radiance = radiance_from(scene, &prim, hit, path, pixel, sample);
                 break;
             }
             if path.depth == bounces {
                 break;
             }
-            let scattered = scatter(scene, &prim, hit, path, pixel, sample);
-            path = scattered.primary;
-            if scattered.splits {
-                pending[waiting] = scattered.secondary;
-                waiting += 1;
+            let split = scatter(scene, &prim, hit, path, pixel, sample);
+            path = split.primary;
+            if split.splits {
+                pending[pending_count] = split.secondary;
+                pending_count += 1;
             }
         }
-        sum += path.throughput * seen;
-        if waiting == 0 {
+        sum += path.throughput * radiance;
+        if pending_count == 0 {
             break;
         }
-        waiting -= 1;
-        path = pending[waiting];
+        pending_count -= 1;
+        path = pending[pending_count];
     }
     sum
 }

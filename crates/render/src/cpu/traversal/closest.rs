@@ -9,10 +9,10 @@ use fearless_simd::prelude::*;
 use super::four::Four;
 use super::line::greater;
 use super::{Line, Mesh, Nearest, limit_from};
-use crate::bvh::{MOST_LEVELS, Node};
+use crate::bvh::{BUILD_MAX_DEPTH, Node};
 
 /// Maximum number of nodes on the stack: each level pops one and pushes up to 8.
-pub const STACK: usize = MOST_LEVELS as usize * 7 + 1;
+pub const STACK: usize = BUILD_MAX_DEPTH as usize * 7 + 1;
 
 /// Decodes one side of all child boxes along an axis, `side` being `Node::low` or `Node::high`, like the accessors of a
 /// single child.

@@ -16,7 +16,7 @@ use crate::bvh::{Aabb, Node};
 const FEW: u32 = 6;
 
 /// Maximum number of SIMD vectors for all segments: the narrowest have four lanes.
-const MOST_LANES: usize = MOST / 4;
+const MAX_LANES: usize = MOST / 4;
 
 /// One SIMD vector of segments, in the order of their indices.
 #[derive(Clone, Copy)]
@@ -55,15 +55,15 @@ pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) 
         asked,
         #[inline(always)]
         |lanes, items, mask| {
-            let mut waiting = mask;
+            let mut pending = mask;
             for triangles in mesh.triangles[items].chunks(4) {
-                if waiting.count_ones() <= FEW {
+                if pending.count_ones() <= FEW {
                     let four = Four::new(simd, mesh, triangles);
-                    for i in bits_of(waiting) {
+                    for i in bits_of(pending) {
                         let (met, t) = four.met_by(simd, &line_at(lanes, i, &o, segments.pad));
                         for c in bits_of(met) {
                             if t[c] > 0.0 && t[c] < segments.t_max && triangles[c][3] != segments.skip {
-                                waiting &= !(1 << i);
+                                pending &= !(1 << i);
                             }
                         }
                     }
@@ -78,14 +78,14 @@ pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) 
                         &mesh.vertices[*b as usize],
                         &mesh.vertices[*c as usize],
                     ];
-                    waiting &= !in_lanes(
+                    pending &= !in_lanes(
                         lanes,
                         #[inline(always)]
                         |lanes| triangle_hides(simd, lanes, &o, segments, vertices),
                     );
                 }
             }
-            mask & !waiting
+            mask & !pending
         },
     )
 }
@@ -158,19 +158,19 @@ fn walk<S: Simd>(
     asked: u32,
     mut visit: impl FnMut(&[Lanes<S>], Range<usize>, u32) -> u32,
 ) -> u32 {
-    let mut waiting = asked & segments.directions.all();
-    if waiting == 0 {
+    let mut pending = asked & segments.directions.all();
+    if pending == 0 {
         return 0;
     }
-    let asked = waiting;
+    let asked = pending;
     let mut lanes = ArrayVec::new();
     let slopes = prepare(simd, segments, &mut lanes);
     let zero = f32x8::splat(simd, 0.0);
     let t_max = f32x8::splat(simd, segments.t_max);
     let mut stack: ArrayVec<(u32, u32), STACK> = ArrayVec::new();
-    stack.push((0, waiting));
+    stack.push((0, pending));
     while let Some((number, mask)) = stack.pop() {
-        let mask = mask & waiting;
+        let mask = mask & pending;
         if mask == 0 {
             continue;
         }
@@ -235,13 +235,13 @@ fn walk<S: Simd>(
             stack.push((node.first_child + before.count_ones(), children[c]));
         }
         for c in bits_of(any & !u32::from(node.inner)) {
-            let mask = children[c] & waiting;
+            let mask = children[c] & pending;
             if mask != 0 {
-                waiting &= !visit(&lanes, node.items(c), mask);
+                pending &= !visit(&lanes, node.items(c), mask);
             }
         }
     }
-    asked & !waiting
+    asked & !pending
 }
 
 #[inline(always)]
@@ -271,7 +271,7 @@ fn line_at<S: Simd>(lanes: &[Lanes<S>], place: usize, o: &[f32; 3], pad: f32) ->
 
 /// Arranges the segments in vectors and returns bounds on their directions.
 #[inline(always)]
-fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>, MOST_LANES>) -> [Slope; 3] {
+fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>, MAX_LANES>) -> [Slope; 3] {
     let one = S::f32s::splat(simd, 1.0);
     let mut bounds = [
         [S::f32s::splat(simd, f32::INFINITY); 3],

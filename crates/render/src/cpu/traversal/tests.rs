@@ -1,3 +1,5 @@
+//! Tests of the BVH traversals against brute force, for single rays and groups of segments, at every SIMD level.
+
 use std::ops::Range;
 
 use glam::{DVec3, Vec3};
@@ -108,7 +110,7 @@ impl Scene {
 
 /// Counts of outcomes, which show that a test covers all cases.
 #[derive(Debug, Default)]
-struct Seen {
+struct Visits {
     hits: u32,
     misses: u32,
     occluded: u32,
@@ -121,8 +123,8 @@ fn compare(
     random: &mut Random,
     count: usize,
     mut line: impl FnMut(&mut Random) -> (Vec3, Vec3),
-) -> Seen {
-    let mut seen = Seen::default();
+) -> Visits {
+    let mut seen = Visits::default();
     let levels = levels();
     for i in 0..count {
         let pad = [0.0, 1e-6, 1e-3][i % 3];
@@ -211,7 +213,7 @@ fn soups() {
 }
 
 #[test]
-fn nothing_at_all() {
+fn an_empty_scene() {
     let scene = Scene::new(&[], &[], 4);
     let line = Line::new(Vec3::ZERO, Vec3::X, 0.0);
     assert_eq!(closest(Level::new(), &scene.mesh(), &line, 0.0, u32::MAX, NONE), NONE);
@@ -271,7 +273,7 @@ fn edges_and_corners_of_a_grid() {
 }
 
 #[test]
-fn no_ray_slips_between_triangles() {
+fn no_ray_passes_between_adjacent_triangles() {
     let random = &mut Random(4);
     let scene = grid(16, 0.3);
     for _ in 0..2000 {
@@ -436,7 +438,7 @@ fn by_another_way(o: DVec3, d: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, f64
 }
 
 #[test]
-fn the_triangle_that_is_there() {
+fn single_triangles() {
     let random = &mut Random(9);
     let (mut hits, mut misses) = (0, 0);
     for _ in 0..10_000 {

@@ -79,7 +79,7 @@ fn has(cone: &Cone, normal: DVec3) -> bool {
 }
 
 #[test]
-fn a_cone_around_two_has_what_both_have() {
+fn the_union_of_two_cones_contains_both() {
     let mut random = Random(1);
     let mut narrower = 0;
     for _ in 0..4000 {
@@ -99,11 +99,14 @@ fn a_cone_around_two_has_what_both_have() {
             }
         }
     }
-    assert!(narrower > 400, "not all are everything: {narrower}");
+    assert!(
+        narrower > 400,
+        "too few unions are narrower than the sphere: {narrower}"
+    );
 }
 
 #[test]
-fn the_measure_of_a_cone_is_the_integral_of_its_weights() {
+fn the_orientation_measure_matches_quadrature() {
     // Equation 1 integrates over the sphere: 1 inside the spread, then the cosine up to the edge.
     for (spread, edge) in [
         (0.0, FRAC_PI_2),
@@ -148,15 +151,15 @@ fn children(node: &LightNode) -> impl Iterator<Item = (usize, u32)> {
 /// Returns the probability of selecting each emitter at p, by traversal of the tree.
 fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64> {
     let mut found = vec![0.0; count];
-    let mut waiting = vec![(0_usize, 1.0)];
-    while let Some((number, probability)) = waiting.pop() {
+    let mut pending = vec![(0_usize, 1.0)];
+    while let Some((number, probability)) = pending.pop() {
         let node = &nodes[number];
         let shares = light_shares(light_importances(node, p, n));
         for (i, below) in children(node) {
             let probability = probability * f64::from(shares[i]);
             match below {
                 NO_INDEX => found[node.index[i] as usize] = probability,
-                below => waiting.push((below as usize, probability)),
+                below => pending.push((below as usize, probability)),
             }
         }
     }
@@ -182,7 +185,7 @@ fn a_tree_built_in_parallel_has_the_same_nodes() {
 }
 
 #[test]
-fn probabilities_sum_to_one_and_whatever_can_shine_has_one() {
+fn probabilities_sum_to_one_and_visible_emitters_have_one() {
     let mut random = Random(2);
     for (count, two_sided) in [(1, false), (2, false), (17, true), (300, false), (300, true)] {
         let lamps: Vec<Lamp> = (0..count).map(|i| random.lamp(i, two_sided)).collect();
@@ -206,40 +209,37 @@ fn probabilities_sum_to_one_and_whatever_can_shine_has_one() {
             let found = probabilities(&nodes, lamps.len(), p.as_vec3(), n.as_vec3());
             let sum: f64 = found.iter().sum();
             assert!((sum - 1.0).abs() < 1e-5, "{sum}");
-            for lamp in &lamps {
+            for emitter in &lamps {
                 // A point of the emitter that faces the surface, on both sides.
-                let (center, half) = (0.5 * (lamp.low + lamp.high), 0.5 * (lamp.high - lamp.low).x);
-                let u = lamp.cone.axis.any_orthonormal_vector();
-                let v = lamp.cone.axis.cross(u);
+                let (center, half) = (0.5 * (emitter.low + emitter.high), 0.5 * (emitter.high - emitter.low).x);
+                let u = emitter.cone.axis.any_orthonormal_vector();
+                let v = emitter.cone.axis.cross(u);
                 let lit = (0..9).any(|k| {
                     let at = center + (u * f64::from(k % 3 - 1) + v * f64::from(k / 3 - 1)) * half / 2.0;
                     let to = (at - p).normalize();
-                    let faces = lamp.cone.spread > 3.0 || -to.dot(lamp.cone.axis) > 0.0 || lamp.cone.two_sided;
+                    let faces = emitter.cone.spread > 3.0 || -to.dot(emitter.cone.axis) > 0.0 || emitter.cone.two_sided;
                     faces && (n == DVec3::ZERO || to.dot(n) > 0.0)
                 });
-                let probability = found[lamp.index as usize];
-                assert!(!lit || probability > 0.0, "{lamp:?} from {p}, {n}");
+                let probability = found[emitter.index as usize];
+                assert!(!lit || probability > 0.0, "{emitter:?} from {p}, {n}");
                 dark += u32::from(probability == 0.0);
             }
         }
-        assert!(
-            count < 3 || dark > 100,
-            "some cannot shine there, and are not asked: {dark}"
-        );
+        assert!(count < 3 || dark > 100, "only {dark} emitters have probability 0");
     }
 }
 
 #[test]
-fn nodes_know_their_parents_and_hold_their_children() {
+fn nodes_link_to_parents_and_bound_children() {
     let mut random = Random(3);
     let lamps: Vec<Lamp> = (0..1000).map(|i| random.lamp(i, false)).collect();
     let nodes = build(&lamps);
     assert_eq!(nodes[0].parent.x, NO_INDEX);
-    assert!(nodes.len() < 500, "most nodes are full: {}", nodes.len());
+    assert!(nodes.len() < 500, "too many nodes: {}", nodes.len());
     let center = |node: &LightNode, i: usize| Vec3::new(node.x[i], node.y[i], node.z[i]);
     let (mut seen, mut leaves) = (0, 0);
-    let mut waiting = vec![0_u32];
-    while let Some(number) = waiting.pop() {
+    let mut pending = vec![0_u32];
+    while let Some(number) = pending.pop() {
         seen += 1;
         let node = &nodes[number as usize];
         for (i, below) in children(node) {
@@ -256,7 +256,7 @@ fn nodes_know_their_parents_and_hold_their_children() {
                 sum += inside.intensity[j];
             }
             assert!((sum - node.intensity[i]).abs() <= 1e-5 * node.intensity[i]);
-            waiting.push(below);
+            pending.push(below);
         }
     }
     assert_eq!((seen, leaves), (nodes.len(), lamps.len()));
@@ -270,43 +270,47 @@ fn mean_above(middle: f64, radius: f64) -> f64 {
 }
 
 #[test]
-fn importance_is_what_angles_say() {
+fn importance_matches_the_formula_with_angles() {
     let mut random = Random(4);
     let (mut compared, mut dark) = (0, 0);
     for i in 0..20_000 {
-        let lamp = Lamp {
+        let emitter = Lamp {
             cone: random.cone(),
             intensity: 1.0,
             ..random.lamp(i, false)
         };
-        let node = build(&[lamp])[0];
+        let node = build(&[emitter])[0];
         let (p, n) = (random.point() * 6.0, random.direction());
-        let to = 0.5 * (lamp.low + lamp.high) - p;
-        let (distance, radius) = (to.length(), 0.5 * (lamp.high - lamp.low).length());
+        let to = 0.5 * (emitter.low + emitter.high) - p;
+        let (distance, radius) = (to.length(), 0.5 * (emitter.high - emitter.low).length());
         let seen = if distance <= radius {
             PI
         } else {
             (radius / distance).asin()
         };
-        let along = lamp.cone.axis.angle_between(-to);
-        let along = if lamp.cone.two_sided {
+        let along = emitter.cone.axis.angle_between(-to);
+        let along = if emitter.cone.two_sided {
             along.min(PI - along)
         } else {
             along
         };
-        let leaving = (along - lamp.cone.spread).max(0.0);
+        let leaving = (along - emitter.cone.spread).max(0.0);
         let facing = n.angle_between(to);
         let around = distance * distance + 0.1 * radius * radius;
         let height = |angle: f64| mean_above(distance * angle.cos(), radius).max(0.03 * radius);
         let value = height(leaving) * height(facing) / (around * around);
         let found = light_importances(&node, p.as_vec3(), n.as_vec3());
-        assert_eq!((found.y, found.z, found.w), (0.0, 0.0, 0.0), "there is one child");
+        assert_eq!(
+            (found.y, found.z, found.w),
+            (0.0, 0.0, 0.0),
+            "only the first child exists"
+        );
         let found = f64::from(found.x);
-        if leaving - seen < lamp.cone.edge && facing - seen < FRAC_PI_2 {
+        if leaving - seen < emitter.cone.edge && facing - seen < FRAC_PI_2 {
             compared += 1;
             assert!(
                 (found - value).abs() < 2e-3 * value.max(1e-3),
-                "{found} for {value}: {lamp:?} {p} {n}"
+                "{found} for {value}: {emitter:?} {p} {n}"
             );
         } else if found == 0.0 {
             dark += 1;
@@ -314,12 +318,12 @@ fn importance_is_what_angles_say() {
     }
     assert!(
         compared > 3_000 && dark > 3_000,
-        "{compared} that can shine there, {dark} that are left out"
+        "{compared} emitters with light at the point, {dark} without"
     );
 }
 
 #[test]
-fn shares_are_those_of_importances_and_numbers_choose_by_them() {
+fn children_are_selected_in_proportion_to_importance() {
     let mut random = Random(5);
     for _ in 0..2_000 {
         let importances = Vec4::from_array([(); 4].map(|()| match (random.unit() * 4.0) as u32 {
@@ -361,7 +365,7 @@ fn shares_are_those_of_importances_and_numbers_choose_by_them() {
 }
 
 #[test]
-fn lamps_in_one_place_and_in_a_row_make_trees_of_few_levels() {
+fn coincident_and_exponential_emitters_give_shallow_trees() {
     let at = |i: u32, p: DVec3, intensity: f64| Lamp {
         low: p,
         high: p,

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::gltf::document::Document;
 use crate::gltf::made::{container, json_of, read};
 
-fn told(json: &Value) -> String {
+fn error_of(json: &Value) -> String {
     match read(json.to_string().into_bytes()) {
         Ok(_) => "fine".to_owned(),
         Err(fault) => fault.of(Path::new("a")).to_string(),
@@ -76,7 +76,7 @@ fn ask(document: &Document) -> usize {
 }
 
 #[test]
-fn a_container_has_all_in_it() {
+fn glb_files_are_self_contained() {
     let (json, binary) = small();
     let document = read(container(&json, &binary)).unwrap();
     assert_eq!(document.vectors::<3>(0).unwrap()[1], [1.0, 0.0, 0.0]);
@@ -110,7 +110,7 @@ fn other_files_are_read_and_listed() {
     let document = Document::open(&path, &folder, &mut files).unwrap();
     assert_eq!(document.indices(1).unwrap(), [0, 1, 2]);
     assert_eq!(*document.image_bytes(0).unwrap().unwrap(), *b"image");
-    let told = |image: usize| {
+    let error_of = |image: usize| {
         let text = document.image_bytes(image).unwrap_err().to_string();
         text.strip_prefix(&format!("{}: ", path.display())).unwrap().to_owned()
     };
@@ -120,16 +120,16 @@ fn other_files_are_read_and_listed() {
         "{missing}"
     );
     assert!(
-        told(2).starts_with("images[2].uri: \"../out.png\" must not leave the folder"),
+        error_of(2).starts_with("images[2].uri: \"../out.png\" must not leave the folder"),
         "{}",
-        told(2)
+        error_of(2)
     );
-    assert_eq!(told(3), "images[3]: has neither a uri nor a bufferView");
+    assert_eq!(error_of(3), "images[3]: has neither a uri nor a bufferView");
     assert_eq!(
-        told(4),
+        error_of(4),
         "images[4]: \"X_image\" holds its only data and is not supported; export the file without it"
     );
-    assert_eq!(told(5), "images: 5 is out of range; the file has 5");
+    assert_eq!(error_of(5), "images: 5 is out of range; the file has 5");
     let names: Vec<_> = files.iter().filter_map(|path| path.file_name()?.to_str()).collect();
     assert_eq!(names.len(), 3);
     for name in ["the data.bin", "a.png", "small.txt"] {
@@ -178,11 +178,14 @@ fn buffers_may_be_data_uris() {
     assert_eq!(document.view(0).unwrap(), [0, 1, 2]);
     assert_eq!(document.json.buffers[0].uri, None);
     json["buffers"][0]["byteLength"] = json!(4);
-    assert_eq!(told(&json), "a: buffers[0].byteLength: 4 bytes; its data has 3");
+    assert_eq!(error_of(&json), "a: buffers[0].byteLength: 4 bytes; its data has 3");
     json["buffers"][0]["uri"] = json!("data:;base64,A");
-    assert!(told(&json).starts_with("a: buffers[0].uri: the data URI must be base64"));
+    assert!(error_of(&json).starts_with("a: buffers[0].uri: the data URI must be base64"));
     json["buffers"] = json!([{ "byteLength": 3 }]);
-    assert_eq!(told(&json), "a: buffers[0]: has no uri, but buffer views refer to it");
+    assert_eq!(
+        error_of(&json),
+        "a: buffers[0]: has no uri, but buffer views refer to it"
+    );
     json["buffers"] = json!([{ "byteLength": 4 }, { "byteLength": 4 }]);
     assert!(read(container(&json, b"1234")).is_ok());
     json["bufferViews"][1]["buffer"] = json!(1);
@@ -251,7 +254,7 @@ fn what_is_no_gltf_is_told() {
 }
 
 #[test]
-fn every_index_and_word_is_checked() {
+fn indices_and_enumerations_are_validated() {
     let (good, binary) = small();
     let with = |key: &str, value: Value| {
         let mut json = good.clone();
@@ -293,8 +296,8 @@ fn every_index_and_word_is_checked() {
         ("/scene", "scene"),
         ("/textures/0/source", "textures[0].source"),
     ] {
-        let told = with(key, json!(99));
-        assert!(told.starts_with(&format!("a: {place}")), "{key}: {told}");
+        let error = with(key, json!(99));
+        assert!(error.starts_with(&format!("a: {place}")), "{key}: {error}");
         // 64-bit values are not truncated, and other types are errors.
         for value in [
             json!(1u64 << 32),
@@ -304,8 +307,8 @@ fn every_index_and_word_is_checked() {
             json!({}),
             json!([]),
         ] {
-            let told = with(key, value.clone());
-            assert!(told.starts_with("a: "), "{key}: {value}: {told}");
+            let error = with(key, value.clone());
+            assert!(error.starts_with("a: "), "{key}: {value}: {error}");
         }
         // Some exporters write integers as floats.
         if key != "/textures/0/source" {
@@ -318,8 +321,8 @@ fn every_index_and_word_is_checked() {
         ("/accessors/0/type", "accessors[0].type"),
     ] {
         for value in [json!(5124), json!("VEC5"), json!(5126u64 + (1 << 32))] {
-            let told = with(key, value.clone());
-            assert!(told.starts_with(&format!("a: {place}")), "{key}: {value}: {told}");
+            let error = with(key, value.clone());
+            assert!(error.starts_with(&format!("a: {place}")), "{key}: {value}: {error}");
         }
     }
     assert!(with("/nodes/0/translation/0", json!(1e39)).starts_with("a: nodes[0].translation[0]: 1e39 exceeds"));
@@ -328,7 +331,7 @@ fn every_index_and_word_is_checked() {
 }
 
 #[test]
-fn what_writers_get_wrong_is_understood() {
+fn common_exporter_errors_are_repaired() {
     let with = |key: &str, value: Value| {
         let mut json = json!({ "asset": { "version": "2.0" }, "nodes": [{}] });
         json[key] = value;
@@ -356,7 +359,7 @@ fn what_writers_get_wrong_is_understood() {
         ["animations: 2 channels that move something other than a node are ignored"]
     );
     json["animations"] = animation(json!([channel(json!(1), "translation")]));
-    assert!(told(&json).starts_with("a: animations[0].channels[0].target.node: 1 is out of range"));
+    assert!(error_of(&json).starts_with("a: animations[0].channels[0].target.node: 1 is out of range"));
     let camera = |camera: Value| with("cameras", json!([camera])).map(|_| ());
     assert!(camera(json!({ "type": "perspective", "perspective": { "yfov": 1, "znear": 0.1 } })).is_ok());
     assert_eq!(
@@ -412,7 +415,7 @@ fn extensions_are_refused_or_told_by_their_names() {
 }
 
 #[test]
-fn a_texture_without_an_image_is_refused() {
+fn textures_without_an_image_are_rejected() {
     let (mut json, binary) = small();
     json["textures"] = json!([
         {},
@@ -425,16 +428,16 @@ fn a_texture_without_an_image_is_refused() {
         { "source": 0, "extensions": { "KHR_texture_basisu": { "source": 2 } } },
     ]);
     let document = read(container(&json, &binary)).unwrap();
-    let told = |texture: usize| match document.image_of(texture) {
+    let error_of = |texture: usize| match document.image_of(texture) {
         Ok(image) => image.to_string(),
         Err(error) => error.to_string().replace("/none/a.gltf: ", ""),
     };
-    assert_eq!(told(0), "textures[0]: has no source");
+    assert_eq!(error_of(0), "textures[0]: has no source");
     assert_eq!(
-        told(1),
+        error_of(1),
         "textures[1]: \"EXT_texture_avif\" holds its only data and is not supported; export the file without it"
     );
-    assert_eq!(told(2), "1");
+    assert_eq!(error_of(2), "1");
     for (texture, extension) in [
         (3, "EXT_texture_webp"),
         (4, "EXT_texture_webp"),
@@ -442,17 +445,17 @@ fn a_texture_without_an_image_is_refused() {
     ] {
         let key = format!("textures[{texture}].extensions.{extension}.source");
         assert_eq!(
-            told(texture),
+            error_of(texture),
             format!("{key}: must be the index of an image; the file has 2")
         );
     }
-    assert_eq!(told(5), "0");
-    assert_eq!(told(6), "1");
-    assert_eq!(told(8), "textures: 8 is out of range; the file has 8");
+    assert_eq!(error_of(5), "0");
+    assert_eq!(error_of(6), "1");
+    assert_eq!(error_of(8), "textures: 8 is out of range; the file has 8");
 }
 
 #[test]
-fn no_beginning_of_a_file_is_more_than_a_message() {
+fn truncated_files_do_not_panic() {
     let (json, binary) = small();
     let bytes = container(&json, &binary);
     assert!(ask(&read(bytes.clone()).unwrap()) > 20);
@@ -466,7 +469,7 @@ fn no_beginning_of_a_file_is_more_than_a_message() {
 }
 
 #[test]
-fn no_byte_that_is_changed_is_more_than_a_message() {
+fn changed_bytes_do_not_panic() {
     let (json, binary) = small();
     let bytes = container(&json, &binary);
     let (mut good, mut bad) = (0, 0);

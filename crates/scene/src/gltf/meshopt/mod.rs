@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use self::filter::Filter;
-use super::error::{Fault, plain, shown};
+use super::error::{GltfFault, plain, shown};
 
 /// In order of precedence.
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
@@ -39,7 +39,7 @@ enum Mode {
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Said {
+struct MeshoptExtension {
     buffer: u32,
     #[serde(default)]
     byte_offset: u64,
@@ -52,15 +52,15 @@ struct Said {
 }
 
 /// Returns the compression of a view of `length` bytes.
-pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) -> Result<Option<Compressed>, Fault> {
+pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) -> Result<Option<Compressed>, GltfFault> {
     let Some((name, said)) = NAMES.iter().find_map(|name| Some((*name, others.get(*name)?))) else {
         return Ok(None);
     };
     let key = format!("{key}.extensions.{name}");
-    let said: Said = serde_path_to_error::deserialize(said)
-        .map_err(|error| Fault::key(format!("{key}.{}", error.path()), plain(error.inner())))?;
+    let said: MeshoptExtension = serde_path_to_error::deserialize(said)
+        .map_err(|error| GltfFault::key(format!("{key}.{}", error.path()), plain(error.inner())))?;
     let fault = |field: &str, value: &dyn std::fmt::Display, rule: &str| {
-        Err(Fault::key(format!("{key}.{field}"), format!("{value} {rule}")))
+        Err(GltfFault::key(format!("{key}.{field}"), format!("{value} {rule}")))
     };
     let stride = said.byte_stride;
     let mode = match said.mode.as_str() {

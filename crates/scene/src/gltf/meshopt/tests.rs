@@ -107,7 +107,7 @@ fn streams_decode_to_what_the_reference_makes_of_them() {
 }
 
 #[test]
-fn the_examples_of_the_specification_are_right() {
+fn examples_of_the_specification_decode() {
     // Sixteen 4-bit deltas of the first byte.
     let mut stream = vec![0xa0, 2, 0x17, 0x5f, 0xf0, 0xbc, 0x77, 0xa9, 0x21, 0x00, 0x34, 0xb5];
     stream.extend([0; 3 + 32]);
@@ -150,7 +150,7 @@ fn the_examples_of_the_specification_are_right() {
 }
 
 #[test]
-fn damaged_streams_are_refused_or_decode_to_something() {
+fn damaged_streams_do_not_panic() {
     let (mut good, mut bad) = (0, 0);
     for Stream { name, how, bytes, .. } in streams() {
         for length in 0..bytes.len() {
@@ -182,7 +182,7 @@ fn damaged_streams_are_refused_or_decode_to_something() {
 }
 
 #[test]
-fn a_small_stream_asks_for_little_memory() {
+fn small_streams_allocate_little_memory() {
     let huge = 1 << 40;
     for (mode, first) in [
         ("ATTRIBUTES", 0xa0),
@@ -203,7 +203,7 @@ fn a_small_stream_asks_for_little_memory() {
 }
 
 #[test]
-fn filters_take_whatever_there_is() {
+fn filters_accept_any_values() {
     let all: Vec<u8> = (0..=255u8)
         .flat_map(|a| [a, a ^ 0x80, 255 - a, 0, 0, a, 1, a])
         .collect();
@@ -232,8 +232,8 @@ fn filters_take_whatever_there_is() {
 }
 
 #[test]
-fn what_the_extension_says_is_checked() {
-    for (mode, filter, stride, count, told) in [
+fn extension_values_are_validated() {
+    for (mode, filter, stride, count, expected) in [
         (
             "POINTS",
             "NONE",
@@ -322,14 +322,14 @@ fn what_the_extension_says_is_checked() {
     ] {
         assert_eq!(
             described(mode, filter, stride, count).unwrap_err(),
-            format!("a: v.extensions.KHR_meshopt_compression.{told}")
+            format!("a: v.extensions.KHR_meshopt_compression.{expected}")
         );
     }
     assert!(described("ATTRIBUTES", "EXPONENTIAL", 256, 3).is_ok());
 }
 
 #[test]
-fn a_compressed_view_is_as_any_other() {
+fn compressed_views_behave_like_others() {
     let streams = streams();
     let stream = streams
         .iter()
@@ -372,34 +372,34 @@ fn a_compressed_view_is_as_any_other() {
         );
     }
     let name = "EXT_meshopt_compression";
-    let told = |key: &str, value: Value| match view(name, &[(key, value)]) {
-        Err(told) => told,
+    let message = |key: &str, value: Value| match view(name, &[(key, value)]) {
+        Err(message) => message,
         Ok(document) => document.view(0).unwrap_err().to_string(),
     };
     let length = stream.bytes.len();
     let key = format!("bufferViews[0].extensions.{name}");
     assert_eq!(
-        told("buffer", json!(2)),
+        message("buffer", json!(2)),
         "a: bufferViews[0]: 2 is out of range; the file has 2"
     );
     assert_eq!(
-        told("buffer", json!(1)),
+        message("buffer", json!(1)),
         "a: buffers[1]: has no uri, but buffer views refer to it"
     );
-    assert!(told("buffer", json!(-1)).starts_with(&format!("a: {key}.buffer: ")));
-    assert!(told("count", json!(99)).starts_with(&format!("a: {key}.count: 99 elements")));
+    assert!(message("buffer", json!(-1)).starts_with(&format!("a: {key}.buffer: ")));
+    assert!(message("count", json!(99)).starts_with(&format!("a: {key}.count: 99 elements")));
     let parts = [(5, length), (u64::MAX, length), (0, usize::MAX)];
     for (offset, length) in parts {
-        let told = match view(name, &[("byteOffset", json!(offset)), ("byteLength", json!(length))]) {
-            Err(told) => told,
+        let message = match view(name, &[("byteOffset", json!(offset)), ("byteLength", json!(length))]) {
+            Err(message) => message,
             Ok(document) => document.view(0).unwrap_err().to_string(),
         };
         assert!(
-            told.contains(&format!("{key}: {length} bytes from byte {offset} on")),
-            "{told}"
+            message.contains(&format!("{key}: {length} bytes from byte {offset} on")),
+            "{message}"
         );
     }
-    let told = told("byteLength", json!(length - 1));
-    assert!(told.contains(&format!("{key}: the stream must ")), "{told}");
-    assert!(told.starts_with("/none/a.gltf: "), "{told}");
+    let message = message("byteLength", json!(length - 1));
+    assert!(message.contains(&format!("{key}: the stream must ")), "{message}");
+    assert!(message.starts_with("/none/a.gltf: "), "{message}");
 }

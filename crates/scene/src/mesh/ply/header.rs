@@ -1,8 +1,8 @@
 //! PLY headers: elements and property types.
 
 use super::super::damage::{self, Damages};
-use super::super::error::{Fault, Place, shown};
-use super::super::words::Words;
+use super::super::error::{Location, MeshFault, shown};
+use super::super::tokens::Tokens;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
@@ -76,7 +76,7 @@ pub(super) struct Element {
     pub name: String,
     pub count: usize,
     pub properties: Vec<Property>,
-    pub place: Place,
+    pub place: Location,
 }
 
 pub(super) struct Header {
@@ -92,7 +92,7 @@ impl Header {
     }
 }
 
-pub(super) fn header(words: &mut Words, damages: &mut Damages) -> Result<Header, Fault> {
+pub(super) fn header(words: &mut Tokens, damages: &mut Damages) -> Result<Header, MeshFault> {
     if words.on_line() != Some(&b"ply"[..]) {
         return Err(words.fault("the file must begin with \"ply\""));
     }
@@ -158,8 +158,8 @@ pub(super) fn header(words: &mut Words, damages: &mut Damages) -> Result<Header,
     }
 }
 
-fn property(words: &mut Words) -> Result<Property, Fault> {
-    let scalar = |words: &Words, name: &[u8]| {
+fn property(words: &mut Tokens) -> Result<Property, MeshFault> {
+    let scalar = |words: &Tokens, name: &[u8]| {
         Scalar::named(name).ok_or_else(|| {
             let rule = "must be a type: char, uchar, short, ushort, int, uint, float or double";
             words.fault(format!("property: {} {rule}", shown(name)))

@@ -1,39 +1,39 @@
 //! PLY values: ASCII, or binary of either byte order.
 
-use super::super::error::{Fault, Place, shown};
-use super::super::words::{self, Words};
+use super::super::error::{Location, MeshFault, shown};
+use super::super::tokens::{self, Tokens};
 use super::header::Scalar;
 
 pub(super) trait Values {
-    fn next(&mut self, scalar: Scalar) -> Result<f64, Fault>;
-    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault>;
+    fn next(&mut self, scalar: Scalar) -> Result<f64, MeshFault>;
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), MeshFault>;
     fn fewest_bytes(&self, scalar: Scalar) -> usize;
     fn left(&self) -> usize;
-    fn place(&mut self) -> Place;
+    fn place(&mut self) -> Location;
     /// Ends a row. Returns its line if that has more values.
-    fn end_row(&mut self) -> Option<Place> {
+    fn end_row(&mut self) -> Option<Location> {
         None
     }
 }
 
 pub(super) struct Ascii<'a> {
-    pub words: Words<'a>,
+    pub words: Tokens<'a>,
     /// Each row is one line.
     pub by_lines: bool,
 }
 
 impl Values for Ascii<'_> {
     #[inline]
-    fn next(&mut self, _: Scalar) -> Result<f64, Fault> {
+    fn next(&mut self, _: Scalar) -> Result<f64, MeshFault> {
         match self.words.anywhere() {
             Some(word) => {
-                words::number(word).ok_or_else(|| self.words.fault(format!("{} must be a number", shown(word))))
+                tokens::number(word).ok_or_else(|| self.words.fault(format!("{} must be a number", shown(word))))
             }
             None => Err(self.words.fault("the file ends too early: values are missing")),
         }
     }
 
-    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault> {
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), MeshFault> {
         (0..count).try_for_each(|_| self.next(scalar).map(|_| ()))
     }
 
@@ -46,12 +46,12 @@ impl Values for Ascii<'_> {
         self.words.left() + 1
     }
 
-    fn place(&mut self) -> Place {
+    fn place(&mut self) -> Location {
         self.words.find_word_anywhere();
         self.words.place()
     }
 
-    fn end_row(&mut self) -> Option<Place> {
+    fn end_row(&mut self) -> Option<Location> {
         let place = self.words.place();
         (self.by_lines && self.words.skip_rest()).then_some(place)
     }
@@ -65,7 +65,7 @@ pub(super) struct Binary<'a> {
 
 impl Binary<'_> {
     #[inline]
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], MeshFault> {
         let Some(bytes) = self.bytes[self.at..].first_chunk::<N>() else {
             return Err(self.ended());
         };
@@ -78,14 +78,14 @@ impl Binary<'_> {
     }
 
     #[cold]
-    fn ended(&self) -> Fault {
-        Place::Byte(self.at).fault("the file ends too early: values are missing")
+    fn ended(&self) -> MeshFault {
+        Location::Byte(self.at).fault("the file ends too early: values are missing")
     }
 }
 
 impl Values for Binary<'_> {
     #[inline]
-    fn next(&mut self, scalar: Scalar) -> Result<f64, Fault> {
+    fn next(&mut self, scalar: Scalar) -> Result<f64, MeshFault> {
         Ok(match scalar {
             Scalar::I8 => i8::from_le_bytes(self.take()?).into(),
             Scalar::U8 => u8::from_le_bytes(self.take()?).into(),
@@ -98,7 +98,7 @@ impl Values for Binary<'_> {
         })
     }
 
-    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault> {
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), MeshFault> {
         match count.checked_mul(scalar.size()) {
             Some(size) if size <= self.left() => {
                 self.at += size;
@@ -116,7 +116,7 @@ impl Values for Binary<'_> {
         self.bytes.len() - self.at
     }
 
-    fn place(&mut self) -> Place {
-        Place::Byte(self.at)
+    fn place(&mut self) -> Location {
+        Location::Byte(self.at)
     }
 }

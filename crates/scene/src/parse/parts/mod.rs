@@ -70,7 +70,7 @@ pub struct Parts<'a> {
 }
 
 #[derive(Debug)]
-pub struct Broken {
+pub struct SyntaxFault {
     /// Byte offset.
     pub at: usize,
     message: String,
@@ -78,18 +78,18 @@ pub struct Broken {
     is_syntax: bool,
 }
 
-impl Broken {
+impl SyntaxFault {
     /// Returns an error of the document that starts at `start`.
-    pub fn of(start: usize, error: &Error) -> Broken {
-        Broken {
+    pub fn of(start: usize, error: &Error) -> SyntaxFault {
+        SyntaxFault {
             at: start + error.span().map_or(0, |span| span.start),
             message: error.message().to_owned(),
             is_syntax: error.span().is_some(),
         }
     }
 
-    fn too_large(at: usize, message: String) -> Broken {
-        Broken {
+    fn too_large(at: usize, message: String) -> SyntaxFault {
+        SyntaxFault {
             at,
             message,
             is_syntax: false,
@@ -105,7 +105,7 @@ impl Broken {
     }
 
     /// Returns the error of a text that must be parsed as a whole but is too large.
-    pub fn whole(text: &str) -> Broken {
+    pub fn whole(text: &str) -> SyntaxFault {
         let size = text.len() as f64 / f64::from(1 << 20);
         let rule =
             "every texture, material, light, shape, mesh and instance must have its own header, such as [[shapes]]";
@@ -113,7 +113,7 @@ impl Broken {
             "in a file larger than {} MiB {rule}; it has {size:.1} MiB",
             LARGEST >> 20
         );
-        Broken::too_large(0, message)
+        SyntaxFault::too_large(0, message)
     }
 }
 
@@ -183,22 +183,22 @@ impl<'a> Parts<'a> {
     }
 
     /// Returns the error of a text with a part larger than [`LARGEST`].
-    pub fn too_large(&self) -> Option<Broken> {
+    pub fn too_large(&self) -> Option<SyntaxFault> {
         let large = self.parts.iter().find(|part| part.place.len() > LARGEST);
         if let Some(part) = large {
             let message = format!("the table that starts here is larger than {} MiB", LARGEST >> 20);
-            return Some(Broken::too_large(part.place.start, message));
+            return Some(SyntaxFault::too_large(part.place.start, message));
         }
         let parts: usize = self.parts.iter().map(|part| part.place.len()).sum();
         let rest = self.text.len() - parts;
-        (rest > LARGEST).then(|| Broken::whole(self.text))
+        (rest > LARGEST).then(|| SyntaxFault::whole(self.text))
     }
 
-    pub fn read_rest(&self) -> Result<Table, Broken> {
+    pub fn read_rest(&self) -> Result<Table, SyntaxFault> {
         let rest = self.rest();
         toml::from_str(&rest.text).map_err(|error| {
-            let broken = Broken::of(0, &error);
-            Broken {
+            let broken = SyntaxFault::of(0, &error);
+            SyntaxFault {
                 at: rest.place(broken.at),
                 ..broken
             }
@@ -206,8 +206,8 @@ impl<'a> Parts<'a> {
     }
 
     /// Parses a part; `None` if it is not one element of its section and the file must be parsed as a whole.
-    pub fn read(&self, part: &Part) -> Result<Option<Named>, Broken> {
-        let document = toml::from_str(self.text(part)).map_err(|error| Broken::of(part.place.start, &error));
+    pub fn read(&self, part: &Part) -> Result<Option<Named>, SyntaxFault> {
+        let document = toml::from_str(self.text(part)).map_err(|error| SyntaxFault::of(part.place.start, &error));
         let mut document: Table = document?;
         Ok(match document.remove(part.kind.name()) {
             Some(Value::Array(mut tables)) if tables.len() == 1 => match tables.pop() {
@@ -223,7 +223,7 @@ impl<'a> Parts<'a> {
     }
 
     /// Returns the TOML error of two parts with the same name.
-    pub fn twice(&self, name: &str, part: &Part) -> Option<Broken> {
+    pub fn twice(&self, name: &str, part: &Part) -> Option<SyntaxFault> {
         let path = [part.kind.name(), name].map(Segment::from);
         let (first, _) = self.find(&KeyPath(path.to_vec()))?;
         let both = [self.text(first), self.text(part)];
@@ -233,9 +233,9 @@ impl<'a> Parts<'a> {
             Some(at) => part.place.start + at,
             None => first.place.start + at,
         };
-        Some(Broken {
+        Some(SyntaxFault {
             at: start,
-            ..Broken::of(0, &error)
+            ..SyntaxFault::of(0, &error)
         })
     }
 

@@ -16,7 +16,7 @@ const BLUE: &str = "[materials.\"b c\"]\ntype = 'phong'\ncolor = [0, 0, 1]\n";
 
 /// Returns the description of a text that is parsed as a whole, or its error.
 fn whole(text: &str) -> Result<Description, SceneError> {
-    let table = toml::from_str(text).map_err(|error| Broken::of(0, &error).into_error(text, "s"))?;
+    let table = toml::from_str(text).map_err(|error| SyntaxFault::of(0, &error).into_error(text, "s"))?;
     read_file(table).map_err(|problems| invalid(text, "s", problems, &Defines::new(&[])))
 }
 
@@ -34,7 +34,7 @@ fn assert_same(text: &str) {
 }
 
 #[test]
-fn good_files_say_the_same() {
+fn valid_files_parse_equally_by_parts() {
     let sub = "[materials.a.normal_map]\ntexture = 't'\n";
     let image = "[textures.t]\ntype = 'image'\nfile = 'a [[shapes]] b'\n";
     let strange = "[[ shapes ]] # [[lights]]\n type = \"\"\"sphere\"\"\"\nmaterial = '[[shapes]]'\ncenter = [ # [x]\n0,\n\
@@ -68,7 +68,7 @@ fn good_files_say_the_same() {
 }
 
 #[test]
-fn bad_files_are_told_the_same() {
+fn invalid_files_have_equal_errors_by_parts() {
     let good = format!(
         "{START}{POINT}{RED}{render}{SPHERE}{BLUE}{SPHERE}{POINT}",
         render = "[render]\nseed = 3\n"
@@ -104,25 +104,29 @@ fn bad_files_are_told_the_same() {
 }
 
 #[test]
-fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
+fn sizes_of_parts_and_whole_files_are_limited() {
     let many = "[0, 0, 0],".repeat(LARGEST / 10 + 1);
-    let told = |text: &str| by_parts(text).unwrap_err();
+    let error_of = |text: &str| by_parts(text).unwrap_err();
     let long = format!("{START}{RED}[[shapes]]\nx = [{many}]\n");
-    assert_eq!(told(&long), "s:6:1: the table that starts here is larger than 4 MiB");
+    assert_eq!(
+        error_of(&long),
+        "s:6:1: the table that starts here is larger than 4 MiB"
+    );
     let rest = format!("{START}x = [{many}]\n{SPHERE}");
-    assert!(told(&rest).starts_with("s:1:1: "));
+    assert!(error_of(&rest).starts_with("s:1:1: "));
     assert!(
-        told(&rest).contains("in a file larger than 4 MiB every texture, material, light, shape, mesh and instance")
+        error_of(&rest)
+            .contains("in a file larger than 4 MiB every texture, material, light, shape, mesh and instance")
     );
     let spheres = SPHERE.repeat(LARGEST / SPHERE.len() + 1);
     assert!(by_parts(&format!("{START}{spheres}{RED}")).unwrap().shapes.len() > 50_000);
-    assert!(told(&format!("{START}{spheres}[materials]\n{RED}")).contains("must have its own header"));
+    assert!(error_of(&format!("{START}{spheres}[materials]\n{RED}")).contains("must have its own header"));
     let bad = format!("{START}{spheres}{RED}[render]\nseed = -1\n");
     let line = 1 + bad[..bad.len() - 10].matches('\n').count();
     assert!(
-        told(&bad).starts_with(&format!("s:{line}: render.seed: -1 ")),
+        error_of(&bad).starts_with(&format!("s:{line}: render.seed: -1 ")),
         "{}",
-        told(&bad)
+        error_of(&bad)
     );
     let bad = format!(
         "{START}{RED}{spheres}{}{BLUE}",
@@ -130,13 +134,17 @@ fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
     );
     let line = bad.matches('\n').count() - 3;
     assert!(
-        told(&bad).starts_with(&format!("s:{line}: materials.d.colour: ")),
+        error_of(&bad).starts_with(&format!("s:{line}: materials.d.colour: ")),
         "{}",
-        told(&bad)
+        error_of(&bad)
     );
-    let twice = told(&format!("{START}{RED}{spheres}{RED}"));
+    let twice = error_of(&format!("{START}{RED}{spheres}{RED}"));
     assert!(twice.contains("duplicate key") && !twice.starts_with("s:3:"), "{twice}");
     let bad = format!("{START}{spheres}{}", SPHERE.replace("radius", "size"));
     let line = bad.matches('\n').count();
-    assert!(told(&bad).starts_with(&format!("s:{line}: shapes[")), "{}", told(&bad));
+    assert!(
+        error_of(&bad).starts_with(&format!("s:{line}: shapes[")),
+        "{}",
+        error_of(&bad)
+    );
 }

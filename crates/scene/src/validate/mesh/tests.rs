@@ -271,21 +271,21 @@ const BAD: &[(&str, &str, &str)] = &[
 ];
 
 #[test]
-fn bad_meshes_are_told_with_line_key_value_and_rule() {
+fn invalid_meshes_are_reported_with_line_key_value_and_rule() {
     let folder = folder();
-    for &(line, bad, told) in BAD {
+    for &(line, bad, expected) in BAD {
         let message = parse_in(&folder, &with(line, bad)).unwrap_err().to_string();
         let (_, rest) = message.split_once("s.toml:").unwrap();
         let (place, rest) = rest.split_once(": ").unwrap();
-        assert!(rest.starts_with(told), "{rest}\n{told}");
+        assert!(rest.starts_with(expected), "{rest}\n{expected}");
         assert!(place.parse::<usize>().unwrap() > 13, "{message}");
     }
 }
 
 #[test]
-fn files_are_told_with_their_own_places() {
+fn errors_in_mesh_files_have_their_own_location() {
     let folder = folder();
-    for (file, told) in [
+    for (file, expected) in [
         ("broken.obj", "broken.obj:2: vertex 2 of the face does not exist"),
         ("far.obj", "\"far.obj\" reaches to "),
         ("small.obj", ""),
@@ -293,27 +293,27 @@ fn files_are_told_with_their_own_places() {
         // At least scaled by 2, and moved three times as far.
         let text = GOOD.replacen("file = \"one.obj\"", &format!("file = \"{file}\""), 1);
         match parse_in(&folder, &text) {
-            Ok(_) => assert_eq!(told, ""),
+            Ok(_) => assert_eq!(expected, ""),
             Err(error) => {
                 let (_, rest) = error
                     .to_string()
                     .split_once("shapes[0].file: ")
                     .map(|(a, b)| (a.to_owned(), b.to_owned()))
                     .unwrap();
-                assert!(rest.contains(told) && !told.is_empty(), "{rest}\n{told}");
+                assert!(rest.contains(expected) && !expected.is_empty(), "{rest}\n{expected}");
             }
         }
     }
     let text = with("scale = 2", "scale = 1e-3").replacen("file = \"one.obj\"", "file = \"small.obj\"", 1);
-    let told = parse_in(&folder, &text).unwrap_err().to_string();
+    let error = parse_in(&folder, &text).unwrap_err().to_string();
     assert!(
-        told.contains("shapes[0].file: \"small.obj\" must be at least 1e-9 long there; it is "),
-        "{told}"
+        error.contains("shapes[0].file: \"small.obj\" must be at least 1e-9 long there; it is "),
+        "{error}"
     );
 }
 
 #[test]
-fn a_mesh_is_no_image_in_memory() {
+fn images_in_memory_are_not_meshes() {
     let image = Image {
         width: 1,
         height: 1,
@@ -323,23 +323,23 @@ fn a_mesh_is_no_image_in_memory() {
     assets.images.insert("one.obj".to_owned(), Arc::new(image));
     let camera = crate::PerspectiveDescription::new([0.0, -9.0, 0.0], [0.0; 3], 40.0);
     let scene = Description::new(4, 4, camera).with_shape(MeshDescription::new("red", "one.obj"));
-    let told = scene.validate_with(&assets).unwrap_err().to_string();
-    assert_eq!(told, "shapes[0].file: \"one.obj\" is an image in memory, and no mesh");
+    let error = scene.validate_with(&assets).unwrap_err().to_string();
+    assert_eq!(error, "shapes[0].file: \"one.obj\" is an image in memory, and no mesh");
 }
 
 #[test]
-fn names_of_nothing_are_told_so() {
+fn unknown_names_without_candidates() {
     let start = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
-    let told = |text: &str| {
+    let error_of = |text: &str| {
         let message = parse(&format!("{start}{text}")).unwrap_err().to_string();
         message.split_once("s.toml:").unwrap().1.to_owned()
     };
     assert_eq!(
-        told("[[instances]]\nmesh = 'a'\n"),
+        error_of("[[instances]]\nmesh = 'a'\n"),
         "4: instances[0].mesh: there is no mesh \"a\"; the scene has none"
     );
     assert_eq!(
-        told("[[shapes]]\ntype = 'mesh'\nfile = 'one.obj'\nmaterial = 'a'\n"),
+        error_of("[[shapes]]\ntype = 'mesh'\nfile = 'one.obj'\nmaterial = 'a'\n"),
         "6: shapes[0].material: there is no material \"a\"; the scene has none"
     );
 }
@@ -354,16 +354,16 @@ fn groups_are_counted() {
         },
         material: 0,
     };
-    few_groups(&[shape(MOST_GROUPS / 2), shape(MOST_GROUPS / 2)]).unwrap();
-    let told = few_groups(&[shape(MOST_GROUPS / 2), shape(MOST_GROUPS / 2 + 1)]).unwrap_err();
+    few_groups(&[shape(MAX_GROUPS / 2), shape(MAX_GROUPS / 2)]).unwrap();
+    let error = few_groups(&[shape(MAX_GROUPS / 2), shape(MAX_GROUPS / 2 + 1)]).unwrap_err();
     assert_eq!(
-        told.to_string(),
+        error.to_string(),
         "the meshes have 16777217 groups together; they must be at most 16777216"
     );
 }
 
 #[test]
-fn groups_have_the_materials_of_their_names_first() {
+fn group_names_take_precedence_over_material_names() {
     // checked, red, white
     let scene = parse(GOOD).unwrap();
     assert_eq!((groups(&scene, 0), groups(&scene, 1)), (&[1][..], &[2][..]));
@@ -437,7 +437,7 @@ fn meshes_are_scaled_then_turned_then_moved() {
 }
 
 #[test]
-fn the_axes_are_turned_about_in_their_order() {
+fn rotations_apply_in_the_order_of_the_axes() {
     let text = with("rotate = [0, 0, 90]", "rotate = [90, 0, 90]").replace("scale = 2\n", "");
     let scene = parse(&text).unwrap();
     let turned = |p: [f64; 3]| to_world(&scene, 0).transform_vector3(p.into());
@@ -499,7 +499,7 @@ fn values_at_the_limits_are_good() {
 }
 
 #[test]
-fn what_is_odd_is_noted_once_for_each_file() {
+fn warnings_about_a_file_appear_once() {
     assert_eq!(parse(GOOD).unwrap().notes, Vec::<String>::new());
     let scene = parse(&GOOD.replace("one.obj", "odd.obj")).unwrap();
     assert_eq!(

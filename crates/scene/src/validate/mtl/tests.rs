@@ -17,12 +17,12 @@ const MESH: &str = "[[shapes]]\ntype = 'mesh'\nfile = 'in/a.obj'\n";
 const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 2 4\nv 0 0 5\nv 1 0 5\nv 0 2 9\nv 0 0 6\nv 1 0 6\nv 0 2 8\nvt 0 0\n\
                    usemtl red\nf 1/1 2/1 3/1\ng door\nf 4/1 5/1 6/1\nusemtl blue\nf 7/1 8/1 9/1\n";
 
-struct Place(TempDir);
+struct TestFolder(TempDir);
 
-impl Place {
+impl TestFolder {
     /// Creates the mesh in the folder `in`, with these materials.
-    fn new(mtl: &str) -> Place {
-        let place = Place(tempfile::tempdir().unwrap());
+    fn new(mtl: &str) -> TestFolder {
+        let place = TestFolder(tempfile::tempdir().unwrap());
         fs::create_dir(place.path("in")).unwrap();
         place.write("in/a.obj", OBJ);
         place.write("in/a.mtl", mtl);
@@ -78,7 +78,7 @@ const TWO: &str = "newmtl red\nKa 1 1 1\nKd 0.5 0.25 0\nKs 0.125\nNs 96.5\nd 1\n
 
 #[test]
 fn groups_have_the_materials_of_their_file() {
-    let place = Place::new(TWO);
+    let place = TestFolder::new(TWO);
     let scene = place.scene(MESH).unwrap();
     assert_eq!(scene.notes, Vec::<String>::new());
     assert_eq!(scene.material_names, ["own", "red", "blue"]);
@@ -95,8 +95,8 @@ fn groups_have_the_materials_of_their_file() {
 }
 
 #[test]
-fn the_scene_goes_before_the_file() {
-    let place = Place::new(TWO);
+fn materials_of_the_scene_override_those_of_the_file() {
+    let place = TestFolder::new(TWO);
     let materials = |keys: &str| {
         let scene = place.scene(&format!("{MESH}{keys}")).unwrap();
         names(&scene, 0).join(" ")
@@ -113,7 +113,7 @@ fn the_scene_goes_before_the_file() {
 
 #[test]
 fn instances_share_materials() {
-    let place = Place::new(TWO);
+    let place = TestFolder::new(TWO);
     place.write("in/b.obj", &OBJ.replace("red", "unused"));
     let meshes = "[meshes.a]\nfile = 'in/a.obj'\n[meshes.b]\nfile = 'in/b.obj'\n";
     let instances =
@@ -127,7 +127,7 @@ fn instances_share_materials() {
 
 #[test]
 fn maps_are_textures() {
-    let place = Place::new("newmtl red\nmap_Kd red wood.png\nnewmtl blue\nmap_Kd ..\\in\\red wood.png\n");
+    let place = TestFolder::new("newmtl red\nmap_Kd red wood.png\nnewmtl blue\nmap_Kd ..\\in\\red wood.png\n");
     place.write(
         "in/far.mtl",
         "newmtl red\nmap_Kd C:\\far\\away\\red wood.png\nnewmtl blue\nmap_Kd /far/red wood.png\n",
@@ -155,8 +155,8 @@ fn maps_are_textures() {
 }
 
 #[test]
-fn what_cannot_be_rendered_is_told_once() {
-    for (mtl, told) in [
+fn unsupported_statements_cause_one_warning() {
+    for (mtl, warning) in [
         (
             "Kd -1 0 0",
             "\"red\": Kd: each of [-1, 0, 0] must be from 0 to 1e6; [0, 0, 0] stands in",
@@ -189,16 +189,16 @@ fn what_cannot_be_rendered_is_told_once() {
         ("map_Kd -s 2 red wood.png", "\"red\": option \"-s\" of map_Kd: ignored"),
         ("disp a.png", "\"red\": disp: ignored"),
     ] {
-        let place = Place::new(&format!("newmtl red\n{mtl}\n# all of it\nnewmtl blue\n"));
+        let place = TestFolder::new(&format!("newmtl red\n{mtl}\n# all of it\nnewmtl blue\n"));
         let scene = place.scene(MESH).unwrap();
         let [note] = &scene.notes[..] else {
             panic!("{:?}", scene.notes)
         };
         // The warning is about the last line of `mtl`.
         let line = 1 + mtl.lines().count();
-        let start = format!("in/a.mtl:{line}: material {told}");
+        let start = format!("in/a.mtl:{line}: material {warning}");
         assert!(note.message.starts_with(&start), "{note}\n{start}");
-        let place = Place::new(&format!("newmtl red\n{mtl}\nnewmtl blue\n{mtl}\n"));
+        let place = TestFolder::new(&format!("newmtl red\n{mtl}\nnewmtl blue\n{mtl}\n"));
         let notes = place.scene(MESH).unwrap().notes;
         assert!(
             notes.len() == 1 && notes[0].message.ends_with(" (and 1 more material)"),
@@ -206,25 +206,26 @@ fn what_cannot_be_rendered_is_told_once() {
         );
     }
     // Without effect, like a line without a file name.
-    let place =
-        Place::new("newmtl red\nKs 0\nNs 0\nd 1\nTr 0\nKe 0 0 0\nmap_Ka a.png\nPr 1\nNi 1.5\nillum 2\nnewmtl blue\n");
+    let place = TestFolder::new(
+        "newmtl red\nKs 0\nNs 0\nd 1\nTr 0\nKe 0 0 0\nmap_Ka a.png\nPr 1\nNi 1.5\nillum 2\nnewmtl blue\n",
+    );
     place.write("in/a.obj", &format!("mtllib\n{OBJ}"));
     assert_eq!(place.scene(MESH).unwrap().notes, Vec::<String>::new());
 }
 
 #[test]
 fn a_map_needs_texture_coordinates() {
-    let place = Place::new("newmtl red\nKd 1 0 0\nmap_Kd red wood.png\nnewmtl blue\n");
+    let place = TestFolder::new("newmtl red\nKd 1 0 0\nmap_Kd red wood.png\nnewmtl blue\n");
     place.write("in/a.obj", &OBJ.replace("/1", ""));
     let scene = place.scene(MESH).unwrap();
-    let told = "in/a.mtl:3: material \"red\": map_Kd: the mesh has no texture coordinates; Kd stands in";
-    assert_eq!(scene.notes, [told]);
+    let warning = "in/a.mtl:3: material \"red\": map_Kd: the mesh has no texture coordinates; Kd stands in";
+    assert_eq!(scene.notes, [warning]);
     assert_eq!(phong(named(&scene, "red")).1, Color::Plain(DVec3::X));
 }
 
 #[test]
-fn a_default_stands_in_for_missing_materials() {
-    let place = Place::new("newmtl red\n");
+fn missing_materials_get_a_default() {
+    let place = TestFolder::new("newmtl red\n");
     let note = |rest: &str| format!("in/a.obj: no material {rest}; a gray material is used instead");
     let notes = |keys: &str| place.scene(&format!("{MESH}{keys}")).unwrap().notes;
     let scene = place.scene(MESH).unwrap();
@@ -253,8 +254,8 @@ fn a_default_stands_in_for_missing_materials() {
 }
 
 #[test]
-fn a_changed_file_of_materials_is_read_anew() {
-    let place = Place::new("newmtl red\nKd 1 0 0\nnewmtl blue\n");
+fn changed_mtl_files_are_read_again() {
+    let place = TestFolder::new("newmtl red\nKd 1 0 0\nnewmtl blue\n");
     let first = place.scene(MESH).unwrap();
     place.write("in/a.mtl", "newmtl red\nKd 0.25 0 0\nnewmtl blue\n");
     let second = place.scene(MESH).unwrap();

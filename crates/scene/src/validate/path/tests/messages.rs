@@ -185,11 +185,11 @@ const BAD: &[(&str, &str, &str)] = &[
 
 #[test]
 fn bad_values_are_told_with_line_key_value_and_rule() {
-    for &(line, bad, told) in BAD {
+    for &(line, bad, expected) in BAD {
         let text = with(line, bad);
         let place = text[..text.find(bad).unwrap()].lines().count() + 1;
         let message = parse(&text).unwrap_err().to_string();
-        assert_eq!(message, format!("s.toml:{place}: {told}"));
+        assert_eq!(message, format!("s.toml:{place}: {expected}"));
     }
     let text = GOOD.replace("[render]", "[render]\nbackground = [0, 0.5, 0]");
     let place = text[..text.find("[environment]").unwrap()].lines().count() + 1;
@@ -232,7 +232,7 @@ fn values_at_the_limits_are_good() {
 
 /// Tests a Phong scene with each feature of the path tracer.
 #[test]
-fn what_only_paths_have_is_refused_under_phong() {
+fn path_tracer_features_are_rejected_under_phong() {
     const START: &str = "image = { width = 1, height = 1 }\n\
                          camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
     for (added, line, key) in [
@@ -279,11 +279,11 @@ fn what_only_paths_have_is_refused_under_phong() {
             false => text.replace("[materials.a]", &format!("{render}\n[materials.a]")),
         };
         let under_phong = under_phong.replace("[environment]", &format!("{render}\n[environment]"));
-        let told = format!(
+        let expected = format!(
             "s.toml:{}: {key} needs integrator = \"path\"",
             line + 3 + usize::from(!text.contains("[render]"))
         );
-        assert_eq!(parse(&under_phong).unwrap_err().to_string(), told);
+        assert_eq!(parse(&under_phong).unwrap_err().to_string(), expected);
         // Without an integrator the path tracer is used.
         let scene = parse(&text).unwrap();
         assert_eq!(scene.render.integrator, Integrator::Path);
@@ -304,8 +304,8 @@ fn what_only_paths_have_is_refused_under_phong() {
             false => format!("{text}{render}\n"),
         };
         parse(&under_path).unwrap();
-        let told = told.replace("s.toml:", "").split_once(": ").unwrap().1.to_owned();
+        let expected = expected.replace("s.toml:", "").split_once(": ").unwrap().1.to_owned();
         let refused = Scene::parse_with(&under_path, "s.toml", &overrides(Integrator::Phong)).unwrap_err();
-        assert!(refused.to_string().ends_with(&told), "{refused}");
+        assert!(refused.to_string().ends_with(&expected), "{refused}");
     }
 }

@@ -1,8 +1,7 @@
-//! Shows a picture in the terminal as it grows: all pixels have their first samples at once, and get better. It needs a
-//! terminal with 24-bit colours.
+//! Shows an image in the terminal while it is rendered progressively. Needs a terminal with 24-bit colours.
 //!
 //! ```sh
-//! cargo run --release --example growing -- scenes/cornell.toml
+//! cargo run --release --example progressive -- scenes/cornell.toml
 //! ```
 
 use std::io::{self, Write as _};
@@ -11,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use wgray::{Error, Options, Overrides, Picture, Scene};
 
-/// Width and height of the picture: two pixels, one above the other, are a character.
+/// Width and height of the image. One character shows two pixels, one above the other.
 const SIZE: (u32, u32) = (64, 48);
 
 fn main() -> Result<(), Error> {
@@ -24,15 +23,15 @@ fn main() -> Result<(), Error> {
     };
     let scene = Scene::load_with(file, &overrides)?;
 
-    let mut shown = Instant::now();
-    let picture = wgray::render_growing(&scene, &Options::default(), &mut |growing| {
-        if shown.elapsed() > Duration::from_millis(100) {
-            // Moves the cursor back up, so that the next picture stands in the place of this one.
-            let lines = draw(&growing.picture()?);
-            print!("{:3.0} %\x1b[{lines}A\r", growing.share() * 100.0);
-            shown = Instant::now();
+    let mut last_draw = Instant::now();
+    let picture = wgray::render_progressive(&scene, &Options::default(), &mut |progress| {
+        if last_draw.elapsed() > Duration::from_millis(100) {
+            // Moves the cursor back up, so that the next image overwrites this one.
+            let lines = draw(&progress.picture()?);
+            print!("{:3.0} %\x1b[{lines}A\r", progress.share() * 100.0);
+            last_draw = Instant::now();
         }
-        // A stream that takes nothing any more: nobody looks, so that the work can end.
+        // Cancels the rendering when the output is closed.
         Ok(match io::stdout().flush() {
             Ok(()) => ControlFlow::Continue(()),
             Err(_) => ControlFlow::Break(()),
@@ -43,7 +42,7 @@ fn main() -> Result<(), Error> {
     Ok(())
 }
 
-/// Prints a picture, and returns how many lines it takes.
+/// Prints an image and returns its number of lines.
 fn draw(picture: &Picture) -> usize {
     let (width, bytes) = (picture.width() as usize, picture.rgb8());
     let rows: Vec<&[u8]> = bytes.chunks(3 * width).collect();

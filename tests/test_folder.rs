@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// The folder, which goes with the value. What is run in it, and how, is said where it is used.
-pub struct Place {
+pub struct TestFolder {
     folder: TempDir,
 }
 
-impl Place {
+impl TestFolder {
     /// A folder with one file in it.
-    pub fn with_file(name: &str, text: &str) -> Place {
-        let place = Place {
+    pub fn with_file(name: &str, text: &str) -> TestFolder {
+        let place = TestFolder {
             folder: tempfile::tempdir().expect("a temporary folder"),
         };
         place.write(name, text);

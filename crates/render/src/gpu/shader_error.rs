@@ -1,7 +1,7 @@
 //! Errors of shaders, with the place that the author wrote.
 
 use super::compose::Source;
-use super::wording::chain;
+use super::naga_messages::chain;
 use crate::error::ShaderError;
 use crate::excerpt;
 

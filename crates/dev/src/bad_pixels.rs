@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// The kind of an invalid pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub enum BadPixel {
     /// A value is NaN.
     Nan,
     /// A value is infinite.
@@ -15,13 +15,13 @@ pub enum Fault {
     Negative,
 }
 
-impl Fault {
+impl BadPixel {
     /// Returns the kind of invalid values, the worst of several.
-    pub fn of(values: &[f32]) -> Option<Fault> {
+    pub fn of(values: &[f32]) -> Option<BadPixel> {
         let faults = [
-            (Fault::Nan, values.iter().any(|v| v.is_nan())),
-            (Fault::Infinite, values.iter().any(|v| v.is_infinite())),
-            (Fault::Negative, values.iter().any(|v| *v < 0.0)),
+            (BadPixel::Nan, values.iter().any(|v| v.is_nan())),
+            (BadPixel::Infinite, values.iter().any(|v| v.is_infinite())),
+            (BadPixel::Negative, values.iter().any(|v| *v < 0.0)),
         ];
         faults.into_iter().find(|(_, found)| *found).map(|(fault, _)| fault)
     }
@@ -29,9 +29,9 @@ impl Fault {
     /// Returns the color of the mark, which stands out from light.
     pub fn color(self) -> [u8; 3] {
         match self {
-            Fault::Nan => [255, 0, 255],
-            Fault::Infinite => [0, 255, 255],
-            Fault::Negative => [0, 255, 0],
+            BadPixel::Nan => [255, 0, 255],
+            BadPixel::Infinite => [0, 255, 255],
+            BadPixel::Negative => [0, 255, 0],
         }
     }
 }
@@ -54,7 +54,7 @@ pub struct BadPixels {
 
 impl BadPixels {
     /// Counts the invalid pixels of an image, given row by row from the top, of this width in pixels.
-    pub fn count(faults: &[Option<Fault>], width: u32) -> BadPixels {
+    pub fn count(faults: &[Option<BadPixel>], width: u32) -> BadPixels {
         let width = width as usize;
         let height = faults.len().div_ceil(width.max(1));
         let mut counted = BadPixels::default();
@@ -62,9 +62,9 @@ impl BadPixels {
         for (i, fault) in faults.iter().enumerate() {
             match fault {
                 None => continue,
-                Some(Fault::Nan) => counted.nan += 1,
-                Some(Fault::Infinite) => counted.infinite += 1,
-                Some(Fault::Negative) => counted.negative += 1,
+                Some(BadPixel::Nan) => counted.nan += 1,
+                Some(BadPixel::Infinite) => counted.infinite += 1,
+                Some(BadPixel::Negative) => counted.negative += 1,
             }
             let (x, y) = (i % width, i / width);
             let part = &mut told[y * PARTS / height * PARTS + x * PARTS / width];
@@ -81,13 +81,13 @@ pub fn faults<T: Sync, const N: usize>(
     pixels: &[T],
     negative: bool,
     values: impl Fn(&T) -> [f32; N] + Sync,
-) -> Vec<Option<Fault>> {
-    let fault = |pixel: &T| Fault::of(&values(pixel)).filter(|fault| !(negative && *fault == Fault::Negative));
+) -> Vec<Option<BadPixel>> {
+    let fault = |pixel: &T| BadPixel::of(&values(pixel)).filter(|fault| !(negative && *fault == BadPixel::Negative));
     pixels.par_iter().with_min_len(1024).map(fault).collect()
 }
 
 /// Paints the marks over the bytes of an image.
-pub fn mark(rgb: &mut [u8], faults: &[Option<Fault>]) {
+pub fn mark(rgb: &mut [u8], faults: &[Option<BadPixel>]) {
     for (pixel, fault) in rgb.chunks_exact_mut(3).zip(faults) {
         if let Some(fault) = fault {
             pixel.copy_from_slice(&fault.color());
@@ -104,12 +104,12 @@ mod tests {
         let (nan, inf) = (f32::NAN, f32::INFINITY);
         for (values, fault) in [
             ([0.0, -0.0, f32::MAX], None),
-            ([0.0, 1.0, -1e-45], Some(Fault::Negative)),
-            ([-1.0, inf, 0.0], Some(Fault::Infinite)),
-            ([-inf, 0.0, 0.0], Some(Fault::Infinite)),
-            ([-inf, 0.0, nan], Some(Fault::Nan)),
+            ([0.0, 1.0, -1e-45], Some(BadPixel::Negative)),
+            ([-1.0, inf, 0.0], Some(BadPixel::Infinite)),
+            ([-inf, 0.0, 0.0], Some(BadPixel::Infinite)),
+            ([-inf, 0.0, nan], Some(BadPixel::Nan)),
         ] {
-            assert_eq!(Fault::of(&values), fault, "{values:?}");
+            assert_eq!(BadPixel::of(&values), fault, "{values:?}");
         }
     }
 
@@ -125,11 +125,11 @@ mod tests {
         assert_eq!(rgb, [7, 7, 7, 255, 0, 255, 0, 255, 255, 0, 255, 0]);
         let allowed = faults(&pixels, true, |color| *color);
         assert_eq!(BadPixels::count(&allowed, 4).negative, 0);
-        let mut many = [Some(Fault::Negative); 1000];
+        let mut many = [Some(BadPixel::Negative); 1000];
         let counted = BadPixels::count(&many, 10);
         assert_eq!((counted.negative, counted.places.len()), (1000, PARTS * PARTS));
         many[10..].fill(None);
-        many[999] = Some(Fault::Nan);
+        many[999] = Some(BadPixel::Nan);
         let counted = BadPixels::count(&many, 10);
         assert!(counted.places.contains(&[9, 99]), "one that is alone is not left out");
     }

@@ -5,12 +5,12 @@ use glam::{DVec3, DVec4, Vec3, Vec4};
 use rayon::prelude::*;
 use robust::{Coord, orient2d};
 
-use super::draft::{Draft, counted};
-use super::error::{Fault, Place};
+use super::error::{Location, MeshFault};
 use super::neighbours::Neighbours;
+use super::raw_mesh::{RawMesh, counted};
 use super::{MAX_COLOR, MOST, Mesh, Normals, polygon};
 
-pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fault> {
+pub(super) fn build_mesh(mut draft: RawMesh, normals: Option<Normals>) -> Result<Mesh, MeshFault> {
     polygon::triangulate(&mut draft);
     let mut mesh = Mesh {
         normals: draft.normals,
@@ -26,7 +26,7 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     let count = mesh.triangles.len();
     if count == 0 {
         let reason = draft.without_triangles.map(|reason| format!(": {reason}"));
-        return Err(Fault::empty(&reason.unwrap_or_default()));
+        return Err(MeshFault::empty(&reason.unwrap_or_default()));
     }
     if mesh.groups.len() > 1 {
         let ends = draft.runs.iter().skip(1).map(|(start, _)| *start).chain([count]);
@@ -47,7 +47,7 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     });
     let count = mesh.triangles.len();
     if count == 0 {
-        return Err(Fault::empty(""));
+        return Err(MeshFault::empty(""));
     }
     round(&mut mesh, &draft.positions);
     drop(draft.positions);
@@ -55,7 +55,7 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     drop_unused(&mut mesh);
     let dropped = count - mesh.triangles.len();
     if mesh.triangles.is_empty() {
-        return Err(Fault::empty(&format!(" but {dropped} without an area")));
+        return Err(MeshFault::empty(&format!(" but {dropped} without an area")));
     }
     if dropped > 0 {
         mesh.notes.push(removed(
@@ -91,7 +91,9 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
         Some(Normals::Smooth) => mesh.normals = smooth(&mesh, &neighbours),
         Some(Normals::Flat) => mesh.normals = Vec::new(),
         Some(Normals::File) if mesh.normals.is_empty() => {
-            return Err(Place::File.fault("has no normals; \"smooth\" and \"flat\" ones are made from the triangles"));
+            return Err(
+                Location::File.fault("has no normals; \"smooth\" and \"flat\" ones are made from the triangles")
+            );
         }
         Some(Normals::File) | None => {
             let missing = mesh.normals.iter().filter(|normal| **normal == Vec3::ZERO).count();
@@ -262,7 +264,7 @@ fn smooth(mesh: &Mesh, neighbours: &Neighbours) -> Vec<Vec3> {
 }
 
 /// Fills in missing normals from triangles, splitting vertices if these differ.
-fn fill_normals(mesh: &mut Mesh) -> Result<(), Fault> {
+fn fill_normals(mesh: &mut Mesh) -> Result<(), MeshFault> {
     let missing: Vec<bool> = mesh.normals.iter().map(|normal| *normal == Vec3::ZERO).collect();
     if !missing.contains(&true) {
         return Ok(());
@@ -279,7 +281,7 @@ fn fill_normals(mesh: &mut Mesh) -> Result<(), Fault> {
                 mesh.normals[i] = normal;
             } else if mesh.normals[i] != normal {
                 if mesh.positions.len() >= MOST {
-                    return Err(Place::File.fault(format!("there must be at most {MOST} vertices")));
+                    return Err(Location::File.fault(format!("there must be at most {MOST} vertices")));
                 }
                 *vertex = mesh.positions.len() as u32;
                 mesh.positions.push(position);

@@ -4,13 +4,13 @@ use crate::note::Note;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::damage::Damages;
-use super::error::{Fault, Place, shown_number};
+use super::error::{Location, MeshFault, shown_number};
 use super::polygon::Polygon;
-use super::{Group, MAX_COORDINATE, MOST, Mesh, finish};
+use super::{Group, MAX_COORDINATE, MOST, Mesh, build};
 
 /// A mesh in file coordinates.
 #[derive(Default)]
-pub(crate) struct Draft {
+pub(crate) struct RawMesh {
     pub positions: Vec<DVec3>,
     /// Unit normal of each vertex (zero if invalid), or empty.
     pub normals: Vec<Vec3>,
@@ -34,7 +34,7 @@ pub(crate) struct Draft {
     pub(super) damages: Damages,
 }
 
-impl Draft {
+impl RawMesh {
     /// Assigns the following triangles to a group.
     pub fn begin(&mut self, group: u32) {
         if self.runs.last().is_none_or(|(_, last)| *last != group) {
@@ -44,7 +44,7 @@ impl Draft {
 
     /// Builds the mesh with its normals; `None` without area. The error is the rule.
     pub(crate) fn finish(self) -> Result<Option<Mesh>, String> {
-        match finish::finish(self, None) {
+        match build::build_mesh(self, None) {
             Ok(mesh) => Ok(Some(mesh)),
             Err(fault) if fault.is_empty => Ok(None),
             Err(fault) => Err(fault.message),
@@ -53,7 +53,7 @@ impl Draft {
 
     /// Adds a face as a triangle fan.
     #[inline]
-    pub(super) fn face(&mut self, corners: &[u32], place: Place) -> Result<(), Fault> {
+    pub(super) fn face(&mut self, corners: &[u32], place: Location) -> Result<(), MeshFault> {
         let &[first, ref others @ ..] = corners else {
             return Ok(());
         };

@@ -63,16 +63,16 @@ impl Drop for Inside {
 
 /// A value of a library whose drop may panic; such panics are ignored.
 #[derive(Clone)]
-pub struct DropContained<T>(ManuallyDrop<T>);
+pub struct CatchPanicOnDrop<T>(ManuallyDrop<T>);
 
-impl<T> DropContained<T> {
+impl<T> CatchPanicOnDrop<T> {
     /// Wraps a value.
-    pub fn new(value: T) -> DropContained<T> {
-        DropContained(ManuallyDrop::new(value))
+    pub fn new(value: T) -> CatchPanicOnDrop<T> {
+        CatchPanicOnDrop(ManuallyDrop::new(value))
     }
 }
 
-impl<T> Deref for DropContained<T> {
+impl<T> Deref for CatchPanicOnDrop<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
@@ -80,7 +80,7 @@ impl<T> Deref for DropContained<T> {
     }
 }
 
-impl<T> Drop for DropContained<T> {
+impl<T> Drop for CatchPanicOnDrop<T> {
     fn drop(&mut self) {
         // SAFETY: the value is not used afterwards.
         let value = unsafe { ManuallyDrop::take(&mut self.0) };
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_drop_that_panics_is_contained_where_others_are_not() {
-        drop(DropContained::new(Bad));
-        assert!(catch_unwind(|| drop(Bad)).is_err(), "which by itself is not");
+        drop(CatchPanicOnDrop::new(Bad));
+        assert!(catch_unwind(|| drop(Bad)).is_err(), "the control does not panic");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::error::{Fault, Place, shown};
+use super::error::{Location, MeshFault, shown};
 
 /// Returns UTF-8, converted from UTF-16 with a byte order mark.
 pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
@@ -19,7 +19,7 @@ pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
 
 /// Words between blanks. `#` at the start of a word begins a comment. A backslash at the end of a line joins it with
 /// the next one.
-pub(super) struct Words<'a> {
+pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
     at: usize,
     line: usize,
@@ -27,12 +27,12 @@ pub(super) struct Words<'a> {
     end: u8,
 }
 
-impl<'a> Words<'a> {
-    pub fn new(bytes: &'a [u8]) -> Words<'a> {
+impl<'a> Tokens<'a> {
+    pub fn new(bytes: &'a [u8]) -> Tokens<'a> {
         let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 }; // UTF-8 byte order mark
         // Old Mac text has carriage returns only.
         let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
-        Words {
+        Tokens {
             bytes,
             at,
             line: 1,
@@ -160,7 +160,7 @@ impl<'a> Words<'a> {
 
     /// Reads a number. `what` names it in errors.
     #[inline]
-    pub fn number(&mut self, what: &str) -> Result<f64, Fault> {
+    pub fn number(&mut self, what: &str) -> Result<f64, MeshFault> {
         match self.on_line() {
             Some(word) => number(word).ok_or_else(|| self.fault(format!("{what}: {} must be a number", shown(word)))),
             None => Err(self.fault(format!("{what} is missing"))),
@@ -177,15 +177,15 @@ impl<'a> Words<'a> {
         self.bytes.len() - self.at
     }
 
-    pub fn place(&self) -> Place {
-        Place::Line(self.line)
+    pub fn place(&self) -> Location {
+        Location::Line(self.line)
     }
 
     pub fn line(&self) -> usize {
         self.line
     }
 
-    pub fn fault(&self, message: impl Into<String>) -> Fault {
+    pub fn fault(&self, message: impl Into<String>) -> MeshFault {
         self.place().fault(message)
     }
 }
@@ -200,14 +200,14 @@ mod tests {
     use super::*;
 
     fn lines(text: &str) -> Vec<(usize, Vec<String>)> {
-        let mut words = Words::new(text.as_bytes());
+        let mut words = Tokens::new(text.as_bytes());
         let mut lines = Vec::new();
         loop {
             let mut line = Vec::new();
             while let Some(word) = words.on_line() {
                 line.push(String::from_utf8_lossy(word).into_owned());
             }
-            let Place::Line(number) = words.place() else {
+            let Location::Line(number) = words.place() else {
                 unreachable!("a text has lines")
             };
             if !line.is_empty() {
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn names_have_blanks() {
-        let mut words = Words::new(b"usemtl  dark   red #2 \r\nusemtl #3");
+        let mut words = Tokens::new(b"usemtl  dark   red #2 \r\nusemtl #3");
         assert_eq!(words.on_line(), Some(&b"usemtl"[..]));
         assert_eq!(words.name(), "dark red #2");
         assert_eq!(words.anywhere(), Some(&b"usemtl"[..]));

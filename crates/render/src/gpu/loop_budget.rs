@@ -4,7 +4,7 @@ use crate::records::{MAX_PATH_LEAVES, Packed, SAMPLE_BLOCK};
 
 /// Iterations of all loops together after which the llvmpipe of Mesa 22.3 ends every loop of an invocation. An
 /// iteration counts if any lane of the vector needs it.
-const MOST_ROUNDS: f64 = 65_535.0;
+const MAX_ROUNDS: f64 = 65_535.0;
 /// Estimated number of primitives that may occlude a block of light samples.
 const CANDIDATES: f64 = 4.0;
 
@@ -12,7 +12,7 @@ const CANDIDATES: f64 = 4.0;
 const ROUNDS_OF_TREE: f64 = 150.0;
 
 /// Bounces after which Russian roulette has ended nearly all paths: a reflectance of 95 % leaves 0.95^100 = 0.6 %.
-const LONGEST_ROULETTE: u32 = 100;
+const MAX_ROULETTE_BOUNCES: u32 = 100;
 
 /// Estimated number of surfaces that a ray skips by alpha before a hit.
 const ROUNDS_OF_PASSING: f64 = 4.0;
@@ -22,8 +22,8 @@ const ROUNDS_OF_LOOKUP: f64 = 8.0;
 
 /// Returns the estimated maximum number of samples per dispatch. If it is too high, a truncated dispatch is repeated
 /// with fewer samples, which only costs time. If it is too low, additional dispatches cost time.
-pub fn samples_per_call(packed: &Packed, baked: bool) -> u32 {
-    let samples = MOST_ROUNDS / rounds_of_sample(packed, baked);
+pub fn samples_per_dispatch(packed: &Packed, baked: bool) -> u32 {
+    let samples = MAX_ROUNDS / rounds_of_sample(packed, baked);
     (samples as u32).max(1)
 }
 
@@ -46,7 +46,7 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
         // Each bounce is an iteration, with a BSDF ray, a shadow ray and texture lookups.
         let to_light = if baked { in_tree } else { casters + in_tree };
         let passing = if s.alpha_surfaces == 0 { 1.0 } else { ROUNDS_OF_PASSING };
-        let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(LONGEST_ROULETTE)));
+        let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(MAX_ROULETTE_BOUNCES)));
         // Descent of the light tree to select an emitter, and ascent for the PDF of a hit emitter.
         let levels = 2.0 * f64::from(packed.lighting.nodes.len().max(1).ilog2());
         let of_bounce = 1.0 + of_hit + to_light + levels + f64::from(s.lookups) * ROUNDS_OF_LOOKUP;
@@ -85,15 +85,15 @@ mod tests {
 
     #[test]
     fn longer_samples_come_in_shorter_calls() {
-        let plain = samples_per_call(&scene(6, 0), false);
+        let plain = samples_per_dispatch(&scene(6, 0), false);
         assert!((100..65_535).contains(&plain), "{plain}");
-        assert!(samples_per_call(&scene(6, 0), true) > plain);
-        assert!(samples_per_call(&scene(100, 0), false) < plain);
-        assert!(samples_per_call(&scene(6, 10), false) < plain);
+        assert!(samples_per_dispatch(&scene(6, 0), true) > plain);
+        assert!(samples_per_dispatch(&scene(100, 0), false) < plain);
+        assert!(samples_per_dispatch(&scene(6, 10), false) < plain);
         let changed = |change: fn(&mut Specialization)| {
             let mut packed = scene(6, 0);
             change(&mut packed.specialization);
-            samples_per_call(&packed, false)
+            samples_per_dispatch(&packed, false)
         };
         assert!(changed(|s| s.light_samples = 256) < plain);
         assert!(changed(|s| s.bounces = 8) < plain);
@@ -102,7 +102,7 @@ mod tests {
                 "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\
                  render = {{ integrator = 'path', max_depth = {depth}, rr_depth = 8 }}\n"
             );
-            samples_per_call(&pack(&Scene::parse(&text, "s").unwrap()), false)
+            samples_per_dispatch(&pack(&Scene::parse(&text, "s").unwrap()), false)
         };
         assert!(
             path(0) > path(5) && path(5) > path(100) && path(1024) > 100,
@@ -111,7 +111,10 @@ mod tests {
             path(1024)
         );
         assert_eq!(changed(|s| s.light_samples = 65_536), 1);
-        assert!(samples_per_call(&scene(70_000, 0), false) > 1, "they are in the tree");
-        assert!(samples_per_call(&scene(0, 0), true) > 500);
+        assert!(
+            samples_per_dispatch(&scene(70_000, 0), false) > 1,
+            "the spheres are not in the BVH"
+        );
+        assert!(samples_per_dispatch(&scene(0, 0), true) > 500);
     }
 }

@@ -6,7 +6,7 @@ use wgray_render::cpu::differential::{Derivative, Differential, HitDifferential}
 use wgray_render::cpu::diffuse::Angles;
 use wgray_render::cpu::equirect::EnvironmentCell;
 use wgray_render::cpu::footprint::{Ellipse, Footprint};
-use wgray_render::cpu::light::Segments;
+use wgray_render::cpu::light::LightSegments;
 use wgray_render::cpu::light_sample::{CylinderPart, CylinderPoint};
 use wgray_render::cpu::lobe::LobeSample;
 use wgray_render::cpu::mesh::{Crossing, HitPrimitive, Shear};
@@ -16,14 +16,14 @@ use wgray_render::cpu::phong::Lobes;
 use wgray_render::cpu::primitive::Tangents;
 use wgray_render::cpu::principled::PrincipledLobes;
 use wgray_render::cpu::ray::{Hit, Ray};
-use wgray_render::cpu::shadow::{Cone, SampleBlock};
+use wgray_render::cpu::shadow::{SampleBlock, ShadowFrustum};
 use wgray_render::cpu::slab::{RayInterval, Slabs};
 use wgray_render::cpu::surface::Surface;
 use wgray_render::records::{
     Camera, Environment, FirstHit, Instance, Light, LightNode, Material, Node, Primitive, Sphere, Texture,
 };
 
-pub trait Words: Sized {
+pub trait ProbeWords: Sized {
     /// Reads from the front and advances.
     fn read(words: &mut &[u32]) -> Self;
     fn write(&self, words: &mut Vec<u32>);
@@ -31,7 +31,7 @@ pub trait Words: Sized {
 
 macro_rules! scalars {
     ($($ty:ty: |$bits:ident| $from:expr, |$value:ident| $to:expr;)*) => {$(
-        impl Words for $ty {
+        impl ProbeWords for $ty {
             fn read(words: &mut &[u32]) -> Self {
                 let ($bits, rest) = words.split_first().expect("as many words as the type has");
                 *words = rest;
@@ -54,7 +54,7 @@ scalars! {
 /// Plain data, uploaded as is.
 macro_rules! pod {
     ($($ty:ty),* $(,)?) => {$(
-        impl Words for $ty {
+        impl ProbeWords for $ty {
             fn read(words: &mut &[u32]) -> Self {
                 let (own, rest) = words.split_at(size_of::<$ty>() / 4);
                 *words = rest;
@@ -84,9 +84,9 @@ pod![
 /// Records of `crates/render/src/cpu/`; a missing field does not compile.
 macro_rules! records {
     ($($ty:ident { $($field:ident),* $(,)? })*) => {$(
-        impl Words for $ty {
+        impl ProbeWords for $ty {
             fn read(words: &mut &[u32]) -> Self {
-                $(let $field = Words::read(words);)*
+                $(let $field = ProbeWords::read(words);)*
                 $ty { $($field),* }
             }
             fn write(&self, words: &mut Vec<u32>) {
@@ -115,31 +115,31 @@ records! {
     Angles { wi, wo, between }
     LobeSample { wi, weight, pdf, eta }
     PrincipledLobes {
-        diffuse, alpha, f0, f90, glass, passed, glass_f0, glass_f90, head_on, ratio, eta, thin, coat, coat_alpha,
-        coat_normal, sheen, sheen_alpha, chances,
+        diffuse, alpha, f0, f90, glass, transmission_tint, glass_f0, glass_f90, f0_ior, ratio, eta, thin, coat, coat_alpha,
+        coat_normal, sheen, sheen_alpha, lobe_probs,
     }
     PhongFactors { diffuse, specular, diffuse_share }
-    Segments { towards, u, v }
+    LightSegments { towards, u, v }
     Lobes { diffuse, specular }
     SampleBlock { pattern, side, first, count, group, key }
-    Cone { apex, to, length2, inverse_depth }
+    ShadowFrustum { apex, to, length2, inverse_depth }
     Slabs { low_origin, high_origin, inverse }
     RayInterval { low_origin, high_origin, near_low, near_high, far_low, far_high }
     Shear { axis, slope, scale }
-    Crossing { met, t, barycentric }
+    Crossing { is_hit, t, barycentric }
     HitPrimitive {
         primitive, edge_1, edge_2, uv_0, uv_1, uv_2, normal_0, normal_1, normal_2, tangents_0, tangents_1,
-        tangents_2, anchor, condition,
+        tangents_2, anchor, condition_number,
     }
 }
 
 /// An argument of a twin, by value or by reference.
 pub trait Argument<'a>: Sized {
-    type Owned: Words;
+    type Owned: ProbeWords;
     fn of(owned: &'a Self::Owned) -> Self;
 }
 
-impl<'a, T: Words + Copy> Argument<'a> for T {
+impl<'a, T: ProbeWords + Copy> Argument<'a> for T {
     type Owned = T;
     fn of(owned: &'a T) -> T {
         *owned
@@ -166,7 +166,7 @@ by_reference![
     LightNode,
     Sphere,
     Surface,
-    Cone,
+    ShadowFrustum,
     Texture,
     Node,
     Instance,

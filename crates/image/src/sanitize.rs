@@ -13,12 +13,12 @@ fn acts(c: char) -> bool {
 }
 
 /// Escapes a text, including line breaks.
-pub fn visible(text: &str) -> Cow<'_, str> {
+pub fn escape_control(text: &str) -> Cow<'_, str> {
     shown(text, &[])
 }
 
 /// Escapes a text of several lines; line breaks and tabs are kept.
-pub fn visible_lines(text: &str) -> Cow<'_, str> {
+pub fn escape_control_in_lines(text: &str) -> Cow<'_, str> {
     shown(text, &['\n', '\t'])
 }
 
@@ -51,9 +51,9 @@ mod tests {
             ("\u{202e}gnp.exe\u{2066}\u{200f}", "\\u{202e}gnp.exe\\u{2066}\\u{200f}"),
             ("Größe 日本 é \"\\\" 🦀", "Größe 日本 é \"\\\" 🦀"),
         ] {
-            assert_eq!(visible(text), wanted);
+            assert_eq!(escape_control(text), wanted);
         }
-        assert!(matches!(visible("plain"), Cow::Borrowed("plain")));
-        assert_eq!(visible_lines("a\n\tb\u{1b}\n"), "a\n\tb\\u{1b}\n");
+        assert!(matches!(escape_control("plain"), Cow::Borrowed("plain")));
+        assert_eq!(escape_control_in_lines("a\n\tb\u{1b}\n"), "a\n\tb\\u{1b}\n");
     }
 }

@@ -196,10 +196,10 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
             "", "#", "#ff", "#ffff", "+12", "##12345", "#12345g", "#+12345", "#1234567", "1,2", "1,2,3,4", "1,2,x",
             "blue", "None",
         ] {
-            let told = bad.parse::<Background>().unwrap_err();
+            let message = bad.parse::<Background>().unwrap_err();
             assert!(
-                told.starts_with("must be none or a color, such as white"),
-                "{bad}: {told}"
+                message.starts_with("must be none or a color, such as white"),
+                "{bad}: {message}"
             );
         }
     }
@@ -216,8 +216,11 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
             assert_eq!(std::path::Path::new(&file), here.join(path));
         }
         for bad in ["", "#ff", "forest", "1,2"] {
-            let told = bad.parse::<EnvironmentDescription>().unwrap_err();
-            assert!(told.starts_with("must be studio, sky, an image file (.hdr"), "{told}");
+            let message = bad.parse::<EnvironmentDescription>().unwrap_err();
+            assert!(
+                message.starts_with("must be studio, sky, an image file (.hdr"),
+                "{message}"
+            );
         }
     }
 
@@ -304,7 +307,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
 
     #[test]
     fn bad_surroundings_are_told_as_the_options_that_they_are() {
-        let told = |more: &str, environment: Option<&str>, background: Option<&str>| {
+        let message = |more: &str, environment: Option<&str>, background: Option<&str>| {
             let overrides = Overrides {
                 environment: environment.map(|text| text.parse().unwrap()),
                 background: background.map(|text| text.parse().unwrap()),
@@ -341,12 +344,12 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
                 "environment: \"/nowhere/room.hdr\" cannot be read: ",
             ),
         ] {
-            let error = told(more, environment, background);
+            let error = message(more, environment, background);
             assert!(matches!(error, SceneError::Override(_)), "{error}");
             assert!(error.to_string().starts_with(wanted), "{error}: {wanted}");
         }
         // Errors in values of the file name the file.
-        let error = told(
+        let error = message(
             &format!("{path}materials.a = {{ type = 'glass', ior = 0 }}\n"),
             Some("sky"),
             None,

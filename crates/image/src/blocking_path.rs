@@ -6,7 +6,7 @@ use std::path::Path;
 
 /// Rejects devices, and named pipes, which block until a writer opens them. Anonymous pipes are accepted: standard
 /// input and `<(...)` of a shell have a writer. A missing file is accepted; opening it reports the error.
-pub fn check(path: &Path) -> io::Result<()> {
+pub fn reject(path: &Path) -> io::Result<()> {
     let Ok(data) = fs::metadata(path) else { return Ok(()) };
     let refused = |rule| Err(io::Error::new(io::ErrorKind::InvalidInput, rule));
     match kind(data.file_type()) {
@@ -50,9 +50,9 @@ mod tests {
         let pipe = folder.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
-        assert!(check(&pipe).unwrap_err().to_string().contains("a named pipe"));
+        assert!(reject(&pipe).unwrap_err().to_string().contains("a named pipe"));
         assert!(
-            check(Path::new("/dev/zero"))
+            reject(Path::new("/dev/zero"))
                 .unwrap_err()
                 .to_string()
                 .contains("a device")
@@ -60,7 +60,7 @@ mod tests {
         let file = folder.path().join("file");
         fs::write(&file, "").unwrap();
         for good in [&file, folder.path(), &folder.path().join("none")] {
-            check(good).unwrap();
+            reject(good).unwrap();
         }
     }
 
@@ -69,6 +69,6 @@ mod tests {
     fn pipes_without_names_are_read() {
         use std::os::fd::AsRawFd as _;
         let (reader, _writer) = io::pipe().unwrap();
-        check(Path::new(&format!("/proc/self/fd/{}", reader.as_raw_fd()))).unwrap();
+        reject(Path::new(&format!("/proc/self/fd/{}", reader.as_raw_fd()))).unwrap();
     }
 }
