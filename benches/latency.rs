@@ -1,4 +1,5 @@
-//! The latency of the development mode: the time from a change of a scene or shader to its image, on copies in a temporary folder.
+//! Latency of the development mode: the time from a change of a scene or shader to its image, measured on copies in a
+//! temporary folder.
 //!
 //! ```sh
 //! cargo bench --bench latency                          # scenes/cornell.toml
@@ -23,11 +24,11 @@ const TIMEOUT: Duration = Duration::from_secs(120);
 /// The expression of `kernels/render.wgsl` that is multiplied by a factor.
 const EXPRESSION: &str = "path_value(path)";
 
-/// The times from a change until the old image is given up, to the first image, and until each pixel has a sample.
+/// Times from a change until the old image is discarded, until the first image, and until each pixel has a sample.
 type Times = [Duration; 3];
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench"); // which cargo adds
+    let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench"); // cargo adds --bench
     let scene = arguments.next().unwrap_or_else(|| "scenes/cornell.toml".to_owned());
     let text = fs::read_to_string(&scene).unwrap_or_else(|error| panic!("{scene}: {error}"));
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -59,7 +60,7 @@ fn main() {
         "{:<14}{:>16}{:>18}{:>22}",
         "change", "old one stopped", "first image", "every pixel sampled"
     );
-    // Each run has its own seeds and kernels, which no cache contains.
+    // Each run has its own seeds and kernels, so that no cache contains them.
     let now = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .map_or(0, |time| time.as_millis() as usize % 65_536);

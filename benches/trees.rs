@@ -1,4 +1,4 @@
-//! Benchmarks of BVH construction over triangles and of BVH traversal, on all threads: `cargo bench --bench trees`.
+//! Benchmarks of BVH construction over triangles and of BVH traversal, using all threads: `cargo bench --bench trees`.
 
 use std::hint::black_box;
 

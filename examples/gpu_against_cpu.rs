@@ -32,7 +32,7 @@ fn main() -> Result<ExitCode, Error> {
         return Ok(ExitCode::FAILURE);
     }
     let Some(difference) = difference(&gpu.pixels(), &cpu.pixels(), 0.0) else {
-        return Ok(ExitCode::FAILURE); // Only for images of different sizes.
+        return Ok(ExitCode::FAILURE); // The images have different sizes.
     };
     let name = &gpu.device().name;
     println!(

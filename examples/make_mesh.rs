@@ -1,5 +1,4 @@
-//! Writes meshes that are formulas, so that anyone has the same ones: the knot in `scenes/meshes/`, and large ones to
-//! measure with.
+//! Writes procedural meshes, which need no download: the knot of `scenes/meshes/`, and large meshes for measurements.
 //!
 //! ```sh
 //! cargo run --release --example make_mesh -- knot scenes/meshes/knot.obj
@@ -7,8 +6,8 @@
 //! cargo run --release --example make_mesh -- rock 1000000 target/rock.ply
 //! ```
 //!
-//! The number is about how many triangles there shall be. The ending of the name says the format: `.obj`, `.ply`, `.stl` or
-//! `.glb`, all but the first binary. +Z is up, but in `.glb` +Y is.
+//! The number is the approximate number of triangles. The file extension selects the format: `.obj`, or one of the
+//! binary formats `.ply`, `.stl` and `.glb`. +Z is up, except in `.glb`, where +Y is up.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -31,12 +30,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Points along the knot, and around its tube.
+/// Number of points along the knot (`ALONG`) and around its tube (`AROUND`).
 const ALONG: usize = 216;
 const AROUND: usize = 12;
 
-/// A tube along the (2, 3) torus knot, as the text of an OBJ file: closed, with unit normals and texture coordinates. It is
-/// 0.8 wide and rests on the plane z = 0.
+/// Returns a tube along the (2, 3) torus knot as the text of an OBJ file: closed, with unit normals and texture
+/// coordinates. It is 0.8 wide and rests on the plane z = 0.
 pub fn knot() -> String {
     const TORUS: f64 = 0.23;
     const RING: f64 = 0.1;
@@ -48,7 +47,7 @@ pub fn knot() -> String {
         let ((sin_a, cos_a), (sin_b, cos_b)) = ((2.0 * t).sin_cos(), (3.0 * t).sin_cos());
         let radius = TORUS + RING * cos_b;
         let center = [radius * cos_a, radius * sin_a, RING * sin_b];
-        // The curve lies on a torus, whose normal is at right angles to it.
+        // The curve lies on a torus, whose normal is perpendicular to the curve.
         let out = [cos_b * cos_a, cos_b * sin_a, sin_b];
         let tangent = unit([
             -3.0 * RING * sin_b * cos_a - 2.0 * radius * sin_a,
@@ -83,7 +82,7 @@ pub fn knot() -> String {
         let [x, y, z] = n.map(|x| (x * 1e3).round() / 1e3 + 0.0);
         line(format_args!("vn {x} {y} {z}"));
     }
-    // A square of the texture is about as long as it is wide.
+    // One repetition of the texture is about as long as it is wide.
     for i in 0..=ALONG {
         for j in 0..=AROUND {
             let (u, v) = (i as f64 / AROUND as f64, j as f64 / AROUND as f64);
@@ -104,16 +103,15 @@ pub fn knot() -> String {
     text
 }
 
-/// Triangles that share vertices.
+/// An indexed triangle mesh.
 pub struct Triangles {
-    /// The vertices.
     pub positions: Vec<[f32; 3]>,
-    /// Counter-clockwise from outside.
+    /// Vertex indices, counterclockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl Triangles {
-    /// The bytes of a file with this name.
+    /// Returns the bytes of a file with this name, whose extension selects the format.
     pub fn to_bytes(&self, file: &str) -> Result<Vec<u8>, Box<dyn Error>> {
         match Path::new(file).extension().and_then(|ending| ending.to_str()) {
             Some("obj") => Ok(self.to_obj()),
@@ -135,7 +133,7 @@ impl Triangles {
         text.into_bytes()
     }
 
-    /// glTF: a mesh of one primitive, in a container.
+    /// Returns a .glb file with one mesh of one primitive.
     fn to_glb(&self) -> Vec<u8> {
         let (vertices, indices) = (self.positions.len(), 3 * self.triangles.len());
         let mut binary = Vec::with_capacity(12 * vertices + 4 * indices);
@@ -208,7 +206,7 @@ impl Triangles {
     }
 }
 
-/// Hills of about so many triangles, 2 wide, above z = 0.
+/// Returns hills of about `count` triangles, 2 wide, above z = 0.
 pub fn terrain(count: usize) -> Triangles {
     let side = ((count as f64 / 2.0).sqrt().round() as usize).max(1);
     let coordinate = |i: usize| 2.0 * i as f64 / side as f64 - 1.0;
@@ -227,8 +225,8 @@ pub fn terrain(count: usize) -> Triangles {
     Triangles { positions, triangles }
 }
 
-/// A closed asteroid of about so many triangles, of radius 0.4 about, around the origin: a cube, blown up to a sphere, with
-/// bumps of all sizes.
+/// Returns a closed asteroid of about `count` triangles and a radius of about 0.4 around the origin: a cube projected
+/// onto a sphere, displaced by noise of all frequencies.
 pub fn rock(count: usize) -> Triangles {
     let side = ((count as f64 / 12.0).sqrt().round() as usize).max(1);
     let mut positions = Vec::with_capacity(6 * side * side + 2);
@@ -236,7 +234,7 @@ pub fn rock(count: usize) -> Triangles {
     let mut numbers = HashMap::with_capacity(6 * side * side + 2);
     let mut vertex = |lattice: [usize; 3]| -> u32 {
         *numbers.entry(lattice).or_insert_with(|| {
-            // By the tangent of an angle, cells on the sphere are of about the same size.
+            // Equiangular coordinates: with the tangent, all cells have about the same size on the sphere.
             let on_cube = lattice.map(|i| ((2.0 * i as f64 / side as f64 - 1.0) * TAU / 8.0).tan());
             let direction = unit(on_cube);
             let radius = 0.4 + 0.16 * noise(direction.map(|x| 1.3 * x + 7.0), 10);
@@ -265,14 +263,14 @@ pub fn rock(count: usize) -> Triangles {
     Triangles { positions, triangles }
 }
 
-/// Value noise, summed over octaves of half the size and half the height each: about -1 to 1. Ebert et al., "Texturing and
-/// Modeling: A Procedural Approach", chapters 2 and 16.
+/// Returns value noise from about -1 to 1, summed over octaves; each octave halves the size and the amplitude. Ebert et
+/// al., "Texturing and Modeling: A Procedural Approach", chapters 2 and 16.
 fn noise(mut point: [f64; 3], octaves: u32) -> f64 {
     let mut sum = 0.0;
     let mut height = 0.5;
     for octave in 0..octaves {
         let cell = point.map(f64::floor);
-        // Steps without edges: 3 t^2 - 2 t^3.
+        // Smoothstep: 3 t^2 - 2 t^3.
         let weight: [f64; 3] = std::array::from_fn(|k| {
             let t = point[k] - cell[k];
             t * t * (3.0 - 2.0 * t)
@@ -284,14 +282,14 @@ fn noise(mut point: [f64; 3], octaves: u32) -> f64 {
         let face = |z: i64| mix(edge(0, z), edge(1, z), weight[1]);
         sum += height * mix(face(0), face(1), weight[2]);
         height *= 0.5;
-        // Another place in the lattice, so that cells of different octaves do not lie on each other.
+        // The offset prevents the lattices of different octaves from coinciding.
         point = point.map(|x| 2.0 * x + 0.37);
     }
     2.0 * sum
 }
 
-/// A random value of a lattice point, -1 to 1, by SplitMix64's mixer: Steele, Lea and Flood, "Fast Splittable Pseudorandom
-/// Number Generators", OOPSLA 2014.
+/// Returns a random value from -1 to 1 for a lattice point, by the mixing function of SplitMix64: Steele, Lea and
+/// Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014.
 fn value(cell: [i64; 3], octave: u32) -> f64 {
     let mut z = u64::from(octave);
     for k in cell {

@@ -1,13 +1,14 @@
 // Adaptive sampling: the variance of a pixel, and its sample count from its neighbors' pilot samples.
 
-// Returns a pixel's moments after a sample, where `sum` precedes it: xyz the sums of squared deviations from the mean,
-// w the sample count. Welford's update for weighted samples ("Note on a Method for Calculating Corrected Sums of
-// Squares and Products", Technometrics 4(3), 1962).
+// Returns a pixel's moments after a sample; `sum` is the pixel's weighted sum before it. xyz are sums of squared
+// deviations from the mean, w is the sample count. Welford's update for weighted samples ("Note on a Method for
+// Calculating Corrected Sums of Squares and Products", Technometrics 4(3), 1962).
 fn moments_with(moments: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     return moments + vec4f(squared_deviation(sum, sample), 1.0);
 }
 
-// Returns the sum's increment, clamped at 0: weights of mixed sign can make it negative.
+// Returns the increment of the sum of squared deviations, clamped at 0, since weights of mixed sign can make it
+// negative.
 fn squared_deviation(sum: vec4f, sample: vec4f) -> vec3f {
     let before = sample.rgb - mean_of(sum) * sample.w;
     let after = sample.rgb - mean_of(sum + sample) * sample.w;
@@ -56,9 +57,9 @@ fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
     return vec4f(display_variance(sum, moments), pilot.y, pilot.z, 1.0);
 }
 
-// Returns a pixel's sample count from its neighbors' pilot statistics over `first` samples each. Doubles it until the
-// mean square error is small enough, if the evidence allows: the effective sample size y^2 / z is 1 where a single
-// sample deviates, and the full count where half of them do.
+// Returns a pixel's sample count from its neighbors' pilot statistics over `first` samples each. Doubles the count
+// until the mean squared error is small enough, as long as the variance estimate is reliable: its effective sample size
+// y^2 / z is 1 if a single sample deviates, and the full count if half of them do.
 fn samples_wanted(pilot_sum: vec4f, first: u32, squared_error: f32, most: u32) -> u32 {
     if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
         return most;

@@ -1,6 +1,6 @@
 // Surfaces with alpha. Acceptance depends on pixel, sample, bounce and hit only, not on the BVH's traversal order.
 
-// Ray purposes, which decide independently.
+// Purposes of rays. Each has its own decisions at the same surface.
 const RAY_BSDF: u32 = 0u;
 const RAY_SHADOW: u32 = 1u;
 
@@ -71,8 +71,8 @@ fn is_occluded_alpha(before: bool, surface: Surface, to: vec3f, t_max: f32, targ
     return true;
 }
 
-// Returns the first hit from `skipped` on that reaches its cutoff or is half opaque; t is measured from the origin of
-// `ray`.
+// Returns the first hit, beginning with `first`, that is opaque or whose opacity is at least its cutoff (MASK) or 0.5
+// (BLEND); the next hit after MAX_ALPHA_SKIPS others. t is measured from the origin of `ray`.
 fn skip_transparent(ray: Ray, first: Hit) -> Hit {
     var hit = first;
     var continued = ray;

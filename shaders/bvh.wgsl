@@ -9,7 +9,7 @@ struct TraversalStack {
     pending: array<vec2u, BVH_MAX_DEPTH>,
 }
 
-// Not in functions, where they are zeroed for each ray: a fifth of the time on software Vulkan.
+// Global, since software Vulkan zeroes variables of functions for each ray, which takes a fifth of the time.
 var<private> items_walk: TraversalStack;
 var<private> mesh_walk: TraversalStack;
 
@@ -71,14 +71,14 @@ fn closest_of_item(before: Hit, item: BvhItem, ray: Ray, s: Slabs, origin_prim: 
     if !interval_hits(interval, hit.t) {
         return hit;
     }
-    // A loop instead of an `if`: software Vulkan skips it.
+    // A loop instead of an `if`: software Vulkan executes both sides of a branch, but skips a loop.
     for (var once = has_kind(item, INSTANCE); once; once = false) {
         hit = closest_of_mesh(hit, item.index, ray, max(interval.x, 0.0), origin_prim);
     }
     return closest_of_primitive_item(hit, item, ray, interval.x, origin_prim, inside_prim);
 }
 
-// Returns true if an item is of a kind, at no cost if no item of the scene is.
+// Returns true if an item is of a kind; false at compile time if no item of the scene is.
 fn has_kind(item: BvhItem, kind: u32) -> bool {
     if (TLAS_KINDS & (1u << kind)) == 0u {
         return false;
@@ -97,8 +97,8 @@ fn limit_from(start: f32, t: f32) -> f32 {
     return (t - start) + t * 4.7683716e-7;
 }
 
-// Returns the nearer of `before` and the nearest hit on instance `number`. The ray is traced from `start`, near the
-// mesh.
+// Returns the nearer of `before` and the nearest hit on instance `number`. The ray is traced from distance `start`,
+// near the mesh, for precision.
 fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, origin_prim: vec2u) -> Hit {
     var hit = before;
     let i = load_instance(number);
@@ -144,13 +144,13 @@ fn children_hit_by_pair(node: Node, pair: RayPair, occluded: u32, t_max: f32) ->
         | children_hit(node, pair.s[1], select(t_max, -1.0, (occluded & 2u) != 0u));
 }
 
-// Returns the mask of the samples of a block that any item occludes from a surface, and `before`.
+// Returns the mask of the samples of a block that any item occludes from a surface, together with the bits of `before`.
 fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlock) -> u32 {
     let all = select((1u << block.count) - 1u, 0xffffffffu, block.count >= 32u);
     var bits = before & all;
     let to = segments_to_light(light, surface.ray_origin);
     let pad = item_pad(surface.ray_origin);
-    // Most often no ray to the light comes near anything.
+    // Usually no shadow ray hits any child of the root.
     let interval = interval_to_light(surface.ray_origin, to, pad);
     let some = children_in_interval(load_node(0u), interval, light.t_max) != 0u;
     var wanted = select(0u, all & ~bits, some);

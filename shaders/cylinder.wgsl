@@ -1,7 +1,8 @@
-// The capped cylinder: the surface of x^2 + y^2 <= 1, |z| <= 1 in local space. The images of the three axes are perpendicular, and those of
-// x and y of one length.
+// The capped cylinder: the surface of x^2 + y^2 <= 1, |z| <= 1 in local space. In world space the three axes are
+// perpendicular, and those of x and y have equal lengths.
 
-// The levels of a point of local space, x^2 + y^2 - 1 and |z| - 1: both are below 0 inside. `from_anchor` as in `ellipsoid_level`.
+// Returns the levels of a local point, x^2 + y^2 - 1 and |z| - 1; both are negative inside. `from_anchor` is as in
+// `ellipsoid_level`.
 fn cylinder_levels(q: Primitive, from_anchor: vec3f) -> vec2f {
     let side = from_anchor.x * (from_anchor.x - q.middle.x * 2.0) + from_anchor.y * (from_anchor.y - q.middle.y * 2.0) + q.level;
     let top = from_anchor.z - (q.middle.z + 1.0);
@@ -9,15 +10,17 @@ fn cylinder_levels(q: Primitive, from_anchor: vec3f) -> vec2f {
     return vec2f(side, max(top, bottom));
 }
 
-// The levels of a point on the surface, without their rounding: the larger one is `on`, the other not above.
+// Corrects the rounding of the levels of a point on the surface: the larger one becomes `on`, and the other is at most
+// `on`.
 fn levels_on_surface(levels: vec2f, on: f32) -> vec2f {
     let on_side = levels.x >= levels.y;
     return vec2f(select(min(levels.x, on), on, on_side), select(on, min(levels.y, on), on_side));
 }
 
-// The part of the line o + s d inside: s from x to y; none unless x < y.
+// Returns the interval of s, from x to y, where the line o + s d is inside; empty unless x < y. `levels` are those of
+// o.
 fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
-    // The side, with the discriminant of `ellipsoid_discriminant` in two dimensions.
+    // Side, with `ellipsoid_discriminant` in two dimensions.
     let a = d.x * d.x + d.y * d.y;
     let b = o.x * d.x + o.y * d.y;
     let moment = o.x * d.y - o.y * d.x;
@@ -31,7 +34,7 @@ fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
     let misses = select(!(discriminant >= 0.0), !((levels.x <= 0.0) & (b == 0.0)), parallel);
     let near_side = select(min(s0, s1), -INFINITE_T, parallel);
     let far_side = select(max(s0, s1), INFINITE_T, parallel);
-    // The caps: between them z - 1 and -z - 1 are below 0.
+    // Caps. Between them, z - 1 and -z - 1 are negative.
     let above = o.z > 0.0;
     let upper = select(-2.0 - levels.y, levels.y, above);
     let lower = select(levels.y, -2.0 - levels.y, above);
@@ -43,7 +46,8 @@ fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
     return vec2f(select(near, INFINITE_T, misses), select(far, -INFINITE_T, misses));
 }
 
-// The distance of the nearest hit in (0, limit), else `limit`. `from_inside` says that the ray starts on the surface and goes through the inside.
+// Returns the distance of the nearest hit in (0, limit), else `limit`. With `from_inside` the ray starts on the surface
+// and goes inside.
 fn intersect_cylinder(q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let d = vector_to_local(q, ray.direction);
@@ -54,7 +58,7 @@ fn intersect_cylinder(q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> 
     return select(limit, t, (inside.x < inside.y) & (t > 0.0) & (t < limit));
 }
 
-// Returns whether the surface cuts the segment o + s d, s in (0, reach), of local space.
+// Returns true if the surface intersects the local segment o + s d, s in (0, t_max).
 fn cylinder_occludes(o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     let inside = cylinder_interval(o, d, levels);
     let enters = (inside.x > 0.0) & (inside.x < t_max);
@@ -62,52 +66,52 @@ fn cylinder_occludes(o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     return (inside.x < inside.y) & (enters | leaves);
 }
 
-// Returns whether a point of the surface lies on a cap, not on the side.
+// Returns true if a point of the surface lies on a cap, false on the side.
 fn is_on_cap(local: vec3f) -> bool {
     return local.z * local.z > local.x * local.x + local.y * local.y;
 }
 
-// 1 at the end of the cylinder, -1 at its start.
+// Returns 1 at the end of the cylinder, -1 at its start.
 fn cap_side(local: vec3f) -> f32 {
     return select(-1.0, 1.0, local.z > 0.0);
 }
 
-// The gradient of (x^2 + y^2 - 1) / 2 on the side, and of |z| - 1 on the caps.
+// Returns the gradient of (x^2 + y^2 - 1) / 2 on the side, and of |z| - 1 on the caps.
 fn cylinder_gradient(local: vec3f) -> vec3f {
     return select(vec3f(local.x, local.y, 0.0), vec3f(0.0, 0.0, cap_side(local)), is_on_cap(local));
 }
 
-// The change of the gradient where the point changes by d.
+// Returns the change of the gradient if the point changes by d.
 fn cylinder_gradient_derivative(local: vec3f, d: vec3f) -> vec3f {
     return select(vec3f(d.x, d.y, 0.0), vec3f(0.0), is_on_cap(local));
 }
 
-// The function of which `cylinder_gradient` is the gradient.
+// Returns the function whose gradient is `cylinder_gradient`.
 fn cylinder_height(q: Primitive, from_anchor: vec3f) -> f32 {
     let levels = cylinder_levels(q, from_anchor);
     return select(0.5 * levels.x, levels.y, is_on_cap(from_anchor - q.middle));
 }
 
-// Texture coordinates: on the side the longitude, and 0 to 1 from the start to the end; on the caps those of a disk, mirrored at the start, where
-// they are seen from the other side.
+// Returns the texture coordinates. On the side: longitude, and 0 to 1 from start to end. On the caps: as on a disk;
+// mirrored on the start cap, which is seen from the other side.
 fn cylinder_uv(local: vec3f) -> vec2f {
     let cap = vec2f(0.5 * local.x + 0.5, 0.5 * (local.y * cap_side(local)) + 0.5);
     return select(vec2f(longitude(local), 0.5 * local.z + 0.5), cap, is_on_cap(local));
 }
 
-// The derivative of `cylinder_uv`, where the local point has the derivative d.
+// Returns the change of `cylinder_uv` if the local point changes by d.
 fn cylinder_uv_derivative(local: vec3f, d: vec3f) -> vec2f {
     let cap = vec2f(0.5 * d.x, 0.5 * (d.y * cap_side(local)));
     let du = (local.x * d.y - local.y * d.x) / max(local.x * local.x + local.y * local.y, 1e-12);
     return select(vec2f(du * 0.15915494309189535, 0.5 * d.z), cap, is_on_cap(local));
 }
 
-// The derivative of a point by u on the side or the cap.
+// Returns the derivative of a point by u on the side or the cap.
 fn cylinder_tangent(local: vec3f) -> vec3f {
     return select(vec3f(-local.y, local.x, 0.0) * 6.283185307179586, vec3f(2.0, 0.0, 0.0), is_on_cap(local));
 }
 
-// The same by v.
+// Returns the derivative of a point by v.
 fn cylinder_bitangent(local: vec3f) -> vec3f {
     return select(vec3f(0.0, 0.0, 2.0), vec3f(0.0, 2.0 * cap_side(local), 0.0), is_on_cap(local));
 }

@@ -1,13 +1,13 @@
 // The ellipsoid: the unit sphere of local space.
 
-// Returns |l|^2 - 1 of a point's local position l; negative inside. `from_anchor`, (x, y, z) (p - anchor), is short
-// near the anchor, and the 1 is part of `q.level`: digits are kept.
+// Returns |l|^2 - 1 for a point's local position l; negative inside. Avoids cancellation near the anchor:
+// `from_anchor`, (x, y, z) (p - anchor), is short there, and `q.level` includes the 1.
 fn ellipsoid_level(q: Primitive, from_anchor: vec3f) -> f32 {
     return dot(from_anchor, from_anchor - q.middle * 2.0) + q.level;
 }
 
-// Returns the quarter discriminant of |o + s d|^2 = 1, where start = |o|^2 - 1: (o.d)^2 - d.d start, equal to
-// d.d - |o x d|^2 (Lagrange). The first keeps its digits near the surface, the second far from it.
+// Returns the quarter discriminant of |o + s d|^2 = 1. It has two equal forms (Lagrange): (o.d)^2 - d.d start with
+// start = |o|^2 - 1, precise near the surface, and d.d - |o x d|^2, precise far from it.
 fn ellipsoid_discriminant(o: vec3f, d: vec3f, start: f32) -> f32 {
     let a = dot(d, d);
     let b = dot(o, d);

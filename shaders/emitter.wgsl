@@ -2,9 +2,9 @@
 
 // Light that may arrive at a point.
 struct LightSample {
-    to: vec3f,             // to the light's point; towards distant light
+    to: vec3f,             // vector to the sampled point; direction to distant light
     radiance: vec3f,       // of a delta light: its contribution for a pdf of 1
-    pdf: f32,              // per solid angle, with the selection; of a delta light the selection alone
+    pdf: f32,              // per solid angle, including the selection; for a delta light the selection alone
     is_delta: bool,        // cannot be hit by other rays
     t_max: f32,            // end of shadow rays, as a multiple of `to`
     primitive: u32,        // the emitter, which does not occlude itself, or NO_INDEX
@@ -22,7 +22,8 @@ fn select_emitter(bits: vec2u) -> Emitter {
     return load_emitter(select(emitter.other, first, unit_float(bits.y) < emitter.threshold));
 }
 
-// Samples the light that arrives at p from an emitter. `normal` is that of a surface lit from its side only, else 0.
+// Samples the light that arrives at p from an emitter. `normal` is the normal of the surface, or 0 if light may arrive
+// from both sides.
 fn sample_emitter(chosen: EmitterSelection, p: vec3f, normal: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     if (EMITTER_KINDS & (1u << INSTANCE)) != 0u {

@@ -50,7 +50,8 @@ fn interval_width(distribution: u32, index: u32) -> f32 {
     return environment_float(distribution + index + 1u) - environment_float(distribution + index);
 }
 
-// Returns the bilinear radiance, and the pdf at a surface with this normal: the block's probability by the cell's mean.
+// Returns the bilinear radiance, and the pdf at a surface with this normal: the block's probability times the cell's
+// mean radiance over the block's integral.
 fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     let d = vec3f(dot(environment.x, direction), dot(environment.y, direction), dot(environment.z, direction));
     let cell = cell_towards(d, environment.width, environment.height);
@@ -78,8 +79,8 @@ fn environment_mis(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
 }
 
 // Samples the map for a surface with this normal, or 0 if light may arrive from both sides. Inverts the distributions
-// of rows and blocks, then picks a cell by Walker's alias method, the position in the block selecting the entry. The
-// radiance is evaluated as for other rays, so that the pdfs agree.
+// of rows and blocks, then picks a cell by Walker's alias method; the position in the block selects the table's entry.
+// The radiance is evaluated as for other rays, so that the pdfs agree.
 fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
     let more = hash4(vec4u(bitcast<u32>(u.x), bitcast<u32>(u.y), 0u, 0u));
     let rows = block_distributions(normal);

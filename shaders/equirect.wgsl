@@ -1,21 +1,21 @@
-// Directions around a scene, and the cells of the image that surrounds it. The image's middle lies towards +x, its left and right edges
-// towards -x, its upper edge towards +z; a cell lies between the centres of four texels, or of two and a pole.
+// Equirectangular mapping of the environment map, and its cells. The image's center is +x, its left and right edges are
+// -x, its upper edge is +z. A cell lies between the centers of four texels, or of two texels and a pole.
 
-// A cell: of `width` a row, and one row more than the image has.
+// A point in a cell of the map, which has `width` cells per row and one row more than the image.
 struct EnvironmentCell {
     column: u32,
     row: u32,
-    x: f32,                // where in it, 0 to 1
+    x: f32,                // position in the cell, 0 to 1
     y: f32,
 }
 
-// The cell that a direction points at.
+// Returns the cell that a direction points at.
 fn cell_towards(d: vec3f, width: u32, height: u32) -> EnvironmentCell {
     let u = (0.5 - atan2(d.y, d.x) * 0.15915494) * f32(width) - 0.5;
     let v = atan2(sqrt(d.x * d.x + d.y * d.y), d.z) * 0.31830987 * f32(height) + 0.5;
     let column = floor(u);
     let row = min(floor(v), f32(height));
-    // The outermost rows are half as high: from 1/2 to 1 of their unit, and from 0 to 1/2.
+    // The first and the last row have half the height: `at` is 1/2 to 1 in the first, 0 to 1/2 in the last.
     let at = v - row;
     let first = row == 0.0;
     let last = row == f32(height);
@@ -24,20 +24,22 @@ fn cell_towards(d: vec3f, width: u32, height: u32) -> EnvironmentCell {
     return EnvironmentCell(u32(select(f32(width) - 1.0, column, column >= 0.0)), u32(row), u - column, inside);
 }
 
-// The column to the right of one.
+// Returns the column to the right of one, around the edge.
 fn column_after(column: u32, width: u32) -> u32 {
     return select(column + 1u, 0u, column + 1u == width);
 }
 
-// 1 minus the cosine of the angle from the pole to the border above `row`, which has no digits left itself near the pole.
+// Returns 1 minus the cosine of the angle between the pole and the upper border of `row`, without the cancellation of
+// that difference near the pole.
 fn cap_above(row: u32, height: u32) -> f32 {
     let from_pole = max(f32(row) - 0.5, 0.0) / f32(height);
     let s = sine(0.5 * min(from_pole, 1.0));
     return 2.0 * s * s;
 }
 
-// The bin of a normal: the nearest point of a grid on the octahedral map, which has the axes among its points. Cigolle et al., "A Survey of Efficient Representations for Independent Unit
-// Vectors", JCGT 3(2), 2014. The last bin is that of 0.
+// Returns the bin of a normal: the nearest point of a grid on the octahedral map, which includes the axes. Cigolle et
+// al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 3(2), 2014. The last bin is for a
+// normal of 0.
 fn normal_bin(normal: vec3f) -> u32 {
     let sum = abs(normal.x) + abs(normal.y) + abs(normal.z);
     let x = normal.x / sum;
@@ -51,7 +53,8 @@ fn normal_bin(normal: vec3f) -> u32 {
     return select(NORMAL_BINS * NORMAL_BINS, bin, sum > 0.0);
 }
 
-// The direction of a point of a cell, uniform by solid angle where u is uniform. Its length is 1 within 1 / 10^6.
+// Returns the direction to the point u of a cell, uniform over the solid angle if u is uniform. Its length is 1 within
+// 1 / 10^6.
 fn direction_in_cell(column: u32, row: u32, u: vec2f, width: u32, height: u32) -> vec3f {
     let turn = 1.0 - 2.0 * ((f32(column) + 0.5 + u.x) / f32(width));
     let below = row > height / 2u;

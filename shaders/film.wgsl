@@ -1,8 +1,8 @@
-// The film, and the layers in it: parts of one vector for each pixel, one after the other.
+// The film: consecutive parts of one vector per pixel, some of which are layers.
 
 @group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
 
-// The layers of a pixel, the first of which is this part of the film.
+// Returns the layers of a pixel; the first layer is this part of the film.
 fn stored_layers(index: u32, part: u32) -> Layers {
     let pixels = params.film_size.x * params.film_size.y;
     let first = part * pixels + index;

@@ -22,7 +22,7 @@ fn wrap_v(t: Texture) -> u32 {
 }
 
 // Transforms a footprint to the texture's coordinates. Beyond a clamped edge it has no extent across the edge, so that
-// coarse levels bring in nothing from afar.
+// coarse levels do not mix in distant texels.
 fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
     let dx = vec2f(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
     let dy = vec2f(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);

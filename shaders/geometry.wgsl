@@ -1,5 +1,5 @@
-// Ray queries of integrators: closest hits, occlusion and the surface at a hit. Few primitives are tested one by one,
-// in buffers (`buffers.wgsl`) or as constants; all others by BVHs (`bvh.wgsl`).
+// Ray queries of integrators: closest hits, occlusion and the surface at a hit. A few primitives are tested one by one,
+// from buffers (`buffers.wgsl`) or as constants; BVHs hold all others (`bvh.wgsl`).
 
 // Returns the closest hit except on `origin_prim`. `inside_prim` is a solid from whose surface the ray goes inside.
 fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
@@ -9,8 +9,9 @@ fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     return closest_in_tree(closest_primitive(ray, standalone_prim(origin_prim), standalone_prim(inside_prim)), ray, origin_prim, inside_prim);
 }
 
-// Returns the mask of a block's occluded samples. The surface's own primitive occludes none above it, unless it is a
-// solid seen from inside. Bits in `unlit` do not matter: the BVH is not traversed for these.
+// Returns the mask of a block's occluded samples. The surface's own primitive does not occlude samples above the
+// surface, unless it is a solid seen from inside. Samples in `unlit` are not tested against the BVH; their bits have no
+// meaning.
 fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u32) -> u32 {
     let bits = occluded_by_primitives(surface, light, block);
     if TLAS_KINDS == 0u {

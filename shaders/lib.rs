@@ -1,4 +1,5 @@
-//! The WGSL shaders of wgray as text: a table of the files, and their hash, which is part of the identity of a render on every device.
+//! The WGSL shaders of wgray as text: a table of the files, and their hash, which is part of the identity of a render
+//! on every device.
 
 /// A shader file: its name in `shaders/` and its text at build time.
 pub type File = (&'static str, &'static str);
@@ -56,7 +57,7 @@ pub static SHARED: &[File] = files![
     "bvh_node.wgsl",
     "mesh.wgsl",
 ];
-/// Software quotients and square roots. First in a kernel, since naga requires functions before their calls.
+/// Correctly rounded quotients and square roots. First in a kernel, since naga requires functions before their calls.
 pub static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
 /// The buffers and the scene traversal, which every kernel adds to [`SHARED`].
 pub static KERNEL: &[File] = files![
@@ -83,7 +84,8 @@ pub static PATH: &[File] = files![
     "scattering.wgsl",
     "integrators/path.wgsl"
 ];
-/// Loops that read the scene from buffers. Where the scene is compiled into the kernel, functions with its records as constants take their place.
+/// Loops that read the scene from buffers. Kernels with the scene compiled in replace them by functions with constant
+/// records.
 pub static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
 /// Access to texels in a single buffer.
 pub static TEXELS: &[File] = files!["texels.wgsl"];

@@ -1,6 +1,6 @@
 // Vectors from a point to the samples of a light, and the falloff of spot lights.
 
-// Vectors towards + u a + v b to a light's samples, a and b in -1..1.
+// The vectors `towards + u a + v b` from a point to the samples of a light, with a and b in -1..1.
 struct LightSegments {
     towards: vec3f,
     u: vec3f,

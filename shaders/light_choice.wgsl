@@ -2,11 +2,11 @@
 
 struct EmitterSelection {
     emitter: Emitter,
-    density: f32,          // pdf per area, including the selection; 0 if not by the tree
+    density: f32,          // pdf per area, including the selection; 0 if the light tree did not select
 }
 
-// Returns `emitter`, or a choice of the light tree at p if the entry stands for the tree. n is as in
-// `light_importances`. Two levels at a time share a random point, a set over the pixel's samples.
+// Returns `emitter`, or an emitter that the light tree selects at p if the entry stands for the tree. n is as in
+// `light_importances`. Each pair of levels uses a two-dimensional point set over the pixel's samples.
 fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -> EmitterSelection {
     var chosen = EmitterSelection(emitter, 0.0);
     if emitter.index != NO_INDEX {
@@ -37,7 +37,8 @@ fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u
     return chosen;
 }
 
-// Returns the pdf, per area, of a sample at a hit from p; 0 if not `wanted` or not in the tree.
+// Returns the pdf per area with which `light_tree_select` at p samples a hit; 0 if not `wanted` or if the hit is not in
+// the tree.
 fn light_tree_pdf(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     var at = NO_INDEX;
     if wanted {

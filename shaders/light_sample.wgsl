@@ -56,7 +56,8 @@ struct CylinderPoint {
     normal: vec3f,
 }
 
-// Returns the part that faces a point: an arc of the side from beside it, a cap from beyond it, all from inside.
+// Returns the part that faces a point: an arc of the side if the point is beside the cylinder, a cap if it is beyond
+// the cap, everything if it is inside.
 fn cylinder_part(q: Primitive, o: vec3f, levels: vec2f) -> CylinderPart {
     let inside = (levels.x <= 0.0) & (levels.y <= 0.0);
     let r2 = o.x * o.x + o.y * o.y;

@@ -6,11 +6,11 @@ fn mean_above(m: vec4f, r: vec4f) -> vec4f {
     return select(max4(m, vec4f(0.0)), 0.25 * (m + r) * ((m + r) / r), abs(m) < r);
 }
 
-// Returns the importances of the children for p, up to a factor: section 4.1, where each cosine is a mean over the
-// bounding sphere, of the height above the plane of emitter or surface, over the distance. The mean height is at least
-// 0.03 of the radius, since spheres are wider than their contents. A tenth of the squared radius is added to the
-// squared distance. n is the normal of a surface lit from its side only, else 0. The result is positive where light can
-// arrive, with a margin for rounding.
+// Returns the importances of the children for p, up to a factor: section 4.1, where each cosine is the mean, over the
+// bounding sphere, of the height above the plane of emitter or surface, divided by the distance. The mean height is at
+// least 0.03 of the radius, since spheres are wider than their contents. A tenth of the squared radius is added to the
+// squared distance. n is the normal of the surface, or 0 if light may arrive from both sides. The result is positive
+// where light can arrive, with a margin for rounding.
 fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
     let x = node.x - p.x;
     let y = node.y - p.y;

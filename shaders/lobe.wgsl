@@ -95,8 +95,8 @@ fn aniso_table_position(alpha: vec2f, w: vec3f) -> vec2f {
     return vec2f(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)));
 }
 
-// Returns the energy lost to multiple scattering as a multiple of the single-scattering albedo; less the error of the
-// fit, which therefore creates no energy. Anisotropic lobes use a table if they have one.
+// Returns the energy that single scattering loses, as a multiple of its albedo, reduced by the error of the fit so that
+// its compensation creates no energy.
 fn facet_loss(alpha: vec2f, wo: vec3f) -> f32 {
     let albedo = ggx_albedo_along(alpha, wo);
     return max(1.0 / (albedo.x + albedo.y) - 1.005, 0.0);

@@ -1,5 +1,5 @@
-// Arithmetic that gives the same bits on every device that rounds as IEEE 754 asks: written out, because WGSL's
-// built-in functions become instructions that no decoration protects from contraction. The tests hold each bound.
+// Arithmetic with the same bits on every device that rounds as IEEE 754 requires. Written out, because WGSL's built-in
+// functions become instructions that no decoration protects from contraction. Tests check each error bound.
 
 fn dot(a: vec3f, b: vec3f) -> f32 {
     return a.x * b.x + a.y * b.y + a.z * b.z;
@@ -9,7 +9,7 @@ fn cross(a: vec3f, b: vec3f) -> vec3f {
     return vec3f(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
 }
 
-// Each component within 3 x 2^-24.
+// Returns the unit vector, each component within 3 x 2^-24.
 fn normalize(v: vec3f) -> vec3f {
     return v * (1.0 / sqrt(dot(v, v)));
 }
@@ -18,7 +18,7 @@ fn max(a: f32, b: f32) -> f32 {
     return select(b, a, a > b);
 }
 
-// Each component's.
+// Returns the maximum of each component.
 fn max4(a: vec4f, b: vec4f) -> vec4f {
     return select(b, a, a > b);
 }
@@ -27,21 +27,21 @@ fn min(a: f32, b: f32) -> f32 {
     return select(b, a, a < b);
 }
 
-// x, but 0 for -0. Mesa takes the sign of a zero for free: it makes a selection of -1 or 0 the negative of a truth value,
-// and x + 0 it makes x. So this is about bits.
+// Returns x, but 0 for -0. Operates on bits, since Mesa ignores the sign of zero: it simplifies a selection of -1 or 0
+// to a negated boolean, and x + 0 to x.
 fn positive_zero(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
     return bitcast<f32>(select(bits, 0u, bits == 0x80000000u));
 }
 
-// The largest whole number that is not above x.
+// Returns the largest integer that is not above x.
 fn floor(x: f32) -> f32 {
     let small = abs(x) < 8388608.0; // larger ones are whole
     let whole = f32(i32(select(0.0, x, small)));
     return select(x, select(whole, whole - 1.0, whole > x), small);
 }
 
-// x to the power n by squaring, for n below 2^bits: within n x 2^-24 relative for x from 0 to 1.
+// Returns x^n by squaring, for n below 2^bits: within n x 2^-24 relative for x from 0 to 1.
 fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     var result = 1.0;
     var square = x;
@@ -52,15 +52,15 @@ fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     return result;
 }
 
-// x to the power y, for x from 0 to 1 and y > 0: 2^(y log2 x), within 1.7 x 2^-23 (1 + |y log2 x|) relative. 0 for an x
+// Returns x^y as 2^(y log2 x), for x from 0 to 1 and y > 0, within 1.7 x 2^-23 (1 + |y log2 x|) relative; 0 if x is
 // below the normal numbers.
 fn power(x: f32, y: f32) -> f32 {
     return select(0.0, exp2(y * log2(x)), x >= 1.1754943508222875e-38);
 }
 
-// The logarithm to base 2 of a normal x > 0: exponent, and the series of 2 artanh((m - 1) / (m + 1)) for a mantissa m
-// between the roots of 1/2 and 2 (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.1.27). Within 4.5 units
-// in the last place.
+// Returns the binary logarithm of a normal x > 0: the exponent, and the series of 2 artanh((m - 1) / (m + 1)) for a
+// mantissa m from sqrt(1/2) to sqrt(2) (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.1.27). Within
+// 4.5 units in the last place.
 fn log2(x: f32) -> f32 {
     let bits = bitcast<i32>(x);
     let exponent = (bits - 0x3f3504f3) >> 23u;
@@ -71,8 +71,8 @@ fn log2(x: f32) -> f32 {
     return f32(exponent) + s * series * 2.8853900817779268;
 }
 
-// 2 to the power x, 0 below the normal numbers, infinite from 127.5 on: the exponential's series (Abramowitz and Stegun,
-// 4.2.1) after splitting off the nearest whole number. Within 1.5 units in the last place.
+// Returns 2^x; 0 below the normal numbers, infinite from 127.5 on. Splits off the nearest integer and evaluates the
+// series of the exponential (Abramowitz and Stegun, 4.2.1). Within 1.5 units in the last place.
 fn exp2(x: f32) -> f32 {
     let p = min(max(x, -126.5), 128.0);
     let whole = i32(p + select(0.5, -0.5, p < 0.0));
@@ -82,8 +82,8 @@ fn exp2(x: f32) -> f32 {
     return select(0.0, series * bitcast<f32>((whole + 127) << 23u), x > -126.5);
 }
 
-// The angle of (x, y) in (-pi, pi]: the arc tangent's series (Abramowitz and Stegun, 4.4.42) of an argument brought
-// below tan(pi / 8). 0 where both are 0. Within 3.5 units in the last place.
+// Returns the angle of (x, y) in (-pi, pi], 0 if both are 0: the series of the arctangent (Abramowitz and Stegun,
+// 4.4.42) after reduction of the argument below tan(pi / 8). Within 3.5 units in the last place.
 fn atan2(y: f32, x: f32) -> f32 {
     let large = max(abs(x), abs(y));
     let small = min(abs(x), abs(y));
@@ -98,7 +98,7 @@ fn atan2(y: f32, x: f32) -> f32 {
     return select(0.0, select(half, -half, y < 0.0), large > 0.0);
 }
 
-// The sine of pi x. Within 3 / 10^7 for |x| below 1000, by the Taylor series from -pi / 2 to pi / 2.
+// Returns sin(pi x), within 3 / 10^7 for |x| below 1000: the Taylor series from -pi / 2 to pi / 2.
 fn sine(x: f32) -> f32 {
     let whole = floor(x + 0.5);
     let r = x - whole;

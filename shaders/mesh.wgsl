@@ -96,7 +96,7 @@ struct HitPrimitive {
     tangents_1: Tangents,
     tangents_2: Tangents,
     anchor: vec3f,         // origin of object space
-    condition_number: f32,        // condition number of the transform
+    condition_number: f32, // condition number of the transform
 }
 
 fn standalone_hit_primitive(q: Primitive) -> HitPrimitive {
@@ -128,7 +128,8 @@ fn face_surface(face: HitPrimitive, prim_id: vec2u, b: vec2f, d: vec3f, epsilon:
     let normal = q.z * side;
     let edge = max(max(largest(face.edge_1), largest(face.edge_2)), largest(face.edge_2 - face.edge_1));
     let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition_number);
-    // Offset towards the viewer too: a hit on an edge is then inside of the other faces at that edge.
+    // The offset has a part towards the viewer, so that the origin of a hit on an edge is in front of the other faces
+    // at that edge too.
     let start = position + (normal - d) * (epsilon * size);
     let tangents = face_frame(face, b);
     let smooth_normal = face_normal(face, b) * side;
@@ -170,9 +171,9 @@ fn face_terminator_offset(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
 }
 
-// Returns the offset from a point, `to_vertex` from a vertex, up to the tangent plane of the vertex; 0 if the point is above
-// it. A normal more than 37 degrees off the triangle normal `up` implies no surface nearby, as at the corner of a cube:
-// objects on the cube would lose their contact shadows.
+// Returns the offset from a point up to the tangent plane of a vertex; 0 if the point is above it. `to_vertex` is the
+// vector from the vertex to the point. A normal more than 37 degrees off the triangle normal `up` implies no surface
+// nearby, as at the corner of a cube: objects on the cube would lose their contact shadows.
 fn lift(n: vec3f, to_vertex: vec3f, up: vec3f) -> vec3f {
     return n * select(0.0, max(-dot(n, to_vertex), 0.0), dot(n, up) > 0.8);
 }
@@ -200,7 +201,7 @@ fn face_tangents(face: HitPrimitive) -> Tangents {
     return Tangents(select(face.edge_1, u, whole), select(cross(face.primitive.z, face.edge_1), v, whole));
 }
 
-// Returns the interpolated vertex tangents, continuous across edges; without them `face_tangents`.
+// Returns the interpolated vertex tangents, which are continuous across edges, or `face_tangents` if the mesh has none.
 fn face_frame(face: HitPrimitive, b: vec2f) -> Tangents {
     let a = 1.0 - b.x - b.y;
     let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;

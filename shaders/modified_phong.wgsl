@@ -1,11 +1,11 @@
-// The material `phong` where light bounces: the modified model of Lafortune and Willems, "Using the Modified Phong Reflectance
-// Model for Physically Based Rendering", report CW 197, Leuven, 1994.
+// The material `phong` under the integrator `path`: the modified model of Lafortune and Willems, "Using the Modified
+// Phong Reflectance Model for Physically Based Rendering", report CW 197, Leuven, 1994.
 
-// The factors of its two terms, made smaller where together they would reflect more light than there is.
+// Reflectances of the two terms, scaled down if their sum exceeds 1.
 struct PhongFactors {
     diffuse: vec3f,
     specular: vec3f,
-    diffuse_share: f32,    // of all directions, those sampled by the diffuse term
+    diffuse_share: f32,    // probability of sampling the diffuse term
 }
 
 fn phong_factors(material: Material) -> PhongFactors {
@@ -17,27 +17,27 @@ fn phong_factors(material: Material) -> PhongFactors {
     return PhongFactors(diffuse, specular, select(1.0, d / (d + s), s > 0.0));
 }
 
-// The cosine of the angle between wi and the mirrored wo, to the power of the exponent.
+// Returns the cosine between wi and the mirror direction of wo, to the power of the exponent.
 fn phong_lobe(material: Material, angles: Angles) -> f32 {
     let cosine = 2.0 * angles.wi * angles.wo - angles.between;
     return power(min(max(cosine, 0.0), 1.0), material.shininess);
 }
 
-// The BRDF times the cosine of wi.
+// Returns the BRDF times the cosine of wi.
 fn modified_phong_eval(material: Material, angles: Angles) -> vec3f {
     let factors = phong_factors(material);
     let specular = phong_lobe(material, angles) * (material.shininess + 2.0) * 0.15915494309189535;
     return (factors.diffuse * 0.31830988618379067 + factors.specular * specular) * max(angles.wi, 0.0);
 }
 
-// The density of `modified_phong_sample`, per solid angle.
+// Returns the pdf of `modified_phong_sample`, per solid angle.
 fn modified_phong_pdf(material: Material, angles: Angles) -> f32 {
     let share = phong_factors(material).diffuse_share;
     let specular = phong_lobe(material, angles) * (material.shininess + 1.0) * 0.15915494309189535;
     return diffuse_pdf(angles) * share + specular * (1.0 - share);
 }
 
-// A direction wi, which may be below the surface. `random`, in [0, 1), chooses the term.
+// Samples a direction, which may be below the surface. `random` in [0, 1) selects the term.
 fn modified_phong_sample(material: Material, normal: vec3f, wo: vec3f, u: vec2f, random: f32) -> vec3f {
     if random < phong_factors(material).diffuse_share {
         return diffuse_sample(normal, u);

@@ -1,9 +1,9 @@
-// The normals that normal maps give.
+// Normal mapping.
 
-// The unit normal of a normal map's vector n, whose x points along the texture's u, y along its v and z outwards; on
-// the side of the surface's normal. It never points into the surface.
+// Returns the unit normal for a vector n of a normal map, whose x is along the texture's u, y along its v, and z
+// outward. The result is on the side of the surface's normal and never points into the surface.
 fn mapped_normal(surface: Surface, t: Texture, n: vec3f) -> vec3f {
-    // By the texture's own coordinates: the inverse of its map, up to a positive factor.
+    // Tangents along the texture's own coordinates: the inverse of its UV transform, up to a positive factor.
     let sign = select(-1.0, 1.0, t.u.x * t.v.y - t.u.y * t.v.x > 0.0);
     let along_u = (surface.du * t.v.y - surface.dv * t.v.x) * sign;
     let along_v = (surface.dv * t.u.x - surface.du * t.u.y) * sign;

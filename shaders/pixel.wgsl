@@ -1,6 +1,6 @@
-// Camera samples of a pixel, for any integrator: it traces a path by `begin_path` and, one surface at a time, `advance`
-// until it has `ended`; then `path_value` and `path_layers` return its contribution. Lanes in lockstep thus begin their
-// next samples without waiting for the longest path.
+// Camera samples of a pixel, and the interface of integrators: `begin_path` starts a path, and `advance` traces one
+// surface at a time until the path has `ended`; then `path_value` and `path_layers` return its contribution. Lanes in
+// lockstep thus begin their next samples without waiting for the longest path.
 
 struct CameraSample {
     ray: Ray,
@@ -21,7 +21,7 @@ fn camera_sample(pixel: vec2u, sample: u32) -> CameraSample {
     return CameraSample(ray, differential_at(raster), at.z);
 }
 
-// Returns the lens position of a sample, from a point set of its own over the samples of the pixel.
+// Returns the lens position of a sample, from a separate point set over the samples of the pixel.
 fn lens_point(pixel: vec2u, sample: u32) -> vec2f {
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 0u)).zw;
     var u = sobol_sample(sample, key);

@@ -1,8 +1,8 @@
 // Dispatch by the kind of a primitive: intersection, normals, texture coordinates and tangents. `kind` may be a
 // compile-time constant.
 
-// Returns the t of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray starts on the primitive,
-// inwards.
+// Returns the t of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray starts on the primitive and
+// goes inside.
 fn intersect(kind: u32, q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
@@ -48,7 +48,7 @@ fn is_solid(kind: u32) -> bool {
     return ((SOLID_KINDS >> kind) & 1u) == 1u;
 }
 
-// Returns true if local -1 to 1 is 0 to 1 in texture coordinates.
+// Returns true if texture coordinates from 0 to 1 correspond to local coordinates from -1 to 1.
 fn is_centered(kind: u32) -> bool {
     return (kind == RECTANGLE) | (kind == DISK);
 }

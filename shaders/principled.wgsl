@@ -12,10 +12,10 @@ struct PrincipledLobes {
     f0: vec3f,             // its reflectance at normal incidence, with multiple scattering
     f90: vec3f,            // the same at grazing angles
     glass: f32,            // weight of glass, with multiple scattering
-    transmission_tint: vec3f,         // the same for transmitted light
+    transmission_tint: vec3f, // the same for transmitted light
     glass_f0: vec3f,       // reflectance of glass at normal incidence
     glass_f90: f32,        // the same at grazing angles
-    f0_ior: f32,          // reflectance by the index alone, at normal incidence
+    f0_ior: f32,           // reflectance by the index alone, at normal incidence
     ratio: f32,            // of the indices before and behind the surface, thin or not
     eta: f32,              // the same for refraction: 1 if thin
     thin: bool,            // transmission keeps the direction
@@ -24,7 +24,7 @@ struct PrincipledLobes {
     coat_normal: vec3f,
     sheen: vec3f,          // weight of the sheen lobe
     sheen_alpha: f32,
-    lobe_probs: vec4f,        // probabilities of diffuse, specular, glass and coat; the rest is that of sheen
+    lobe_probs: vec4f,     // probabilities of diffuse, specular, glass and coat; the rest is that of sheen
 }
 
 // Returns the lobes seen from wo, only those with a bit in `lobes`. `energy` has tabulated albedos: x and y are the
@@ -176,7 +176,8 @@ fn refracting_half(wo: vec3f, wi: vec3f, eta: f32) -> vec3f {
     return select(-unit, unit, unit.z > 0.0);
 }
 
-// Returns the Jacobian from transmitted directions to microfacet normals: equation 17 there; 0 if none refracts so.
+// Returns the Jacobian from transmitted directions to microfacet normals, equation 17 of that paper; 0 if no normal
+// refracts wi to wo.
 fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
     let o = dot(wo, half);
     let i = dot(wi, half);

@@ -1,6 +1,6 @@
-// Random numbers as functions of what they are for: no state, so no order of work can change them.
+// Counter-based random numbers: without state, so that they do not depend on the order of execution.
 
-// The hash pcg4d of Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
+// Returns the hash pcg4d: Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
 fn hash4(key: vec4u) -> vec4u {
     var v = key * 1664525u + 1013904223u;
     v.x += v.y * v.w;
@@ -15,7 +15,7 @@ fn hash4(key: vec4u) -> vec4u {
     return v;
 }
 
-// The upper 24 bits as a number in [0, 1).
+// Returns the upper 24 bits as a number in [0, 1).
 fn unit_float(bits: u32) -> f32 {
     return f32(bits >> 8u) * 5.9604644775390625e-8;
 }

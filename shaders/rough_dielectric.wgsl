@@ -2,7 +2,7 @@
 // Surfaces", EGSR 2007, with GGX microfacets. `ior` is the index behind the surface relative to the viewer's side;
 // radiance scales with its square.
 
-// Returns the multiple-scattering compensation, which is the same for all light.
+// Returns the factor of the multiple-scattering compensation, the same for reflection and transmission.
 fn dielectric_gain(material: Material) -> f32 {
     return 1.0 + material.loss;
 }

@@ -1,10 +1,11 @@
-// Correctly rounded quotients and square roots (IEEE 754-2019, 4.3.1: to nearest, ties to even), for devices whose own may be off: WGSL
-// allows 2.5 units in the last place. The result of the device is corrected by its remainder, which is exact in integers modulo 2^32.
-// `crates/render/src/gpu/rounding.rs` replaces the operations of a kernel by these functions.
+// Correctly rounded quotients and square roots (IEEE 754-2019, 4.3.1: to nearest, ties to even), for devices whose own
+// may be inexact: WGSL allows errors of 2.5 units in the last place. The device's result is corrected by its remainder,
+// which is exact in integers modulo 2^32. `crates/render/src/gpu/rounding.rs` replaces the operations of a kernel by
+// these functions.
 
 const INFINITE = 0x7f800000u;
 
-// A number above 0: mantissa x 2^(exponent - 150), the mantissa from 2^23 to 2^24.
+// A positive number: mantissa x 2^(exponent - 150), with the mantissa from 2^23 to 2^24.
 struct Digits {
     mantissa: u32,
     exponent: i32,
@@ -18,7 +19,8 @@ fn digits_of(bits: u32) -> Digits {
     return Digits((bits & 0x7fffffu) | 0x800000u, i32(bits >> 23u));
 }
 
-// The bits of 2^(exponent - 127) x (digits / 2^24), for digits from 2^24 to 2^25, and a little more than that if `more`.
+// Returns the rounded bits of 2^(exponent - 127) x (digits / 2^24), for digits from 2^24 to 2^25; of slightly more than
+// that if `more`.
 fn rounded(exponent: i32, digits: u32, more: bool) -> u32 {
     if exponent >= 255 {
         return INFINITE;
@@ -28,7 +30,7 @@ fn rounded(exponent: i32, digits: u32, more: bool) -> u32 {
     let rest = digits & ((1u << dropped) - 1u);
     let half = 1u << (dropped - 1u);
     let up = (rest > half) | ((rest == half) & (more | ((kept & 1u) == 1u)));
-    let below = u32(select(0, exponent - 1, exponent > 1)) << 23u; // the mantissa's first bit adds the last 1
+    let below = u32(select(0, exponent - 1, exponent > 1)) << 23u; // the leading bit of the mantissa adds the missing 1
     return below + kept + select(0u, 1u, up);
 }
 
@@ -80,7 +82,7 @@ fn square_root(x: f32) -> f32 {
     if (bits == 0u) | (bits == 0x80000000u) | (bits == INFINITE) {
         return x;
     }
-    if bits > INFINITE { // no number, or below 0
+    if bits > INFINITE { // NaN or negative
         return bitcast<f32>(bits | 0x7fc00000u);
     }
     let number = digits_of(bits);

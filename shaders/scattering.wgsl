@@ -209,7 +209,7 @@ fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Princ
     return principled_mixture(material, wo, surface.side > 0.0, coat, LOBES, energy);
 }
 
-// Returns true if light may arrive from wi: not where shading and geometric normal disagree about its side.
+// Returns true if light may arrive from wi; false if shading and geometric normal disagree about its side.
 fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, wi: vec3f) -> bool {
     var lit = is_lit(surface, wi);
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
@@ -231,7 +231,7 @@ fn is_transmissive(material: Material) -> bool {
     return passes;
 }
 
-// Returns the normal of a surface that is lit from its side only, else 0.
+// Returns the shading normal, or 0 if light may arrive from both sides.
 fn lit_normal(surface: Surface, material: Material) -> vec3f {
     return select(surface.shading_normal, vec3f(0.0), is_transmissive(material));
 }

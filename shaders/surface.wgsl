@@ -9,7 +9,7 @@ struct Surface {
     ray_origin: vec3f,        // origin of rays that leave it, a little above it
     terminator_offset: vec3f, // from there to the origin of shadow rays, on smooth meshes
     side: f32,                // 1 if `normal` is the outward one, else -1
-    exclude_front: vec2u,     // what rays that leave it on the viewer's side cannot hit again, else NO_PRIMITIVE
+    exclude_front: vec2u,     // primitive that rays on the viewer's side cannot hit again, else NO_PRIMITIVE
     exclude_back: vec2u,      // the same for rays on the other side
     uv: vec2f,                // texture coordinates
     du: vec3f,                // derivatives of the position, which span the tangent frame
@@ -20,9 +20,9 @@ fn largest(v: vec3f) -> f32 {
     return max(max(abs(v.x), abs(v.y)), abs(v.z));
 }
 
-// Returns the point where a ray hits primitive i, which is q, without texture coordinates. A Newton step moves it back
-// onto the primitive, up to the rounding of its coordinates and of its offset from the anchor. Rays start `epsilon`
-// times the largest of these above it.
+// Returns the surface where a ray hits primitive i, which is q, without texture coordinates. A Newton step moves the
+// point back onto the primitive, up to the rounding of its coordinates and of its offset from the anchor. Rays start
+// above it by `epsilon` times the largest of these.
 fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let point = ray.origin + ray.direction * t;
     let offset = point - q.anchor;

@@ -1,4 +1,4 @@
-// The texels of images. Where they do not fit one buffer, `crates/render/src/gpu/texels.rs` writes the same function over several.
+// Texels in a single buffer. If they need several, `crates/render/src/gpu/texels.rs` generates this function.
 
 fn texel_word(i: u32) -> u32 {
     return texels[i];

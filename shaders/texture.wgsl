@@ -1,4 +1,4 @@
-// Texture lookups and filters, and the materials that they modify.
+// Texture lookups and filters, and their application to materials.
 
 fn texture_color(t: Texture, surface: Footprint) -> vec3f {
     let f = texture_footprint(t, surface);
@@ -61,7 +61,7 @@ fn nearest_color(t: Texture, uv: vec2f) -> vec3f {
     return load_texel(t, level, i32(x), i32(y));
 }
 
-// Returns the level, with a fraction, where a length in texels of the finest level is 1 to 2 texels.
+// Returns the level, with a fraction, at which `length`, in texels of the finest level, is 1 to 2 texels.
 fn level_of_length(t: Texture, length: f32) -> f32 {
     let coarsest = f32(t.levels - 1u);
     let level = max(log2(max(length, 1.0)), 0.0);
@@ -121,11 +121,11 @@ fn ewa_color(t: Texture, f: Footprint) -> vec3f {
     return color;
 }
 
-// Returns the mean of a level over the ellipse, resized so that the whole filter has the variance of the finest level.
-// In units where half axis r has r^2, that is M + I, with I for reconstruction. Texels of a level are means over a box
-// of variance 1/3, less that of the finest texels: (1 - q) / 3, where q is the squared size of a finest texel; I
-// becomes q I. Half axes stay above 1: every ellipse contains a texel. The mean is of differences to one texel, which
-// keeps constants exact.
+// Returns the mean of a level over the ellipse, resized so that the whole filter has the variance that it has on the
+// finest level. In units in which a half axis r has the variance r^2, that is M + I, where I is the reconstruction
+// filter. Texels of a level are means over a box of variance 1/3, less that of the finest texels: (1 - q) / 3, where q
+// is the squared size of a finest texel; I becomes q I. Half axes stay above 1, so that every ellipse contains a texel.
+// The mean is taken of differences to one texel, which keeps constants exact.
 fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) -> vec3f {
     let size = vec2f(f32(level.width), f32(level.height));
     let q = size / vec2f(f32(t.width), f32(t.height));

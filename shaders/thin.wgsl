@@ -1,8 +1,8 @@
-// The material `dielectric` where it is a thin sheet: what passes it goes straight on. Light bounces between its two sides, which
-// adds up to 2 R / (1 + R): Stam, "An Illumination Model for a Skin Layer Bounded by Rough Surfaces", EGRW 2001, has the series. Where it is
-// rough, what passes is spread as what is mirrored is.
+// The material `dielectric` as a thin sheet, which transmits light without a change of direction. Interreflection
+// between its two sides adds up to the reflectance 2 R / (1 + R): Stam, "An Illumination Model for a Skin Layer Bounded
+// by Rough Surfaces", EGRW 2001, has the series. Roughness spreads transmitted light like reflected light.
 
-// The share of light that a sheet reflects.
+// Returns the reflectance of a sheet.
 fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     let c = min(max(cosine, 1e-6), 1.0);
     let eta = 1.0 / ior;
@@ -10,12 +10,12 @@ fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     return 2.0 * once / (1.0 + once);
 }
 
-// A direction on the viewer's side: what is behind the sheet, mirrored by it.
+// Mirrors a direction to the viewer's side if it is behind the sheet.
 fn to_upper_side(wi: vec3f) -> vec3f {
     return vec3f(wi.x, wi.y, abs(wi.z));
 }
 
-// The BSDF times the cosine of wi, which may be below the surface.
+// Returns the BSDF times the cosine of wi, which may be below the surface.
 fn thin_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     let up = to_upper_side(wi);
     let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));
@@ -24,7 +24,7 @@ fn thin_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     return select(vec3f(0.0), value, (wo.z > 0.0) & (up.z > 0.0));
 }
 
-// The density of `thin_sample`, per solid angle.
+// Returns the pdf of `thin_sample`, per solid angle.
 fn thin_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
     let up = to_upper_side(wi);
     let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));
@@ -32,7 +32,7 @@ fn thin_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
     return select(0.0, share * facet_pdf(facet_alpha(material), wo, up), (wo.z > 0.0) & (up.z > 0.0));
 }
 
-// A way on, mirrored or through the sheet as `random`, in [0, 1), says.
+// Samples a direction: reflected or transmitted, chosen by `random` in [0, 1).
 fn thin_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
     let alpha = facet_alpha(material);
     let m = ggx_sample(alpha, wo, u);

@@ -15,7 +15,7 @@ fn vertex_color(hit: Hit) -> vec4f {
     return vec4f(1.0);
 }
 
-// Applies vertex colors to a material, as it specifies.
+// Applies vertex colors to a material, as its `vertex_colors` specifies.
 fn with_vertex_colors(before: Material, hit: Hit) -> Material {
     var material = before;
     if material.vertex_colors != NO_COLORS {

@@ -3,8 +3,9 @@
 /// The requested device. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
-    /// A hardware GPU if there is one. Otherwise the CPU for scenes with a BVH (meshes, or more than 64 bounded primitives), which
-    /// it traverses faster than software Vulkan, and software Vulkan for all others. The CPU if no adapter exists.
+    /// A hardware GPU if there is one. Otherwise the CPU for scenes with a BVH (meshes, or more than 64 bounded
+    /// primitives), which it traverses faster than software Vulkan, and software Vulkan for all others. The CPU if no
+    /// adapter exists.
     #[default]
     Auto,
     /// The CPU, without any driver.

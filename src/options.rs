@@ -17,8 +17,8 @@ pub struct Options {
     pub crop: Option<Region>,
     /// The layers besides the radiance. Repetitions are ignored.
     pub aovs: Vec<Aov>,
-    /// True to round quotients and square roots correctly in software, for the bits of the CPU on GPUs that may be off by one unit in the last
-    /// place. Vulkan only; the CPU ignores it.
+    /// True to round quotients and square roots correctly in software, for the bits of the CPU on GPUs that may be off
+    /// by one unit in the last place. Vulkan only; the CPU ignores it.
     pub exact_rounding: bool,
 }
 

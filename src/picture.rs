@@ -126,8 +126,8 @@ impl Picture {
     pub fn save_with(&self, path: impl AsRef<Path>, options: &SaveOptions) -> Result<(), Error> {
         let path = path.as_ref();
         let refused = |rule: &str| {
-            let told = format!("{}: {rule}", path.display());
-            RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, told))
+            let message = format!("{}: {rule}", path.display());
+            RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, message))
         };
         let format = Format::of(path).ok_or_else(|| refused("must end in .png, .exr, .jpg, .jpeg or .webp"))?;
         let size = format.check_size(self.width(), self.height());

@@ -43,8 +43,8 @@ const PAUSES: [Duration; 3] = [Duration::ZERO, Duration::from_millis(500), Durat
 /// Interval at which the stop callback is polled during a pause.
 const STOP_INTERVAL: Duration = Duration::from_millis(20);
 
-/// A counter of results that a loss of the device does not undo. The renderer counts losses since the last progress, so that work that
-/// advances between losses continues however often the device is lost.
+/// A counter of results that a loss of the device does not undo. The renderer counts losses since the last progress, so
+/// that work that advances between losses continues however often the device is lost.
 #[derive(Clone, Debug, Default)]
 pub struct Progress(Arc<AtomicU64>);
 

@@ -8,10 +8,10 @@ use crate::oracle::{Flaw, Meeting, Oracle};
 use crate::pictures::{both, first_hits, means, render};
 use crate::scenes;
 
-/// Tolerance of a value `v`, in units of `1 + v`. The f32 error after a specular exponent of 50 is about as large.
+/// Tolerance of a value `v`, in units of `1 + v`. An f32 error after a specular exponent of 50 is about as large.
 const TOLERANCE: f64 = 1e-5;
 
-/// Maximum fraction of differing pixels. At edges, a sample can fall on the other side.
+/// Maximum fraction of differing pixels. At an edge, rounding can move a sample to the other side.
 const EDGES: f64 = 0.0005;
 
 /// Scenes with more edges: name, fraction of differing pixels, reason.
@@ -135,7 +135,7 @@ fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
 }
 
 #[test]
-fn pictures_are_the_oracles() {
+fn images_match_the_oracle() {
     for (name, description) in known() {
         let truth = Oracle::new(&description, Flaw::None).picture();
         for way in both() {
@@ -164,7 +164,7 @@ fn pictures_are_the_oracles() {
     }
 }
 
-/// Checks that each flaw is detected in some scene, and flaws that affect all scenes in each.
+/// Checks that each flaw is detected in at least one scene, and a flaw that affects all scenes in every scene.
 #[test]
 fn a_flawed_oracle_is_found() {
     let way = *both().last().expect("the CPU at least");
@@ -228,7 +228,7 @@ fn same_first_hit(hit: &FirstHit, meeting: &Option<Meeting>) -> bool {
 }
 
 #[test]
-fn first_hits_are_the_oracles() {
+fn first_hits_match_the_oracle() {
     for (name, description) in known() {
         let truth = Oracle::new(&description, Flaw::None).meetings();
         let shifted = Oracle::new(&description, Flaw::ShiftedPixel).meetings();

@@ -141,14 +141,14 @@ fn largest(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
     let results = evaluate(&words);
     let per = results.len() / CALLS;
     let errors = arguments.iter().zip(results.chunks_exact(per));
-    // a NaN error must propagate, but `f64::max` would drop it
+    // A NaN error must propagate, but `f64::max` would drop it.
     errors
         .map(|(x, r)| (bound.error)(x, f64::from(f32::from_bits(r[0]))))
         .fold(0.0, |a, b| if b <= a { a } else { b })
 }
 
 #[test]
-fn functions_are_as_near_to_the_truth_as_they_promise() {
+fn functions_keep_their_documented_error_bounds() {
     let source = shared_source();
     let module = parse(&source);
     let functions = functions(&module, &source);
@@ -181,7 +181,7 @@ fn functions_are_as_near_to_the_truth_as_they_promise() {
 }
 
 #[test]
-fn functions_have_their_exact_answers() {
+fn functions_are_exact_at_special_values() {
     let source = shared_source();
     let module = parse(&source);
     let functions = functions(&module, &source);
@@ -255,7 +255,7 @@ fn the_hash_is_pcg4d() {
 }
 
 #[test]
-fn a_function_that_is_further_from_the_truth_is_found() {
+fn a_function_beyond_its_error_bound_is_found() {
     let Some(device) = adapter::device() else { return };
     for (bound, from, to) in [
         (0, "s2 * (0.2 +", "s2 * (0.201 +"),

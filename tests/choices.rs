@@ -22,7 +22,7 @@ fn on(device: Device) -> Options {
 }
 
 #[test]
-fn every_choice_gives_the_same_picture_and_tells_what_has_rendered() {
+fn every_device_choice_gives_the_same_image_and_reports_the_device() {
     let Some(device) = adapter::device() else { return };
     let name = device.info.name.clone();
     let scene = scene(Overrides::default());
@@ -50,7 +50,7 @@ fn every_choice_gives_the_same_picture_and_tells_what_has_rendered() {
 }
 
 #[test]
-fn a_picture_grows_on_the_device_to_the_rendered_one() {
+fn a_progressive_image_ends_as_the_rendered_one() {
     let Some(device) = adapter::device() else { return };
     let scene = scene(Overrides {
         size: Some((130, 131)),

@@ -1,4 +1,4 @@
-//! Image metrics, compared with closed forms and with the values of NVIDIA's FLIP and scikit-image, which
+//! Image metrics, compared with closed forms and with the values of NVIDIA's FLIP and of scikit-image, which
 //! `benches/peers/diff_check.py --values` prints.
 
 use std::sync::Arc;
@@ -61,7 +61,7 @@ fn is_near(found: f64, expected: f64, bound: f64) {
 }
 
 #[test]
-fn figures_are_those_of_others() {
+fn metrics_match_the_reference_implementations() {
     let display = [
         0.10898956890902572,
         0.12076424445584943,
@@ -89,7 +89,7 @@ fn figures_are_those_of_others() {
 }
 
 #[test]
-fn a_picture_has_no_distance_from_itself_and_the_reference_is_the_second() {
+fn an_image_equals_itself_and_the_second_image_is_the_reference() {
     for kind in [BYTES, Kind::Linear] {
         let (a, b) = formula(kind);
         let found = color(&a, &a);
@@ -127,7 +127,7 @@ fn extremes_have_closed_forms() {
 }
 
 #[test]
-fn windows_along_short_sides_are_cut_and_weighted_anew() {
+fn windows_wider_than_the_image_are_clipped_and_renormalized() {
     // the definition in one dimension: (2 ma mb + C1) (2 cov + C2) / ((ma² + mb² + C1) (va + vb + C2))
     let (a, b) = ([0.0, 51.0, 255.0, 102.0], [10.0, 51.0, 200.0, 0.0]);
     let mut sum = 0.0;
@@ -149,8 +149,9 @@ fn windows_along_short_sides_are_cut_and_weighted_anew() {
 }
 
 #[test]
-fn cuts_into_tiles_and_chunks_change_nothing() {
-    // larger than a tile of 256 x 256 and a chunk of 65,536 pixels; distant changes add up in both metrics
+fn tiles_and_chunks_do_not_change_the_metrics() {
+    // The image is larger than a tile of 256 x 256 pixels and a chunk of 65,536 pixels. The contributions of distant
+    // pixels add up in both metrics.
     let noise = |x: u32, y: u32, c: u32| ((x * 7919 + y * 104_729 + c * 1_299_709) % 251) as f32;
     let b = picture(600, 300, BYTES, move |x, y, c| (noise(x, y, c) / 2.0).floor());
     let one = |places: &'static [(u32, u32)]| {
@@ -175,7 +176,7 @@ fn cuts_into_tiles_and_chunks_change_nothing() {
 }
 
 #[test]
-fn flip_sees_less_from_farther_away() {
+fn flip_decreases_with_the_viewing_distance() {
     let (a, b) = formula(BYTES);
     let at = |ppd: f64| compare::flip(&a, &b, ppd, None).unwrap().mean;
     assert!(at(20.0) > at(67.0) && at(67.0) > at(300.0));
@@ -185,7 +186,7 @@ fn flip_sees_less_from_farther_away() {
 }
 
 #[test]
-fn flip_of_linear_values_has_an_exposure_for_every_brightness() {
+fn flip_of_linear_values_adapts_its_exposures_to_the_reference() {
     let flat = |value: f32| picture(12, 12, Kind::Linear, move |_, _, _| value);
     // the exposures follow the reference, so that a common factor cancels
     let found = flip(&flat(1.1), &flat(1.0));

@@ -1,4 +1,4 @@
-//! Tests of each sentence of the contract of `wgray_render::backend::Backend` on CPU and GPU, with baked and buffered
+//! Tests of each sentence of the contract of `wgray_render::backend::Backend`, on CPU and GPU, with baked and buffered
 //! scenes. Deliberately wrong backends must fail.
 
 use std::ops::Range;
@@ -348,7 +348,7 @@ fn every_backend_fulfills_the_contract() {
     }
 }
 
-/// A backend with one defect.
+/// A backend with one deliberate defect.
 struct Wrong<'a> {
     inner: Cpu<'a>,
     how: How,

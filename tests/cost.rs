@@ -1,4 +1,5 @@
-//! Time and memory grow in proportion to the scene. The tests compare ratios of CPU times, not wall-clock times.
+//! Time and memory are proportional to the size of the scene. The tests compare ratios of CPU times, not wall-clock
+//! times.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -42,7 +43,7 @@ fn scene(n: usize, one: &str) -> String {
 
 const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'first'\ncenter = [{x}, {y}, {z}]\nradius = 0.05";
 
-/// An example of everything that a scene may have many of.
+/// An example of every kind of object that a scene may have many of.
 const KINDS: [(&str, &str); 13] = [
     ("spheres", SPHERE),
     (
@@ -58,7 +59,7 @@ const KINDS: [(&str, &str); 13] = [
         "triangles",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {z}], [9, {y}, {z}], [{x}, 9, {y}]]",
     ),
-    // A slope of triangles: each has all others on one side.
+    // A slope of triangles: each triangle has all others on one side.
     (
         "triangles on a slope",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {x}], [9, {y}, 9], [9, 9, 9]]",
@@ -108,7 +109,7 @@ fn processor_time(work: impl Fn()) -> f64 {
     #[cfg(unix)]
     let now = || {
         let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: the clock is written to a place of the right type.
+        // SAFETY: the clock writes to a valid `timespec`.
         let result = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
         assert_eq!(result, 0, "there is no clock of threads");
         time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
@@ -123,7 +124,7 @@ fn processor_time(work: impl Fn()) -> f64 {
     now() - start
 }
 
-/// Returns the minimum of three times, on a pool of one thread that runs no work of other tests.
+/// Returns the minimum of three times, measured in a pool of one thread, which runs no work of other tests.
 fn least_of_three(work: impl Fn() + Sync) -> f64 {
     let thread = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -148,7 +149,7 @@ fn ratio_below(bound: f64, large: impl Fn() + Sync, small: impl Fn() + Sync) -> 
 }
 
 #[test]
-fn reading_and_packing_take_time_in_proportion() {
+fn parsing_and_packing_take_linear_time() {
     for (name, one) in KINDS {
         let (small, large) = (scene(1500, one), scene(12_000, one));
         let pack = |text: &str| {
@@ -162,7 +163,7 @@ fn reading_and_packing_take_time_in_proportion() {
 }
 
 #[test]
-fn work_that_grows_with_the_square_is_found() {
+fn quadratic_work_is_found() {
     let square = |n: u64| {
         let pairs = (0..n).flat_map(|i| (0..n).map(move |j| i ^ j));
         assert!(std::hint::black_box(pairs.max()).is_some());
@@ -217,7 +218,7 @@ fn address_space(scene: &Path) -> u32 {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_scene_file_takes_a_few_times_its_size() {
+fn memory_is_a_small_multiple_of_the_scene_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.toml");
     let text = scene(100_000, SPHERE);
@@ -260,12 +261,12 @@ fn images_are_refused_by_their_headers() {
         std::fs::write(&path, format!("{START}[textures.t]\ntype = 'image'\nfile = '{name}'\n")).unwrap();
         check_within(program + 20_000, &path)
     };
-    let (code, told) = check("bits.png");
-    assert_eq!(code, Some(3), "{told}");
+    let (code, message) = check("bits.png");
+    assert_eq!(code, Some(3), "{message}");
     assert!(
-        told.contains("\"bits.png\" (16384 x 16384 texels) needs 1365.3 MiB"),
-        "{told}"
+        message.contains("\"bits.png\" (16384 x 16384 texels) needs 1365.3 MiB"),
+        "{message}"
     );
-    let (code, told) = check("profile.png");
-    assert_eq!(code, Some(0), "{told}");
+    let (code, message) = check("profile.png");
+    assert_eq!(code, Some(0), "{message}");
 }

@@ -35,7 +35,7 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
             let p = near.center + Vec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0) as f32)) * t_max;
             let light = &scene.lighting.lights[random.below(scene.lighting.lights.len() as u32) as usize];
             if light.kind == ENVIRONMENT {
-                continue; // has no frustum
+                continue; // no frustum
             }
             let cone = light_frustum(light, p);
             let block = SampleBlock {
@@ -59,7 +59,7 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
 }
 
 #[test]
-fn what_is_left_out_hides_nothing() {
+fn culled_primitives_occlude_nothing() {
     let scenes = some_scenes(400);
     let (left_out_rightly, wrong) = left_out(&scenes, |sphere| sphere);
     println!("{left_out_rightly} primitives were left out, {wrong} of them wrongly");

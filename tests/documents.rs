@@ -1,4 +1,4 @@
-//! The documentation as a reader meets it: its links, its map, and the scene in the README.
+//! The documentation: its links, the table of pages, and the scene of the README.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use wgray::{Options, Overrides, Scene};
 
 use crate::sources::path as project;
 
-/// All Markdown files below a folder of the project, relative to the project.
+/// Returns all Markdown files below a folder of the project, relative to the project.
 fn pages_in(folder: &str) -> Vec<PathBuf> {
     let mut pages = Vec::new();
     for entry in std::fs::read_dir(project(folder)).unwrap() {
@@ -26,7 +26,7 @@ fn read(page: &Path) -> String {
     std::fs::read_to_string(project(page.to_str().unwrap())).unwrap()
 }
 
-/// The lines of a page outside of code blocks.
+/// Returns the lines of a page outside of code blocks.
 fn prose(page: &str) -> impl Iterator<Item = &str> {
     let mut fenced = false;
     page.lines().filter(move |line| {
@@ -36,7 +36,7 @@ fn prose(page: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// The targets of all links and images of a page.
+/// Returns the targets of all links and images of a page.
 fn links(page: &str) -> Vec<String> {
     let targets = |line: &str| -> Vec<String> {
         let rest = line.split("](").skip(1);
@@ -46,7 +46,7 @@ fn links(page: &str) -> Vec<String> {
     prose(page).flat_map(targets).collect()
 }
 
-/// The anchors that GitHub makes of a page's headings.
+/// Returns the anchors that GitHub generates for the headings of a page.
 fn anchors(page: &str) -> Vec<String> {
     let headings = prose(page).filter(|line| line.starts_with('#'));
     headings
@@ -61,7 +61,7 @@ fn anchors(page: &str) -> Vec<String> {
         .collect()
 }
 
-/// The relative links of a page that lead nowhere.
+/// Returns the relative links of a page without an existing target.
 fn broken_links(page: &Path, text: &str) -> Vec<String> {
     let leads_nowhere = |link: &String| {
         if link.contains("://") {
@@ -87,7 +87,7 @@ fn broken_links(page: &Path, text: &str) -> Vec<String> {
 }
 
 #[test]
-fn relative_links_lead_somewhere() {
+fn relative_links_have_existing_targets() {
     let mut pages = pages_in("docs");
     pages.extend(
         [
@@ -118,7 +118,7 @@ fn broken_links_are_found() {
 }
 
 #[test]
-fn the_map_lists_every_page() {
+fn the_table_of_pages_is_complete() {
     let map = read(Path::new("docs/README.md"));
     let listed = links(&map);
     for page in pages_in("docs") {

@@ -105,7 +105,7 @@ fn check(radii: &[f64], most: usize, shapes: impl Fn(&Setting, f64) -> String) {
 const RADII: &[f64] = &[0.3, 1.0, 100.0, 1e3, 1e4];
 
 #[test]
-fn a_sphere_hides_no_light_from_its_own_points() {
+fn spheres_do_not_shadow_themselves() {
     check(RADII, 1, |s, radius| s.sphere("dull", [0.0, 0.0, -radius], radius));
 }
 
@@ -137,7 +137,7 @@ fn a_grain_on_the_largest_ground_has_its_contact_shadow() {
 }
 
 #[test]
-fn mirrors_and_glass_of_all_radii_do_not_meet_themselves() {
+fn specular_rays_do_not_intersect_their_origin_again() {
     for material in ["mirror", "glass"] {
         check(RADII, 14, |s, radius| {
             let ground = s.sphere(material, [0.0, 0.0, -radius], radius);
@@ -147,7 +147,7 @@ fn mirrors_and_glass_of_all_radii_do_not_meet_themselves() {
 }
 
 #[test]
-fn the_inside_of_a_sphere_is_lit_from_inside_alone() {
+fn the_inside_of_a_sphere_is_lit_from_inside_only() {
     for setting in settings() {
         for radius in [1.0, 100.0, 1e4] {
             let up = |height: f64| [0.1, 0.0, height - radius];
@@ -167,7 +167,7 @@ fn the_inside_of_a_sphere_is_lit_from_inside_alone() {
 
 /// Faces with common edges. Pixel centers and the light lie on lines of symmetry.
 #[test]
-fn neighbours_hide_no_light_at_shared_edges() {
+fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
     for setting in settings() {
         let p = |p: [f64; 3]| setting.point(p);
         let floor = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
@@ -215,7 +215,7 @@ fn neighbours_hide_no_light_at_shared_edges() {
 
 /// In f64, over all sizes, `ray_origin` is above the surface, by less than 1e-5 of the coordinates.
 #[test]
-fn rays_start_a_little_above_their_surface() {
+fn ray_origins_are_slightly_above_their_surface() {
     let random = Random::new(5);
     let mut highest = 0.0f64;
     for setting in settings() {

@@ -1,6 +1,6 @@
 //! Random inputs for the probes of CPU and GPU functions. Most arguments are consistent, such as a primitive and a ray
 //! to its interior, to its edge or past it, to cover every branch. Some components are replaced by edge values or by
-//! each other, rounded to halves for equal comparisons, or of any magnitude.
+//! each other, rounded to halves so that comparisons find equal values, or of any magnitude.
 
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};

@@ -1,6 +1,5 @@
-//! An integrator is one file over a few functions that are not its own. Here is another one in the place of `phong`, with its
-//! twin: what share of the light comes from where a random ray leaves the scene, and how that looks by the surface's colour.
-//! It uses the geometry, materials, lights and random numbers as any integrator does.
+//! An integrator is a single file that only uses shared functions. This test replaces `phong` by another integrator and
+//! its twin: half the diffuse color if a random ray above the surface leaves the scene, plus unoccluded direct light.
 
 use glam::{UVec2, Vec3, Vec4};
 use wgray_render::cpu::camera::camera_ray;
@@ -42,7 +41,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
 }
 ";
 
-/// The same in Rust.
+/// The twin of [`WGSL`]'s `radiance`.
 fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     let hit = closest_hit(scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
     if hit.primitive == NO_INDEX {
@@ -78,7 +77,7 @@ fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
 }
 
 #[test]
-fn another_integrator_is_one_file() {
+fn an_integrator_is_a_single_file() {
     let mut description = scenes::scene("turntable.toml");
     (description.image.width, description.image.height) = (96, 72);
     description.render.pixel_samples = crate::patterns::samples(wgray::scene::Pattern::Grid, 4);

@@ -320,7 +320,7 @@ fn open(
         path: path.to_owned(),
         resume: true,
         interval: Duration::ZERO,
-        // A child process inherits the file, and with it the lock, for a moment.
+        // A child process inherits the file, and therefore the lock, for a moment.
         wait: Box::new(move || {
             rounds += 1;
             assert!(rounds < 200, "another process writes it");
@@ -487,7 +487,7 @@ fn another_job_has_another_identity() {
 }
 
 #[test]
-fn tiles_are_all_rows_once() {
+fn tiles_partition_the_rows() {
     for (height, of) in [(1, 1), (7, 3), (7, 7), (65_536, 1), (65_536, 65_536), (65_536, 9999)] {
         let region = Region {
             x0: 3,

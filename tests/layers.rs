@@ -295,7 +295,7 @@ fn mean_normals_include_normal_maps() {
 }
 
 #[test]
-fn albedo_is_seen_in_mirrors() {
+fn albedo_is_recorded_through_mirrors() {
     let text = facing((1, 1), [0.0, -0.5], "", false)
         .replace("max_depth = 0", "max_depth = 2")
         .replace(

@@ -101,7 +101,7 @@ fn a_disk_out_of_focus_is_its_circle_of_confusion() {
 }
 
 #[test]
-fn the_aperture_may_be_given_as_f_number() {
+fn the_aperture_may_be_an_f_number() {
     // The default focus distance is that of `look_at`.
     let by = |lens: &str| spot(12.0, lens, 1).camera;
     assert_eq!(

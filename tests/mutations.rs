@@ -1,4 +1,5 @@
-//! The mistakes of `scripts/mutation/twins.toml` can be made: each text that one replaces occurs in its shader or twin.
+//! The mutations of `scripts/mutation/twins.toml` are applicable: each text to be replaced occurs in its shader or
+//! twin.
 
 use std::fs;
 
@@ -15,7 +16,7 @@ fn words(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the texts that a table of mistakes names and that do not occur, and the number of texts.
+/// Returns the texts to be replaced that do not occur in their file, and the number of all texts.
 fn missing(table: &toml::Table, read: impl Fn(&str) -> String) -> (Vec<String>, usize) {
     let (mut missing, mut count) = (Vec::new(), 0);
     for (file, mistakes) in table {
@@ -35,7 +36,7 @@ fn missing(table: &toml::Table, read: impl Fn(&str) -> String) -> (Vec<String>, 
 }
 
 #[test]
-fn every_mistake_can_be_made() {
+fn every_mutation_is_applicable() {
     let table = fs::read_to_string(sources::path("scripts/mutation/twins.toml")).unwrap();
     let read = |name: &str| {
         let path = match name.strip_suffix(".rust") {

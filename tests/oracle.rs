@@ -15,7 +15,7 @@ use wgray::scene::{
 
 use crate::sources;
 
-/// A deliberate error that `tests/against_oracle.rs` must detect.
+/// A deliberate error in the oracle, which `tests/against_oracle.rs` must detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flaw {
     None,

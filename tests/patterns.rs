@@ -1,4 +1,4 @@
-//! Every pattern of samples that a scene file can name, found in the source, so that a new one is tested at once.
+//! All sample patterns that a scene file can name, read from the source so that a new pattern is tested automatically.
 
 use serde::Deserialize as _;
 use serde::de::IntoDeserializer;
@@ -7,7 +7,7 @@ use wgray::scene::{Pattern, SamplesDescription};
 
 use crate::sources;
 
-/// The patterns with the names that files have for them.
+/// Returns all patterns with their names in scene files.
 pub fn all() -> Vec<(String, Pattern)> {
     let file = sources::rust("crates/scene/src/description/render.rs");
     let names = file.items.iter().find_map(|item| match item {
@@ -35,7 +35,7 @@ fn snake_case(name: &str) -> String {
     result
 }
 
-/// Samples of a pattern, as near to `count` as it takes.
+/// Returns samples of a pattern, with the largest count up to `count` that the pattern permits.
 pub fn samples(pattern: Pattern, count: u32) -> SamplesDescription {
     let side = count.isqrt();
     SamplesDescription {

@@ -93,7 +93,7 @@ fn ambient_light_alone() {
 }
 
 #[test]
-fn only_background() {
+fn an_empty_scene_shows_only_the_background() {
     let scene = parse(&format!("{DOWN}{LIGHT}"));
     for film in films(&scene) {
         assert!(film.means().all(|color| color == [0.5, 0.25, 0.125]));

@@ -1,4 +1,4 @@
-//! Random numbers for tests, from another generator than the renderer's.
+//! Random numbers for tests, from a generator other than the renderer's.
 
 use std::cell::Cell;
 
@@ -18,12 +18,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// From 0 to below n.
+    /// Returns an integer from 0 to n - 1.
     pub fn below(&self, n: u32) -> u32 {
         (self.bits() >> 32) as u32 % n
     }
 
-    /// From 0 to below 1.
+    /// Returns a number in [0, 1).
     pub fn unit(&self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -32,12 +32,12 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// True once in n times.
+    /// Returns true with probability 1 / n.
     pub fn once_in(&self, n: u32) -> bool {
         self.below(n) == 0
     }
 
-    /// Between 10^low and 10^high, evenly over the magnitudes.
+    /// Returns a log-uniform number from 10^low to 10^high.
     pub fn magnitude(&self, low: f64, high: f64) -> f64 {
         10f64.powf(self.between(low, high))
     }

@@ -118,7 +118,7 @@ fn camera_moved(description: &Description, way: DVec3) -> Description {
 /// The segment from pixel (15, 193) to the first light sample passes an edge of the tetrahedron at 4e-7, so the scale
 /// decides its occlusion.
 #[test]
-fn the_unit_of_length_shows_in_the_last_digits_of_edges_alone() {
+fn the_unit_of_length_changes_only_the_last_digits_of_edges() {
     let (scene, expected) = (cornell(), reference(&packed(&cornell())));
     for scale in [0.001, 0.3, 7.7, 1000.0] {
         let found = reference(&packed(&transformed(&scene, scale, DVec3::ZERO)));
@@ -131,9 +131,10 @@ fn the_unit_of_length_shows_in_the_last_digits_of_edges_alone() {
     assert_eq!(near, 0, "of the pixels of everywhere");
 }
 
-/// Even at 1000 times the scene's size and farther: coordinates are relative to a point near the look-at point.
+/// Checks offsets up to 1000 times the scene's size and more: coordinates are relative to a point near the look-at
+/// point.
 #[test]
-fn the_place_of_the_origin_does_not_show() {
+fn the_position_of_the_origin_is_invisible() {
     for offset in [100.0, -2000.0, 1e6] {
         let (found, expected) = (transformed(&cornell(), 1.0, DVec3::splat(offset)), cornell());
         let (found, expected) = (reference(&packed(&found)), reference(&packed(&expected)));

@@ -180,7 +180,7 @@ pub fn poor_shaders() -> &'static Shaders {
 
 /// With imprecise operations images are within the tolerances; with the software functions they are bit-identical.
 #[test]
-fn pictures_keep_their_promise_on_a_poor_device() {
+fn images_keep_their_guarantees_on_an_imprecise_device() {
     if !adapter::device().is_some_and(bit_exact) {
         return; // other tests cover such devices
     }

@@ -1,4 +1,4 @@
-//! The shared functions and records, as naga parses the WGSL and syn the Rust.
+//! The shared functions and records, parsed from WGSL by naga and from Rust by syn.
 
 use std::fs;
 use std::path::{Path, PathBuf};

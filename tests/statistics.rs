@@ -113,7 +113,7 @@ fn flaw(positions: &[Vec2]) -> Option<String> {
 }
 
 #[test]
-fn the_chances_are_those_of_the_tables() {
+fn p_values_match_published_tables() {
     for (z, expected) in [(0.0, 0.5), (1.0, 0.158_655), (3.0, 0.001_349_9), (-1.0, 0.841_345)] {
         assert!((upper_tail(z) - expected).abs() < 1e-6, "{z}");
     }
@@ -162,7 +162,7 @@ fn random_patterns_are_uniform_over_pixels() {
 
 /// The mean position is the center of the square.
 #[test]
-fn all_patterns_are_centred() {
+fn all_patterns_are_centered() {
     for (name, pattern) in patterns::all() {
         let sets = positions(pattern, 16, 10_000);
         let n = (sets.len() * sets[0].len()) as f64;
@@ -230,7 +230,7 @@ fn unbiased(deviations: &[f64]) -> Result<(), String> {
 }
 
 #[test]
-fn pictures_of_random_patterns_have_the_mean_of_grids() {
+fn images_of_random_patterns_have_the_mean_of_grids() {
     let truth = means(&reference(&noisy(Pattern::Grid, 0, (256, 256))));
     for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !fixed(*pattern)) {
         let picture = |seed| means(&reference(&noisy(pattern, seed, (4, 4))));

@@ -1,5 +1,4 @@
-//! The modules of a package are in layers: none imports another one that imports it, directly or through others. The order of the packages is
-//! Cargo's to enforce.
+//! The import graph of the modules of each package has no cycles. Cargo ensures the same for the packages.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -10,7 +9,7 @@ use syn::{Attribute, File, Item, ItemMacro, ItemMod, ItemUse, Macro, UseTree, Vi
 
 use crate::sources;
 
-/// The folders whose files and folders are the modules in question, and the path of the module that they are in.
+/// Folders whose files and subfolders are the checked modules, with the path of their parent module.
 const FOLDERS: [(&str, &[&str]); 6] = [
     ("crates/image/src", &[]),
     ("crates/scene/src", &[]),
@@ -21,7 +20,7 @@ const FOLDERS: [(&str, &[&str]); 6] = [
 ];
 
 #[test]
-fn no_module_imports_one_that_imports_it() {
+fn module_imports_have_no_cycles() {
     for (folder, parent) in FOLDERS {
         let mut files = Vec::new();
         read(&sources::path(folder), &strings(parent), &mut files);
@@ -46,7 +45,7 @@ fn cycles_are_found() {
         found(&[("a", "use crate::b::B;"), ("b", "fn f() { super::a::g() }")]),
         both
     );
-    // through the names that the root exports
+    // through names that the root exports
     let root = ("lib", "mod a; mod b; pub use b::B; pub use a::*;");
     assert_eq!(
         found(&[
@@ -79,7 +78,7 @@ fn strings(names: &[&str]) -> Module {
     names.iter().map(|&name| name.to_owned()).collect()
 }
 
-/// Reads the files of a folder, each with its module. Tests are left out.
+/// Reads the files of a folder with their module paths, except test modules.
 fn read(folder: &Path, module: &[String], files: &mut Vec<(Module, File)>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -103,7 +102,7 @@ fn read(folder: &Path, module: &[String], files: &mut Vec<(Module, File)>) {
     files.retain(|(module, _)| !of_tests.iter().any(|tests| module.starts_with(tests)));
 }
 
-/// Returns the modules of a file that are in tests only.
+/// Returns the modules that a file declares for tests only.
 fn tests_of(file: &File) -> impl Iterator<Item = String> {
     file.items.iter().filter_map(|item| match item {
         Item::Mod(module) if is_test(&module.attrs) => Some(module.ident.to_string()),
@@ -146,7 +145,7 @@ fn imports(files: &[(Module, File)], parent: &[String]) -> BTreeMap<String, BTre
     all
 }
 
-/// Returns the names that the parent module exports from its children, with the child that has them.
+/// Returns the names that the parent module re-exports, each with the child module that defines it.
 fn exports(files: &[(Module, File)], parent: &[String], modules: &BTreeSet<String>) -> BTreeMap<String, String> {
     let mut exports = BTreeMap::new();
     let roots = files.iter().filter(|(module, _)| module == parent);
@@ -198,7 +197,7 @@ fn public_names(file: &File) -> impl Iterator<Item = String> {
     })
 }
 
-/// Collects the paths of a file that start with `crate`, `self` or `super`, from the root of the package.
+/// A visitor that collects the paths starting with `crate`, `self` or `super`, relative to the root of the package.
 struct Paths {
     module: Module,
     found: Vec<Module>,
@@ -219,7 +218,7 @@ impl Paths {
         self.found.push(base.into_iter().chain(rest.cloned()).collect());
     }
 
-    /// Finds paths in tokens, whose text has spaces between them.
+    /// Adds the paths in the text of tokens, which are separated by spaces.
     fn add_tokens(&mut self, tokens: &str) {
         let tokens = tokens.replace(" :: ", "::");
         let paths = tokens.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
@@ -260,7 +259,7 @@ impl Visit<'_> for Paths {
     }
 }
 
-/// Returns the paths of an import.
+/// Returns all paths that a `use` item imports.
 fn used(tree: &UseTree) -> Vec<Module> {
     match tree {
         UseTree::Path(path) => {
@@ -275,7 +274,7 @@ fn used(tree: &UseTree) -> Vec<Module> {
     }
 }
 
-/// Returns the groups of modules that import each other.
+/// Returns the groups of modules that import each other, directly or indirectly.
 fn cycles(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<Vec<String>> {
     let reached = |start: &String| {
         let mut reached = BTreeSet::new();

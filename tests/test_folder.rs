@@ -1,17 +1,18 @@
-//! A folder of its own for a test, in which the program runs.
+//! A temporary folder for a test.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-/// The folder, which goes with the value. What is run in it, and how, is said where it is used.
+/// A temporary folder that is deleted when the value is dropped. The modules that use it define how the program runs in
+/// it.
 pub struct TestFolder {
     folder: TempDir,
 }
 
 impl TestFolder {
-    /// A folder with one file in it.
+    /// Creates a folder with one file.
     pub fn with_file(name: &str, text: &str) -> TestFolder {
         let place = TestFolder {
             folder: tempfile::tempdir().expect("a temporary folder"),
@@ -36,7 +37,7 @@ impl TestFolder {
         fs::write(self.path(name), text).expect("a file");
     }
 
-    /// The names of all files but some, hidden ones too, sorted.
+    /// Returns the sorted names of all files, including hidden ones, except those for which `known` returns true.
     pub fn files_but(&self, known: impl Fn(&str) -> bool) -> Vec<String> {
         let entries = fs::read_dir(self.folder()).expect("the folder");
         let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());

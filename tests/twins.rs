@@ -1,4 +1,5 @@
-//! WGSL and Rust have the same shared functions, and SPIR-V has no floating-point operation that depends on the driver.
+//! WGSL and Rust have the same shared functions, and the SPIR-V kernels contain no floating-point operation whose
+//! result depends on the driver.
 
 use std::collections::BTreeSet;
 

@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
-"""Makes every mistake that cargo-mutants knows in crates/render/src/cpu, one at a time, and asks whether the tests find it.
+"""Tests all mutations that cargo-mutants generates for crates/render/src/cpu, one at a time.
 
-cargo-mutants would compile the project anew for each of two thousand.  Here it only lists them; all are built at once,
-behind a switch that an environment variable sets.  What does not compile is left out, as cargo-mutants does.
+cargo-mutants would compile the project once per mutation, two thousand times. Here it only lists them; all are compiled
+into one binary, and an environment variable selects one. Mutations that do not compile are skipped, as in
+cargo-mutants.
 
     scripts/mutation/operators.py                     all of them (about an hour on two cores)
     scripts/mutation/operators.py --only ray,shadow   those of some files
     scripts/mutation/operators.py --sample 10         every tenth
-    scripts/mutation/operators.py --again LOG         those that survived a run whose output is in LOG
+    scripts/mutation/operators.py --again LOG         those that survived a run with the output LOG
 
-Needs cargo-mutants (`cargo install cargo-mutants`) and the Python packages tree-sitter and tree-sitter-rust.
-Exit code 1 if fewer than 95 % are found, one survives that survivors.toml does not explain, or one that it explains does not.
+Needs cargo-mutants (`cargo install cargo-mutants`) and the Python packages tree-sitter and tree-sitter-rust. Exit code
+1 if the tests detect fewer than 95 %, if a survivor is not explained in survivors.toml, or if an explained mutation
+does not survive.
 """
 
 import argparse
@@ -30,8 +32,8 @@ import tree_sitter_rust
 from project import AGREEMENT, ANSWERS, REST, ROOT, WITHOUT_GPU, WORK, Tests, cargo, copy
 
 PROBES, PICTURES = AGREEMENT[:1], AGREEMENT[1:]
-# The least share of the mistakes that the tests must find.
-ENOUGH = 0.95
+# Minimum fraction of the mutations that the tests must detect.
+MIN_DETECTED = 0.95
 REASONS = ROOT / "scripts/mutation/survivors.toml"
 
 
@@ -52,12 +54,12 @@ class Mutation:
             self.change = f"{found[1]} to {found[2]}"
         else:
             self.change = re.sub(r"^\S+ ", "", self.name)
-        # A place that survives other lines' changes: the function, the line's text, the column within it.
+        # A key that does not depend on other lines: the function, the text of the line, the column in it.
         self.key = f"{self.function}: {self.line} | {self.change} @{start['column'] - (len(line) - len(line.lstrip()))}"
 
-    def when(self, mistaken, right):
-        """An expression that is one thing with the mistake and another without; marked, to find what does not compile."""
-        return f"if crate::mutant({self.number}) {{ /*<{self.number}*/ {mistaken} /*{self.number}>*/ }} else {{ {right} }}"
+    def when(self, mutated, original):
+        """A switch between the mutated and the original expression, with markers that locate compile errors."""
+        return f"if crate::mutant({self.number}) {{ /*<{self.number}*/ {mutated} /*{self.number}>*/ }} else {{ {original} }}"
 
 
 def all_mutations():
@@ -69,7 +71,7 @@ def all_mutations():
 
 
 class Writer:
-    """Writes a file anew with its mutations behind the switch."""
+    """Rewrites a file with its mutations behind the switch."""
 
     def __init__(self, source, mutations):
         self.source, self.at = source, defaultdict(list)
@@ -78,7 +80,7 @@ class Writer:
         self.done = set()
 
     def text(self, node):
-        """A node's text, those of its parts in place."""
+        """The text of a node with its children rewritten."""
         out, at = "", node.start_byte
         for child in node.children:
             out += self.source[at : child.start_byte].decode() + self.write(child)
@@ -149,11 +151,11 @@ def write_mutations(mutations, folder):
         (folder / file).write_text(writer.write(parser.parse(source).root_node))
         missed += [m for m in of_file if m.number not in writer.done]
     if missed:
-        raise SystemExit("no place was found for\n" + "\n".join(m.name for m in missed))
+        raise SystemExit("cannot locate these mutations:\n" + "\n".join(m.name for m in missed))
 
 
 def unviable(messages, folder):
-    """The numbers of the mutations that the compiler complains about."""
+    """The numbers of the mutations with compile errors."""
     numbers = set()
     for message in messages:
         diagnostic = message.get("message") or {}
@@ -166,13 +168,13 @@ def unviable(messages, folder):
             closed = set(re.findall(r"/\*(\d+)>\*/", text))
             here.update(int(n) for n in opened if n not in closed)
         if not here and diagnostic["spans"]:
-            raise SystemExit(f"no mutation's, but does not compile:\n{diagnostic['rendered']}")
+            raise SystemExit(f"compile error outside of the mutations:\n{diagnostic['rendered']}")
         numbers |= here
     return numbers
 
 
 def probed():
-    """The functions that tests/probes.rs compares one by one."""
+    """The functions that tests/probes.rs tests."""
     text = (ROOT / "tests/probes.rs").read_text()
     listed = text[text.index("probes! {\n") :]
     return set(re.findall(r"^    (\w+)\(", listed[: listed.index("\n}")], re.M))
@@ -180,9 +182,9 @@ def probed():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", help="names of files, without .rs, separated by commas")
-    parser.add_argument("--sample", type=int, default=1, metavar="N", help="only every N-th")
-    parser.add_argument("--again", type=argparse.FileType(), metavar="LOG", help="only those that LOG names as survivors")
+    parser.add_argument("--only", help="file names without .rs, separated by commas")
+    parser.add_argument("--sample", type=int, default=1, metavar="N", help="test only every N-th mutation")
+    parser.add_argument("--again", type=argparse.FileType(), metavar="LOG", help="test only the survivors listed in LOG")
     arguments = parser.parse_args()
     listed = all_mutations()
     chosen = [m for m in listed if not arguments.only or m.file[8:-3] in arguments.only.split(",")][:: arguments.sample]
@@ -200,7 +202,7 @@ def main():
         numbers = unviable(messages, folder)
         left_out += [m for m in chosen if m.number in numbers]
         chosen = [m for m in chosen if m.number not in numbers]
-    print(f"{len(chosen)} mutations; {len(left_out)} more do not compile", flush=True)
+    print(f"{len(chosen)} mutations; {len(left_out)} others do not compile", flush=True)
     tests, functions = Tests(folder), probed()
 
     def found(m):
@@ -226,14 +228,14 @@ def main():
     killed = {m.key for m in chosen} - {m.key for m in survivors}
     stale = [key for key in reasons if key in killed or key not in {m.key for m in listed}]
     share = 1 - len(survivors) / len(chosen)
-    print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} found ({share:.1%}), by")
+    print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} detected ({share:.1%}), by")
     for test, number in sorted(by.items(), key=lambda item: -item[1]):
         print(f"  {number:5} {test or 'nothing'}")
     for m in unexplained:
-        print(f"no reason is known for {m.name}\n    {m.key}")
+        print(f"survives without an explanation: {m.name}\n    {m.key}")
     for key in stale:
-        print(f"survives no more, its reason must go: {key}")
-    return 0 if share >= ENOUGH and not unexplained and not stale else 1
+        print(f"does not survive, but is listed in survivors.toml: {key}")
+    return 0 if share >= MIN_DETECTED and not unexplained and not stale else 1
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What both mutation runs share: a copy of the project that makes its mistakes behind a switch, and its tests."""
+"""Shared code of both mutation runs: a copy of the project with switchable mutations, and its tests."""
 
 import json
 import os
@@ -13,22 +13,22 @@ TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
 WORK = TARGET / "mutants"
 
 SWITCH = """
-/// Whether the mistake of this number is made.
+/// Returns whether the mutation with this number is active.
 #[doc(hidden)]
 pub fn mutant(number: u32) -> bool {
-    static MADE: std::sync::LazyLock<u32> =
+    static ACTIVE: std::sync::LazyLock<u32> =
         std::sync::LazyLock::new(|| std::env::var("WGRAY_MUTANT").map_or(0, |n| n.parse().expect("a number")));
-    *MADE == number
+    *ACTIVE == number
 }
 """
 
-# Comparisons of GPU and CPU, fast ones first.
+# Comparisons of GPU and CPU, fastest first.
 AGREEMENT = [
     ["main", "probes::functions_give_the_same_bits"],
     ["main", "render::pictures_of_all_scenes", "render::first_hits_of_all_scenes", "textures::agreement"],
     ["main", "random_scenes::random_scenes_are_the_same"],
 ]
-# What knows right answers, on the CPU alone: where both paths agree, it speaks for both.
+# Tests against known results, on the CPU only; the comparisons extend them to the GPU.
 ANSWERS = [
     ["lib", "cpu::"],
     ["main", "textures::", "against_oracle::", "radiance::", "culling::", "--skip", "is_found", "--skip", "textures::agreement"],
@@ -37,14 +37,14 @@ ANSWERS = [
     ["main", "path::", "lens::", "panorama::", "--skip", "is_found"],
     ["main", "meshes::", "--skip", "is_found", "--skip", "meshes::bad_input", "--skip", "meshes::readers"],
 ]
-# What else there is, of the command line and of how work is cut.
+# The remaining tests, of the command line and of the division of work.
 REST = [["main", "render::", "cli::", "sampling::"], ["lib"]]
-LOOP = "a loop without end"
+LOOP = "an infinite loop"
 WITHOUT_GPU = {"WGRAY_TEST_WITHOUT_GPU": "1"}
 
 
 def copy(folder):
-    """A copy of the project with the switch, in which mistakes can be made."""
+    """Copies the project and adds the switch."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for name in ["Cargo.toml", "Cargo.lock", "rustfmt.toml", "src", "crates", "shaders", "scenes", "tests", "examples", "benches", "docs", "README.md"]:
@@ -66,7 +66,7 @@ def cargo(folder, *arguments):
 
 
 def build(folder):
-    """The test binaries of a copy: that of crates/render, `lib`, and that of tests/main.rs, `main`."""
+    """Builds the test binaries of a copy: `lib` of crates/render, and `main` of tests/main.rs."""
     code, messages = cargo(folder, "test", "--release", "--no-run", "-p", "wgray", "-p", "wgray-render", "--lib", "--test", "main")
     if code != 0:
         raise SystemExit("the copy of the project does not compile")
@@ -74,7 +74,7 @@ def build(folder):
     for message in messages:
         if message.get("executable") and message.get("profile", {}).get("test"):
             name = {"wgray_render": "lib"}.get(message["target"]["name"], message["target"]["name"])
-            # cargo gives all copies' binaries the same path
+            # cargo uses the same path for the binaries of all copies.
             binaries[name] = shutil.copy2(message["executable"], folder / f"tests-{name}")
     return binaries
 
@@ -89,19 +89,19 @@ class Tests:
                 begin = time.monotonic()
                 failed = self.first_failing([stage], **environment)
                 if failed:
-                    raise SystemExit(f"without any mistake, the tests of {name} fail: {failed}")
+                    raise SystemExit(f"without a mutation, the tests of {name} fail: {failed}")
                 self.seconds[str(stage)] = time.monotonic() - begin
 
     def first_failing(self, stages, **environment):
-        """The name of the first test that fails, by stages in order; None if none does. What takes five times as long
-        as without a mistake loops without end, and counts as failed."""
+        """Returns the name of the first failing test of the stages, or None. A stage that takes five times as long as
+        without a mutation counts as an infinite loop, and as a failure."""
         for stage in stages:
             binary, *filters = stage
-            patience = 5 * self.seconds[str(stage)] + 5 if str(stage) in self.seconds else None
+            timeout = 5 * self.seconds[str(stage)] + 5 if str(stage) in self.seconds else None
             try:
                 run = subprocess.run(
                     [self.binaries[binary], "--quiet", *filters], cwd=self.folder, env=os.environ | environment,
-                    stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=patience, errors="replace",
+                    stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=timeout, errors="replace",
                 )
             except subprocess.TimeoutExpired:
                 return LOOP
@@ -109,5 +109,5 @@ class Tests:
                 failed = re.findall(r"^---- (\S+) stdout", run.stdout, re.M)
                 return failed[0] if failed else f"exit code {run.returncode}"
             if not re.search(r"[1-9]\d* passed", run.stdout):
-                raise SystemExit(f"no test is called {' or '.join(filters)}")
+                raise SystemExit(f"no test matches {' or '.join(filters)}")
         return None

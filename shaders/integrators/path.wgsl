@@ -5,7 +5,7 @@
 // The path of one sample of a pixel.
 struct PathState {
     path: Path,            // with the next ray
-    radiance: vec3f,       // so far
+    radiance: vec3f,       // accumulated
     pdf: f32,              // of the ray's direction, per solid angle; 0 if NEE cannot sample what it hits
     eta2: f32,             // product of the squared index ratios in the throughput
     absorption: vec3f,     // of the ray's medium
@@ -33,7 +33,7 @@ fn begin_path(pixel: vec2u, sample: u32) -> PathState {
 }
 
 // Advances a path by one surface. Short code also runs for a path that ends, and its results are discarded: software
-// Vulkan executes both sides of a branch, and each value that it keeps adds cost.
+// Vulkan executes both sides of a branch, and each value kept across it adds cost.
 fn advance(before: PathState, pixel: vec2u) -> PathState {
     var state = before;
     let path = before.path;
@@ -70,8 +70,8 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         }
     }
     if ABSORPTION != 0u {
-        // With alpha, a surface may have been skipped on entry and says nothing of the medium. An opaque one determines
-        // the whole segment.
+        // An opaque surface hit from inside determines the medium of the whole segment. One with alpha does not, since
+        // the ray may have skipped it on entry.
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
         let absorption = select(state.absorption, material.absorption, inside);
         state.path.throughput *= transmittance(absorption, hit.t + state.skipped_distance);
@@ -307,7 +307,7 @@ fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, mate
     return add_radiance(state, found, !occluded, state.path.depth + 1u);
 }
 
-// Samples the next direction.
+// Samples the next direction from the BSDF.
 fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, u: vec2f,
              random: f32) -> PathState {
     var state = before;

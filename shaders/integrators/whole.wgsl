@@ -1,4 +1,4 @@
-// A sample in one step, for an integrator that is a function `radiance`.
+// Path interface of `pixel.wgsl` for integrators that evaluate a whole sample by a function `radiance`.
 
 struct PathState {
     value: vec4f,

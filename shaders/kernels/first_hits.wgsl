@@ -1,4 +1,4 @@
-// Writes what the ray through each pixel's centre meets first.
+// Writes the first hit of the ray through each pixel's center.
 
 @group(0) @binding(1) var<storage, read_write> hits: array<FirstHit>;
 

@@ -1,5 +1,5 @@
-//! The global allocator: the system allocator, except that an allocation failure that no caller handles ends the program
-//! with exit code 7. The standard library would abort and leave temporary files behind.
+//! The global allocator: the system allocator, except that an allocation failure that no caller handles ends the
+//! program with exit code 7. The standard library would abort and leave temporary files behind.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::{self, Write as _};
@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use super::log;
 
-/// The global allocator of the program: the system allocator, except that an allocation failure ends the program with exit code 7.
+/// The global allocator of the program: the system allocator, except that an allocation failure ends the program with
+/// exit code 7.
 #[derive(Debug)]
 pub struct Allocator;
 
@@ -72,8 +73,8 @@ pub fn end(size: usize) -> ! {
 /// Size of the signal stack that the standard library maps for each thread, in bytes.
 const SIGNAL_STACK: usize = 8192;
 
-/// Ends the program as an allocation failure does if a new thread has no memory for its signal stack: the standard library
-/// maps it without the allocator, and panics.
+/// Ends the program as an allocation failure does if a new thread has no memory for its signal stack: the standard
+/// library maps it without the allocator, and panics.
 pub fn catch_signal_stacks() {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {

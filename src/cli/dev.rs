@@ -47,8 +47,8 @@ pub struct Args {
 
     /// Render on this device
     ///
-    /// auto and gpu prefer a GPU over software Vulkan; NAME is a part of an adapter's name, driver or type, or its number in
-    /// `wgray devices`.
+    /// auto and gpu prefer a GPU over software Vulkan; NAME is a part of an adapter's name, driver or type, or its
+    /// number in `wgray devices`.
     #[arg(long, value_name = "auto|gpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
@@ -62,8 +62,8 @@ pub struct Args {
 
     /// Use this URL to open source lines in an editor
     ///
-    /// The URL contains {file} and optionally {line} and {column}, such as idea://open?file={file}&line={line}. off disables
-    /// the links.
+    /// The URL contains {file} and optionally {line} and {column}, such as idea://open?file={file}&line={line}. off
+    /// disables the links.
     #[arg(long, value_name = "URL|off", default_value = "vscode://file/{file}:{line}:{column}", value_parser = NonEmptyStringValueParser::new())]
     editor: String,
 

@@ -17,7 +17,8 @@ pub fn is_finished(path: &Path) -> bool {
     is_complete(path) && read_metadata(path).is_none_or(|metadata| metadata.get(PARTIAL).is_none())
 }
 
-/// Returns the samples per pixel of an image file, the maximum under adaptive sampling; `None` if wgray did not write it.
+/// Returns the samples per pixel of an image file, the maximum under adaptive sampling; `None` if wgray did not write
+/// it.
 pub fn samples_of(path: &Path) -> Option<u32> {
     let metadata = read_metadata(path)?;
     let text = match (metadata.get(PARTIAL), metadata.get("adaptive")) {

@@ -73,8 +73,8 @@ pub enum LayerPolicy {
 const PART: &str = "part";
 
 impl Outputs {
-    /// Checks all destinations. `-` is standard output. Without --output the image is `default`, which must not replace a file
-    /// of another program.
+    /// Checks all destinations. `-` is standard output. Without --output the image is `default`, which must not replace
+    /// a file of another program.
     pub fn find(
         options: &PictureOptions,
         default: &Path,
@@ -206,8 +206,8 @@ impl Outputs {
         Ok(())
     }
 
-    /// Returns true if all files exist and all images are whole and have all of their samples. Image streams never exist; a statistics
-    /// stream is ignored.
+    /// Returns true if all files exist and all images are whole and have all of their samples. Image streams never
+    /// exist; a statistics stream is ignored.
     pub fn exist(&self) -> bool {
         let exists = |output: &Output| output.path().is_some_and(Path::is_file);
         let mut pictures = self.pictures.iter().flat_map(|picture| &picture.files);
@@ -265,7 +265,8 @@ impl Outputs {
         outputs.map(|output| output.name().to_owned()).collect()
     }
 
-    /// Opens all destinations. Opening a pipe blocks until it has a reader, so signals must still end the program at once.
+    /// Opens all destinations. Opening a pipe blocks until it has a reader, so signals must still end the program at
+    /// once.
     pub fn begin(mut self) -> io::Result<OpenOutputs> {
         let pictures = self.pictures.iter_mut().flat_map(|picture| &mut picture.files);
         for output in pictures

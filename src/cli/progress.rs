@@ -154,7 +154,8 @@ impl Drop for Progress {
     }
 }
 
-/// Runs work whose progress cannot be measured. On a terminal its name and time are shown once it takes longer than a second.
+/// Runs work whose progress cannot be measured. On a terminal its name and time are shown once it takes longer than a
+/// second.
 pub fn named<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
     if mode != Mode::Auto || log::is_json() || !std::io::stderr().is_terminal() {
         return work();

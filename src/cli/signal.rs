@@ -40,8 +40,8 @@ pub fn exit_code(signal: i32) -> u8 {
     128_u8.saturating_add(u8::try_from(signal).unwrap_or(0))
 }
 
-/// Records the first signal; the second one ends the program at once. A signal that was ignored when the program started stays
-/// ignored: `nohup` and shells rely on it for background jobs.
+/// Records the first signal; the second one ends the program at once. A signal that was ignored when the program
+/// started stays ignored: `nohup` and shells rely on it for background jobs.
 pub fn stop() -> io::Result<Stop> {
     stop_with(None)
 }
@@ -104,7 +104,8 @@ const HANG_UP: i32 = signal_hook::consts::SIGHUP;
 #[cfg(not(unix))]
 const HANG_UP: i32 = SIGTERM; // SIGHUP does not exist
 
-/// Makes writing beyond the file size limit (`ulimit -f`) an error, like a full disk, instead of a signal that ends the program.
+/// Makes writing beyond the file size limit (`ulimit -f`) an error, like a full disk, instead of a signal that ends the
+/// program.
 pub fn file_size_limit_is_an_error() {
     #[cfg(unix)]
     // SAFETY: no handler runs for the signal, and no other thread exists yet.
@@ -116,7 +117,8 @@ pub fn file_size_limit_is_an_error() {
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
-    // SAFETY: nothing is changed; the current action is written to a value of the right type, for which zeros are valid.
+    // SAFETY: nothing is changed; the current action is written to a value of the right type, for which zeros are
+    // valid.
     unsafe {
         libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr());
         action.assume_init().sa_sigaction == libc::SIG_IGN

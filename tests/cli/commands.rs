@@ -17,7 +17,7 @@ fn devices_are_listed() {
 }
 
 #[test]
-fn good_scenes_pass_the_check_without_a_device() {
+fn valid_scenes_pass_the_check_without_a_device() {
     let place = TestFolder::new();
     let cornell = project_scene("cornell.toml");
     let ran = place.run_with(&["check", "small.toml", &cornell], &NO_DRIVER);
@@ -117,7 +117,7 @@ fn help_and_version_exit_with_0() {
 }
 
 #[test]
-fn the_scenes_of_the_documents_are_good() {
+fn the_scenes_of_the_documentation_are_valid() {
     let place = TestFolder::new();
     for document in ["README.md", "docs/scene-format.md"] {
         let text = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(document)).unwrap();

@@ -85,12 +85,12 @@ fn two(place: &TestFolder) -> (Vec<u8>, Vec<u8>) {
 #[track_caller]
 fn says(ran: &Ran, code: i32, text: &str) {
     assert_eq!(ran.code, code, "{}{}", ran.stdout, ran.stderr);
-    let said = if [0, 5].contains(&code) {
+    let output = if [0, 5].contains(&code) {
         &ran.stdout
     } else {
         &ran.stderr
     };
-    assert!(said.contains(text), "'{text}' is not in: {said}");
+    assert!(output.contains(text), "'{text}' is not in: {output}");
 }
 
 fn json(ran: &Ran) -> serde_json::Value {
@@ -300,7 +300,7 @@ fn files_that_are_not_images_exit_with_1() {
 }
 
 #[test]
-fn different_sizes_and_places_differ() {
+fn different_sizes_and_positions_differ() {
     let place = TestFolder::new();
     two(&place);
     png(&place, "wide.png", (8, 1), &[0; 24]);

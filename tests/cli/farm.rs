@@ -1,4 +1,5 @@
-//! The templates of `examples/farm`: their tasks render the image that one `wgray render` does. `scripts/farms` runs them on the engines.
+//! Templates of `examples/farm`: their tasks render the same image as a single `wgray render`. `scripts/farms` runs
+//! them on the farm engines.
 #![cfg(unix)]
 
 use std::fs;
@@ -32,7 +33,7 @@ fn write_slurm(place: &TestFolder, variables: &str, scene: &str, options: &str, 
     place.write("slurm.sh", &(head.to_owned() + &settings + rest));
 }
 
-/// Runs a shell script with arguments and variables, in another folder than that of the scene.
+/// Runs a shell script with arguments and variables, in a folder other than the scene's.
 fn run(words: &[&str], variables: &[(&str, &str)]) -> Ran {
     let mut command = assert_cmd::Command::new("sh");
     command.current_dir("/").args(words).envs(variables.iter().copied());
@@ -77,7 +78,7 @@ fn tasks_of_slurm_render_the_image() {
         OPTIONS,
         "'- {{}} .exr'",
     );
-    // An array of two tasks, and one of one.
+    // An array of two tasks, and an array of one task.
     for (first, index) in [("0", "0"), ("0", "1"), ("2", "0")] {
         let ran = task(&place, "tile", first, index);
         assert_eq!(ran.code, 0, "{}", ran.stderr);

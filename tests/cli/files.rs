@@ -50,7 +50,7 @@ mod unix {
     use super::*;
 
     #[test]
-    fn permissions_are_those_of_any_new_file() {
+    fn permissions_are_those_of_a_new_file() {
         let place = TestFolder::new();
         place.quietly(&["render", "small.toml", "--stats", "stats.json"]);
         let mode = |name: &str| fs::metadata(place.path(name)).unwrap().permissions().mode();

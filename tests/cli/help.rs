@@ -6,7 +6,7 @@ use super::{Ran, TestFolder};
 fn listed(help: &str) -> Vec<String> {
     let list = help.split("Commands:\n").nth(1).unwrap_or_default();
     let lines = list.lines().take_while(|line| !line.is_empty());
-    let names = lines.filter(|line| !line.starts_with("   ")); // further lines of a description are indented
+    let names = lines.filter(|line| !line.starts_with("   ")); // continuation lines of a description are indented
     let names = names.filter_map(|line| line.split_whitespace().next());
     names.filter(|name| *name != "help").map(str::to_owned).collect()
 }
@@ -43,7 +43,7 @@ fn help_is_short() {
     assert!(commands >= 12, "{commands}");
 }
 
-/// `-h` leaves rarely used options to `--help`; that and `wgray help` list all of them.
+/// `-h` omits rarely used options; `--help` and `wgray help` list all options.
 #[test]
 fn the_long_help_lists_all_options() {
     let place = TestFolder::new();
@@ -188,7 +188,7 @@ fn common_mistakes_have_hints() {
             ran.stderr
         );
     }
-    // The hint is in JSON too.
+    // JSON messages contain the hint, too.
     let ran = place.run(&["box.glb", "--log-format", "json"]);
     assert!(ran.stderr.contains("wgray render box.glb"), "{}", ran.stderr);
     for option in ["--spp", "--samples", "--pixel-samples"] {

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::{NO_DRIVER, SCENE, TestFolder, project_scene};
 
-/// The JSON of a scene.
+/// Returns the JSON output for a scene.
 fn info(place: &TestFolder, arguments: &[&str]) -> Value {
     let all = [&["info", "--json"], arguments].concat();
     let ran = place.run(&all);
@@ -13,7 +13,7 @@ fn info(place: &TestFolder, arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn things_are_counted() {
+fn info_counts_shapes_memory_and_samples() {
     let place = TestFolder::new();
     let small = info(&place, &["small.toml", "--device", "cpu"]);
     assert_eq!(
@@ -42,7 +42,7 @@ fn things_are_counted() {
         (&small["kernel"]["compiled"], &small["memory"]["scene_on_device"]),
         (&false.into(), &Value::Null)
     );
-    // 10 x 6 pixels of four floats.
+    // 10 x 6 pixels of four 32-bit floats.
     assert_eq!(
         (&small["memory"]["film"], &small["memory"]["bands"]),
         (&960.into(), &1.into())
@@ -115,11 +115,11 @@ fn things_are_counted() {
 }
 
 #[test]
-fn the_device_is_that_of_a_render() {
+fn info_selects_the_same_device_as_a_render() {
     let place = TestFolder::new();
     let cornell = project_scene("cornell.toml");
     for scene in ["small.toml", &cornell, &project_scene("twisted-tube.toml")] {
-        let foreseen = info(&place, &[scene]);
+        let planned = info(&place, &[scene]);
         let ran = place.run(&[
             "render",
             scene,
@@ -144,7 +144,7 @@ fn the_device_is_that_of_a_render() {
     let on_gpu = info(&place, &["small.toml", "--device", "gpu"]);
     assert!(on_gpu["memory"]["scene_on_device"].as_u64() > Some(500), "{on_gpu}");
     assert_eq!(on_gpu["kernel"]["entry"], "render");
-    // Without any driver too.
+    // The same without any Vulkan driver.
     let ran = place.run_with(&["info", "small.toml"], &NO_DRIVER);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(ran.stdout.contains("    device      cpu: no Vulkan"), "{}", ran.stdout);
@@ -155,7 +155,7 @@ fn the_device_is_that_of_a_render() {
 }
 
 #[test]
-fn empty_and_large_scenes_are_described_and_invalid_ones_refused() {
+fn info_describes_empty_and_large_scenes_and_rejects_invalid_ones() {
     let place = TestFolder::new();
     let head = SCENE.split("[materials.gray]").next().unwrap();
     place.write("empty.toml", head);

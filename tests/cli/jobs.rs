@@ -48,7 +48,7 @@ fn wait_for(place: &TestFolder, file: &str, bytes: u64) {
     }
 }
 
-/// Waits for 0.15 s of CPU time of the process: its signal handlers are installed then, even on a busy machine.
+/// Waits for 0.15 s of CPU time of the process, after which its signal handlers are installed even on a busy machine.
 fn work_of(child: &Child) {
     let ticks = || {
         let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
@@ -131,12 +131,12 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
         ("-TERM", 143, &[], kept("SIGTERM")),
         ("-HUP", 129, &[], kept("SIGHUP")),
         ("-TERM", 75, requeue, retry),
-        ("-INT", 130, requeue, kept("Ctrl+C (SIGINT)")), // the user interrupted it
+        ("-INT", 130, requeue, kept("Ctrl+C (SIGINT)")), // the user interrupts a render: no requeue
     ] {
         if !more.is_empty() && place.path("c").exists() {
-            fs::remove_file(place.path("c")).expect("a checkpoint"); // so that work is left
+            fs::remove_file(place.path("c")).expect("a checkpoint"); // so that there is work left
         }
-        // The checkpoint is written at the signal only.
+        // With an interval of 1 h, only the signal causes a checkpoint to be written.
         let child = start(
             &place,
             &[
@@ -216,7 +216,7 @@ fn a_second_writer_waits_and_resumes() {
     );
 }
 
-/// SIGTERM before the render has started also exits with the code for another attempt.
+/// Checks that SIGTERM before the start of the render also exits with the code that requests another attempt.
 #[cfg(target_os = "linux")]
 fn a_farm_ends_one_that_waits(place: &TestFolder, options: &[&str]) {
     let waiting = start(place, &[options, &["-o", "third.exr", "--requeue-exit", "75"]].concat());
@@ -237,7 +237,7 @@ fn a_farm_ends_one_that_waits(place: &TestFolder, options: &[&str]) {
 
 /// Checks the messages for a checkpoint that exists, belongs to other options, or is not a checkpoint.
 #[test]
-fn checkpoints_of_other_jobs_are_refused() {
+fn checkpoints_of_other_jobs_are_rejected() {
     let place = TestFolder::new();
     let base = ["render", "small.toml", "-o", "out.png", "--device", "cpu"];
     let run = |more: &[&str]| place.run(&[&base[..], more].concat());
@@ -464,7 +464,7 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
 fn a_full_disk_keeps_the_checkpoint() {
     let place = TestFolder::new();
     let expected = expected(&place);
-    // At most 250 KiB for each file; the checkpoint needs 400.
+    // A file size limit of 250 KiB; the checkpoint needs 400 KiB.
     let line = "trap '' XFSZ; ulimit -f 500; exec \"$0\" render small.toml --size 160x160 --spp 300 --aov normal \
                 --reproducible --checkpoint c --checkpoint-interval 0.02 -o out.exr --exr-compression none --device cpu";
     let ran = place.shell("sh", line);
@@ -482,8 +482,8 @@ fn a_full_disk_keeps_the_checkpoint() {
     assert!(place.read("out.exr") == expected);
 }
 
-/// A full and a read-only file system, in a separate mount namespace. Where that is not permitted, the file size limit
-/// above and a read-only folder stand in for them.
+/// Renders to a full and to a read-only file system, in a separate mount namespace. Where mount namespaces are not
+/// permitted, the test above with its file size limit and a read-only folder replace it.
 #[cfg(target_os = "linux")]
 #[test]
 fn full_and_read_only_file_systems() {
@@ -589,7 +589,7 @@ fn parts_merge_to_the_same_image() {
     );
     render(&["--tile", "2/3", "-o", "other.part"]);
     refused(&[&shuffled[..], &["other.part"]].concat(), "other.part: overlaps");
-    // Parts of different divisions that fit together.
+    // Parts of different divisions that together cover the image.
     render(&["--tile", "1/1", "-o", "all.part"]);
     assert_eq!(merge(&["all.part"]).code, 0);
     for end in ["png", "exr", "normal.png", "depth.png", "instance.png"] {

@@ -227,9 +227,9 @@ fn a_signal_is_an_error_with_its_exit_code() {
     let mut stderr_lines = BufReader::new(child.stderr.take().expect("a pipe"))
         .lines()
         .map_while(Result::ok);
-    // From here on the signals are handled.
+    // The signal handlers are installed from here on.
     assert!(stderr_lines.any(|line| line.contains("\"ready\"")));
-    // SAFETY: the process is a child that was not waited for.
+    // SAFETY: the process is a child that has not been waited for, so that its id is still valid.
     unsafe { libc::kill(child.id() as i32, libc::SIGTERM) };
     let stderr: Vec<String> = stderr_lines.collect();
     let code = child.wait().expect("its end").code().unwrap_or(-1);

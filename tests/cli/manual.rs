@@ -1,8 +1,8 @@
-//! The manual pages, and completions of the command line.
+//! Manual pages and shell completions.
 
 use super::{Ran, TestFolder};
 
-/// The names of all commands, out of the help.
+/// Returns the names of all commands, from the help.
 fn commands(place: &TestFolder) -> Vec<String> {
     let help = place.run(&["--help"]).stdout;
     let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
@@ -47,7 +47,7 @@ fn every_command_has_a_page() {
         let command = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
         let arguments: Vec<&str> = std::iter::once("man").chain(command).collect();
         assert_eq!(place.run(&arguments).stdout, page, "{name} is printed");
-        // The page lists every option of the help, in bold and with escaped dashes.
+        // The page contains every option of the help, in bold and with escaped hyphens.
         let arguments: Vec<&str> = command.into_iter().chain(["--help"]).collect();
         let help = place.run(&arguments).stdout;
         let is_option = |line: &&str| line.starts_with("  -") || line.starts_with("      -");
@@ -98,7 +98,7 @@ fn unknown_pages_are_rejected() {
     assert!(place.files().is_empty());
 }
 
-/// Formats a page with groff, if it is installed, which must not warn.
+/// Formats a page with groff, if it is installed, and checks that groff prints no warnings.
 fn has_no_warnings(page: &std::path::Path) {
     let groff = std::process::Command::new("groff")
         .args(["-man", "-Tutf8", "-ww", "-z"])
@@ -114,7 +114,7 @@ fn has_no_warnings(page: &std::path::Path) {
     }
 }
 
-/// The table in the documentation has the exit codes of the help, which the pages repeat.
+/// Checks that the documentation and the help, which the manual pages repeat, have the same exit codes.
 #[test]
 fn exit_codes_are_documented() {
     let page = std::fs::read_to_string(super::project("docs/command-line.md")).unwrap();
@@ -150,7 +150,7 @@ fn every_shell_has_completions_that_know_every_command() {
     assert!(ran.stderr.contains("possible values: bash"), "{}", ran.stderr);
 }
 
-/// Returns what bash offers for the last of these words.
+/// Returns the completions that bash offers for the last of these words.
 #[cfg(unix)]
 fn offered(place: &TestFolder, words: &[&str]) -> Vec<String> {
     let line = words.join("' '");

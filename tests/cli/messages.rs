@@ -10,7 +10,7 @@ mod unix {
         place.shell("sh", line)
     }
 
-    /// Redirections to a stream that cannot be written to: full, closed, or without a reader.
+    /// Redirections of standard error to a stream that cannot be written to: full, closed, or without a reader.
     const UNWRITABLE: [&str; 3] = ["2>/dev/full", "2>&-", "2>&1 >&3 3>&- | true"];
 
     #[test]
@@ -329,7 +329,7 @@ fn arguments_in_messages_are_escaped_and_short() {
         assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{arguments:?}");
         assert!(ran.stderr.starts_with(expected), "{arguments:?}: {}", ran.stderr);
     }
-    // Plain words get a suggestion.
+    // Ordinary words get a suggestion.
     let ran = place.run(&["rendr"]);
     assert!(ran.stderr.contains("'render'"), "{}", ran.stderr);
     let long = "a.".repeat(30_000);

@@ -45,7 +45,7 @@ pub fn heed_interrupts() {
 struct Ran {
     code: i32,
     stdout: String,
-    /// Standard error without the lines in `summary`.
+    /// Standard error without the lines of `summary`.
     stderr: String,
     /// Lines about written images, `box.png: 1024 x 1024, 64 spp, 12.3 s`, and progress lines of slow machines.
     summary: Vec<String>,

@@ -5,7 +5,7 @@ use wgray::image::read_exr;
 use super::{NO_DRIVER, SCENE, TestFolder, read_png};
 
 #[test]
-fn options_stand_in_for_the_scenes_values() {
+fn options_override_the_values_of_the_scene() {
     let place = TestFolder::new();
     let cases: [(&[&str], &str, &str); 5] = [
         (&["--size", "13x4"], "width = 10, height = 6", "width = 13, height = 4"),
@@ -29,7 +29,7 @@ fn options_stand_in_for_the_scenes_values() {
 }
 
 #[test]
-fn bounces_are_as_many_as_the_option_says() {
+fn the_option_sets_the_maximum_depth() {
     let place = TestFolder::new();
     // With a depth of 1, light enters the glass but does not leave it.
     let ball = SCENE.replacen("material = \"gray\"", "material = \"glass\"", 1);
@@ -46,27 +46,27 @@ fn bounces_are_as_many_as_the_option_says() {
     assert_ne!(place.read("option.exr"), place.read("plain.exr"));
 }
 
-/// The warning about ignored keys is the same for the option and the key.
+/// Checks that the warning about ignored keys is the same for the option and the key.
 #[test]
-fn an_integrator_stands_in_for_the_scenes() {
+fn the_integrator_option_overrides_the_scene() {
     let place = TestFolder::new();
     let path = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nmax_depth = 0");
     place.write("path.toml", &path);
     let option = ["--integrator", "path", "--max-depth", "0", "--device", "cpu"];
     let ran = place.run(&[&["render", "small.toml", "-o", "option.exr"], &option[..]].concat());
     assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
-    let told: Vec<&str> = ran.stderr.lines().collect();
-    assert_eq!(told.len(), 3, "{}", ran.stderr);
-    assert!(told[2].contains("render.max_depth is 0"), "{}", told[2]);
+    let lines: Vec<&str> = ran.stderr.lines().collect();
+    assert_eq!(lines.len(), 3, "{}", ran.stderr);
+    assert!(lines[2].contains("render.max_depth is 0"), "{}", lines[2]);
     assert!(
-        told[0].starts_with("warning: small.toml: render.ambient: no effect"),
+        lines[0].starts_with("warning: small.toml: render.ambient: no effect"),
         "{}",
-        told[0]
+        lines[0]
     );
     assert!(
-        told[1].starts_with("warning: small.toml: render.light_samples: no effect"),
+        lines[1].starts_with("warning: small.toml: render.light_samples: no effect"),
         "{}",
-        told[1]
+        lines[1]
     );
     place.quietly(&["render", "path.toml", "-q", "-o", "file.exr", "--device", "cpu"]);
     assert_eq!(place.read("option.exr"), place.read("file.exr"));
@@ -105,7 +105,7 @@ fn a_crop_has_the_pixels_of_the_whole() {
 }
 
 #[test]
-fn devices_are_chosen_by_kind_and_by_part_of_a_name() {
+fn devices_are_selected_by_kind_and_by_part_of_a_name() {
     let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "--reproducible", "-o", "auto.exr"]);
     let listed = place.run(&["devices"]).stdout;
@@ -127,9 +127,9 @@ fn devices_are_chosen_by_kind_and_by_part_of_a_name() {
     }
 }
 
-/// Software Vulkan divides and takes square roots with correct rounding, so that the option has no effect.
+/// Software Vulkan rounds quotients and square roots correctly, so that the option has no effect.
 #[test]
-fn rounding_in_software_gives_the_same_picture() {
+fn rounding_in_software_gives_the_same_image() {
     let place = TestFolder::new();
     for device in ["auto", "cpu"] {
         let arguments = ["render", "small.toml", "--device", device, "-o"];
@@ -140,7 +140,7 @@ fn rounding_in_software_gives_the_same_picture() {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_picture() {
+fn any_number_of_threads_gives_the_same_image() {
     let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "--reproducible", "-o", "all.exr"]);
     for (device, threads) in [("auto", "1"), ("cpu", "1"), ("cpu", "3")] {
@@ -164,7 +164,7 @@ fn any_number_of_threads_gives_the_same_picture() {
 }
 
 #[test]
-fn progress_is_told_as_asked() {
+fn progress_is_printed_as_requested() {
     let place = TestFolder::new();
     let plain = place.run(&["render", "small.toml", "--progress", "plain"]);
     assert_eq!((plain.code, plain.stdout.as_str()), (0, ""));
@@ -178,7 +178,7 @@ fn progress_is_told_as_asked() {
 }
 
 #[test]
-fn without_a_driver_auto_renders_on_the_cpu_and_says_so_in_a_line() {
+fn without_a_driver_auto_renders_on_the_cpu_with_a_one_line_warning() {
     let place = TestFolder::new();
     place.quietly(&["render", "small.toml", "--reproducible", "-o", "gpu.exr"]);
     let ran = place.run_with(&["render", "small.toml", "--reproducible", "-o", "cpu.exr"], &NO_DRIVER);

@@ -1,10 +1,10 @@
-//! Allocations that fail on the host.
+//! Failing memory allocations of the program.
 
 use std::fmt::Write as _;
 
 use super::TestFolder;
 
-/// A scene with a mesh that needs some hundred megabytes.
+/// Writes a scene with a mesh that needs several hundred megabytes.
 fn large(place: &TestFolder) {
     const SIDE: usize = 300;
     let mut mesh = String::new();
@@ -29,7 +29,8 @@ fn large(place: &TestFolder) {
     );
 }
 
-/// Whatever allocation fails first, the program ends with one line and code 7, and leaves no file.
+/// Checks that the program, whichever allocation fails first, prints one line, exits with code 7 and leaves no file
+/// behind.
 #[test]
 fn the_program_ends_with_code_7() {
     let place = TestFolder::new();
@@ -42,7 +43,7 @@ fn the_program_ends_with_code_7() {
         let ran = place.shell("sh", &line);
         let is_not_loaded = failed == 0 && [127, 139, -1].contains(&ran.code);
         if is_not_loaded {
-            continue; // there is no room for the program itself
+            continue; // the limit does not even permit the program to be loaded
         }
         match ran.code {
             0 => {
@@ -58,7 +59,7 @@ fn the_program_ends_with_code_7() {
                 assert!(ran.stderr.starts_with("error: "), "{limit}: {}", ran.stderr);
                 assert!(ran.stderr.contains("out of memory"), "{limit}: {}", ran.stderr);
                 assert_eq!(ran.stderr.lines().count(), 1, "{limit}: {}", ran.stderr);
-                let _ = std::fs::remove_file(place.path("c")); // a checkpoint stays, for --resume
+                let _ = std::fs::remove_file(place.path("c")); // the checkpoint remains for --resume
             }
         }
         assert_eq!(place.files(), before, "{limit}");
@@ -66,7 +67,7 @@ fn the_program_ends_with_code_7() {
     assert!(failed > 2 && succeeded > 3, "{failed} failed, {succeeded} succeeded");
 }
 
-/// Other commands, too, end without a panic if no thread can be started.
+/// Checks that other commands do not panic either if a thread cannot be started.
 #[test]
 fn other_commands_end_with_code_7() {
     let place = TestFolder::new();
@@ -82,7 +83,7 @@ fn other_commands_end_with_code_7() {
     assert!(failed > 2, "{failed}");
 }
 
-/// An image that is too large for the memory is an error with its size, as before.
+/// Checks that an image too large for the memory is an ordinary error with its size, not a failed allocation.
 #[test]
 fn handled_allocations_are_errors() {
     let place = TestFolder::new();

@@ -395,7 +395,7 @@ fn aovs_are_files_beside_a_png() {
 }
 
 #[test]
-fn stats_have_the_promised_fields() {
+fn stats_have_the_documented_fields() {
     let place = TestFolder::new();
     let arguments = ["--stats", "stats.json", "--crop", "0,0,5,4", "--light-samples", "9"];
     place.quietly(&[&["render", "small.toml", "-o", "out.png"], &arguments[..]].concat());

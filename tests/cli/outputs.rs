@@ -1,4 +1,5 @@
-//! Output destinations: inputs are protected, no file is written twice, and pipes and devices are written through.
+//! Output destinations: input files are protected, no file is written twice, and pipes and devices are written to
+//! directly.
 
 use std::fs;
 
@@ -39,7 +40,7 @@ fn with_materials(place: &TestFolder) {
 }
 
 #[test]
-fn nothing_that_a_mesh_names_is_replaced() {
+fn files_that_a_mesh_refers_to_are_not_replaced() {
     let place = TestFolder::new();
     with_materials(&place);
     let keeps = "is an input of the scene; choose another name";
@@ -52,11 +53,11 @@ fn nothing_that_a_mesh_names_is_replaced() {
         );
     }
     for name in ["box.mtl", "box.obj"] {
-        let told = format!("--output: {name} {keeps}");
-        refused(&place, &["box.toml", "-o", name, "--format", "png"], 2, &told);
+        let message = format!("--output: {name} {keeps}");
+        refused(&place, &["box.toml", "-o", name, "--format", "png"], 2, &message);
     }
-    let told = format!("--stats: box.mtl {}", keeps.replace(" with --output", ""));
-    refused(&place, &["box.toml", "--stats", "box.mtl"], 2, &told);
+    let message = format!("--stats: box.mtl {}", keeps.replace(" with --output", ""));
+    refused(&place, &["box.toml", "--stats", "box.mtl"], 2, &message);
     place.quietly(&["render", "box.toml", "-o", "other.png", "--device", "cpu"]);
     let ran = place.run(&["dev", "box.toml", "--no-page", "--out", "wood.png"]);
     assert_eq!(ran.code, 2, "{}", ran.stderr);
@@ -68,7 +69,7 @@ fn nothing_that_a_mesh_names_is_replaced() {
 }
 
 #[test]
-fn a_mesh_has_the_colours_of_its_file() {
+fn a_mesh_has_the_materials_of_its_file() {
     let place = TestFolder::new();
     with_materials(&place);
     let picture = |scene: &str| {
@@ -81,10 +82,10 @@ fn a_mesh_has_the_colours_of_its_file() {
     let texture = "[textures.wood]\ntype = 'image'\nfile = 'wood.png'\n[materials.wood]\ntype = 'phong'\n\
                    color = { texture = 'wood' }\nspecular = [0, 0, 0]\n";
     let scene = String::from_utf8(place.read("box.toml")).unwrap();
-    let told = format!("{scene}materials = {{ a = 'red', b = 'wood' }}\n{material}{texture}");
-    place.write("told.toml", &told);
+    let text = format!("{scene}materials = {{ a = 'red', b = 'wood' }}\n{material}{texture}");
+    place.write("told.toml", &text);
     assert!(picture("told.toml") == with_own);
-    place.write("other.toml", &told.replace("[1, 0, 0]", "[0, 1, 0]"));
+    place.write("other.toml", &text.replace("[1, 0, 0]", "[0, 1, 0]"));
     assert!(picture("other.toml") != with_own);
 }
 
@@ -160,8 +161,8 @@ fn no_input_is_replaced_through_links() {
     std::os::unix::fs::symlink("small.toml", path("scene.json")).unwrap();
     fs::hard_link(path("tiles.png"), path("hard.png")).unwrap();
     for output in ["soft.png", "hard.png", "folder/tiles.png"] {
-        let told = format!("--output: {output} is the same file as ./tiles.png, an input of the scene");
-        refused(&place, &["tiles.toml", "-o", output], 2, &told);
+        let message = format!("--output: {output} is the same file as ./tiles.png, an input of the scene");
+        refused(&place, &["tiles.toml", "-o", output], 2, &message);
     }
     refused(
         &place,
@@ -174,7 +175,7 @@ fn no_input_is_replaced_through_links() {
 #[test]
 fn no_output_is_written_twice() {
     let place = TestFolder::new();
-    for (arguments, told) in [
+    for (arguments, message) in [
         (
             &["-o", "q", "--format", "png", "--stats", "./q"][..],
             "--stats: ./q is also written by --output",
@@ -197,16 +198,16 @@ fn no_output_is_written_twice() {
             "--output: other.toml: must not end in .toml",
         ),
     ] {
-        refused(&place, &[&["small.toml"], arguments].concat(), 2, told);
+        refused(&place, &[&["small.toml"], arguments].concat(), 2, message);
     }
 }
 
 #[test]
-fn the_picture_of_the_development_mode_is_no_input() {
+fn the_output_of_the_development_mode_replaces_no_input() {
     let place = TestFolder::new();
     textured(&place);
     std::fs::create_dir(place.path("folder.png")).unwrap();
-    for (out, code, told) in [
+    for (out, code, message) in [
         (
             "tiles.png",
             2,
@@ -223,12 +224,12 @@ fn the_picture_of_the_development_mode_is_no_input() {
     ] {
         let ran = place.run(&["dev", "tiles.toml", "--no-page", "--out", out]);
         assert_eq!(ran.code, code, "{}", ran.stderr);
-        assert!(ran.stderr.contains(told), "{}", ran.stderr);
+        assert!(ran.stderr.contains(message), "{}", ran.stderr);
     }
 }
 
 #[test]
-fn the_format_is_told_by_the_name_or_the_option() {
+fn the_name_or_the_option_selects_the_format() {
     let place = TestFolder::new();
     refused(
         &place,
@@ -280,7 +281,7 @@ mod unix {
 
     /// Standard output receives the same bytes as a file.
     #[test]
-    fn standard_output_takes_a_picture_or_figures() {
+    fn standard_output_receives_an_image_or_statistics() {
         let place = TestFolder::new();
         place.quietly(&["render", "small.toml", "-o", "file.png", "--device", "cpu"]);
         place.quietly(&[
@@ -319,14 +320,14 @@ mod unix {
             assert_eq!(place.read("got"), place.read(file), "{line}");
         }
         assert!(fs::metadata(place.path("p.exr")).unwrap().file_type().is_fifo());
-        for way in ["-", "/dev/stdout", "/dev/fd/1"] {
+        for path in ["-", "/dev/stdout", "/dev/fd/1"] {
             place.write("got", "first\n");
             quiet(
                 &place,
-                &format!("$0 render small.toml --device cpu -o q.png --stats {way} >> got"),
+                &format!("$0 render small.toml --device cpu -o q.png --stats {path} >> got"),
             );
             let got = String::from_utf8(place.read("got")).unwrap();
-            let figures = got.strip_prefix("first\n").unwrap_or_else(|| panic!("{way}: {got}"));
+            let figures = got.strip_prefix("first\n").unwrap_or_else(|| panic!("{path}: {got}"));
             serde_json::from_str::<serde_json::Value>(figures).unwrap();
         }
         refused(
@@ -354,7 +355,7 @@ mod unix {
     }
 
     #[test]
-    fn a_limit_of_file_sizes_is_told_like_a_full_disk() {
+    fn a_file_size_limit_is_reported_like_a_full_disk() {
         let place = TestFolder::new();
         let ran = bash(
             &place,
@@ -377,7 +378,7 @@ mod unix {
             "$0 render small.toml --device cpu -o /dev/null --stats /dev/null",
         );
         assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
-        for (line, told) in [
+        for (line, message) in [
             (
                 "$0 render small.toml --device cpu -o /dev/full",
                 "error: /dev/full: cannot be written: No space left",
@@ -398,12 +399,12 @@ mod unix {
         ] {
             let ran = bash(&place, line);
             assert_eq!(ran.code, 8, "{line}: {}", ran.stderr);
-            assert!(ran.stderr.starts_with(told), "{line}: {}", ran.stderr);
+            assert!(ran.stderr.starts_with(message), "{line}: {}", ran.stderr);
         }
     }
 
     #[test]
-    fn a_folder_for_temporary_files_that_is_not_there_is_told() {
+    fn a_missing_folder_for_temporary_files_is_reported() {
         let place = TestFolder::new();
         let ran = place.run_with(
             &["render", "small.toml", "-o", "-", "--device", "cpu"],
@@ -448,9 +449,9 @@ mod unix {
         );
     }
 
-    /// Judged by the mode bits, as root can write to any file.
+    /// Checks the mode bits instead of trying to write, as root can write to any file.
     #[test]
-    fn a_read_only_file_is_refused_and_others_keep_their_mode() {
+    fn a_read_only_file_is_not_replaced_and_other_files_keep_their_mode() {
         let place = TestFolder::new();
         for (name, mode) in [("fixed.png", 0o444), ("open.png", 0o640)] {
             place.write(name, "old");

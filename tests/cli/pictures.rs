@@ -121,7 +121,8 @@ fn a_failed_output_leaves_no_incomplete_files() {
     ]);
     assert_ne!(ran.code, 0);
     assert!(ran.stderr.contains("/dev/full: cannot be written"), "{}", ran.stderr);
-    // Outputs are renamed one after the other: those before the failure may exist complete, those after it must not.
+    // Outputs are renamed one after the other: outputs before the failure may exist and are complete, later ones must
+    // not exist.
     assert!(!place.files().contains(&"b.png".to_owned()), "{:?}", place.files());
     assert!(
         place.files().iter().all(|name| !name.starts_with('.')),
@@ -608,7 +609,7 @@ fn options_without_an_applicable_output_are_rejected() {
     assert!(samples(&place.path("b")).contains_key("R"));
 }
 
-/// Rejected before rendering, as an image of that size would take long.
+/// Such an image is rejected before the render, which would take long.
 #[test]
 fn images_too_large_for_a_format_are_rejected() {
     let place = TestFolder::new();

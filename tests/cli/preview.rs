@@ -1,4 +1,4 @@
-//! `--preview`: the image as it grows, and renders that a signal ends.
+//! `--preview`: intermediate images during a render, and renders that are ended by a signal.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use wgray::image::read_metadata;
 
 use super::{Ran, TestFolder, heed_interrupts, program, project_scene};
 
-/// A render of minutes, whose passes take some hundredths of a second.
+/// A render that takes minutes, with passes of some hundredths of a second.
 const LONG: [&str; 8] = [
     "render",
     "small.toml",
@@ -25,7 +25,7 @@ fn start(place: &TestFolder, arguments: &[&str]) -> Child {
     start_in_shell(place, "", arguments)
 }
 
-/// Starts the long render after a line of a shell.
+/// Starts the long render with a preceding line of shell code.
 fn start_in_shell(place: &TestFolder, line: &str, arguments: &[&str]) -> Child {
     heed_interrupts();
     Command::new("sh")
@@ -63,7 +63,7 @@ fn ended(child: Child) -> Ran {
     Ran::new(output.status.code(), String::new(), &stderr, &[])
 }
 
-/// The samples and the requested samples of a file that is marked as partial.
+/// Returns the number of samples and of requested samples of a file that is marked as partial.
 fn partial(path: &Path) -> Option<(u32, u32)> {
     let metadata = read_metadata(path).expect("metadata");
     let text = metadata.get("partial")?.strip_suffix(" samples").expect("samples");
@@ -71,7 +71,7 @@ fn partial(path: &Path) -> Option<(u32, u32)> {
     Some((samples.parse().expect("a number"), of.parse().expect("a number")))
 }
 
-/// The contents of all files, and removes them.
+/// Returns the contents of all files and removes the files.
 fn take_files(place: &TestFolder) -> Vec<(String, Vec<u8>)> {
     let files = place.files().into_iter();
     let files: Vec<_> = files.map(|name| (name.clone(), place.read(&name))).collect();
@@ -130,7 +130,7 @@ fn the_complete_files_are_the_same_with_and_without_previews() {
     }
 }
 
-/// Compares an image with a render of so many samples, with these further options.
+/// Returns true if an image has the same pixels as a render with `samples` samples and the further options `more`.
 fn has_pixels_of(place: &TestFolder, file: &str, samples: u32, more: &[&str]) -> bool {
     let spp = samples.to_string();
     let size = ["render", "small.toml", "--size", "150x100", "--device", "cpu"];
@@ -141,7 +141,7 @@ fn has_pixels_of(place: &TestFolder, file: &str, samples: u32, more: &[&str]) ->
 }
 
 #[test]
-fn a_signal_leaves_the_last_whole_pass() {
+fn a_signal_leaves_the_last_complete_pass() {
     for (signal, name, code, device) in [
         ("-INT", "Ctrl+C (SIGINT)", 130, "cpu"),
         ("-TERM", "SIGTERM", 143, "gpu"),
@@ -184,7 +184,7 @@ fn a_signal_leaves_the_last_whole_pass() {
         expected.sort_unstable();
         assert_eq!(place.files(), expected);
         assert!(samples > first, "{samples}");
-        // Their pixels are those of renders of as many samples, and not of more.
+        // The pixels are those of a render with exactly as many samples.
         assert!(has_pixels_of(&place, "first.exr", first, &more[..2]));
         assert!(has_pixels_of(&place, "out.exr", samples, &more[..2]));
         assert!(!has_pixels_of(&place, "out.exr", samples + 1, &more[..2]));
@@ -197,7 +197,7 @@ fn a_second_signal_ends_at_once() {
     let child = start(&place, &["-o", "out.exr", "--device", "cpu"]);
     wait_for(&place, "out.exr");
     std::thread::sleep(Duration::from_millis(500));
-    // All signals arrive before the program can do anything between them.
+    // SIGSTOP makes all signals pending before the program continues.
     send("-STOP", &child);
     std::thread::sleep(Duration::from_millis(100));
     let before = place.read("out.exr");
@@ -252,7 +252,7 @@ fn files_with_more_samples_stay() {
         (130, [&notes.concat(), &*interrupted, error].concat())
     );
     assert_eq!(files.map(|file| place.read(file)), before);
-    // Nothing is written where all files have more samples.
+    // Nothing is written if all files have more samples.
     let child = start(
         &place,
         &[&outputs[..8], &["--stats", "stats.json", "--device", "cpu"]].concat(),
@@ -271,7 +271,7 @@ fn files_with_more_samples_stay() {
     );
     assert!(ran.summary.is_empty() && !place.path("stats.json").exists());
     assert_eq!(files.map(|file| place.read(file)), before);
-    // A complete image replaces all of them, and a preview a file with as many samples.
+    // A complete image replaces all files; a preview replaces a file with as many samples.
     let ran = render(&[&outputs[..], &["--preview", "--spp", "2"]].concat());
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(files.iter().all(|file| partial(&place.path(file)).is_none()));
@@ -323,7 +323,7 @@ fn partial_files_do_not_count_as_existing() {
 }
 
 #[test]
-fn a_checkpoint_takes_the_samples_at_a_signal() {
+fn a_signal_writes_the_samples_to_the_checkpoint() {
     let place = TestFolder::new();
     let options = ["--spp", "2000", "--device", "cpu"];
     let render = |more: &[&str]| {
@@ -384,7 +384,7 @@ fn previews_need_passes_and_a_file() {
         assert!(ran.stderr.contains(rule), "{}", ran.stderr);
         assert!(place.files().is_empty(), "{:?}", place.files());
     }
-    // A stream gets the complete image only.
+    // A stream only receives the complete image.
     let line = "\"$0\" render small.toml --preview --device cpu -q -o - -o a.png > b.png";
     let ran = place.shell("sh", line);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
@@ -405,9 +405,9 @@ fn a_time_limit_ends_previews() {
     );
 }
 
-/// A disk that fills up: here, a limit on the size of files.
+/// A file size limit simulates a full disk.
 #[test]
-fn a_full_disk_loses_previews_and_keeps_the_older_file() {
+fn on_a_full_disk_previews_are_not_written_and_the_older_file_remains() {
     for output in ["out.png", "out.exr"] {
         let place = TestFolder::new();
         let base = ["render", "small.toml", "--spp", "1", "-o", output, "--device", "cpu"];
@@ -422,7 +422,7 @@ fn a_full_disk_loses_previews_and_keeps_the_older_file() {
         assert_eq!(ran.code, 8, "{}", ran.stderr);
         assert!(ran.stderr.starts_with(&warning), "{}", ran.stderr);
         assert!(ran.stderr.contains("error: "), "{}", ran.stderr);
-        // The same at a signal.
+        // The same if a signal ends the render.
         let child = start_in_shell(&place, limit, &["-o", output, "--device", "cpu"]);
         wait_until("a temporary file", || {
             place.files().iter().any(|name| name.starts_with(".wgray-"))

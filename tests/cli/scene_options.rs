@@ -40,11 +40,11 @@ fn the_option_overrides_the_environment() {
         ("1,2,0.5", "color = [1, 2, 0.5]"),
         ("#ffffff", "color = [1, 1, 1]"),
     ] {
-        let says = BALL.replace(
+        let text = BALL.replace(
             "environment.color = [0.5, 0.5, 0.5]",
             &format!("environment = {{ {key} }}"),
         );
-        place.write("other.toml", &says);
+        place.write("other.toml", &text);
         quietly(&place, &["other.toml", "-o", "other.exr"]);
         // The path is relative to the current folder, not to the scene.
         for scene in ["ball.toml", "sub/ball.toml"] {

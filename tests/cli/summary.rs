@@ -1,15 +1,15 @@
-//! The line about a written image, and the files that a default name must not replace.
+//! The summary line of a written image, and the protection of files of other programs from a default output name.
 
 use super::{SCENE, TestFolder, is_summary};
 
-/// Replaces the time of a summary, which differs from run to run.
+/// Removes the time from a summary, as it differs between runs.
 fn without_time(line: &str) -> String {
     let (rest, _) = line.rsplit_once(", ").unwrap_or((line, ""));
     rest.to_owned()
 }
 
 #[test]
-fn a_render_ends_with_a_line_about_its_files() {
+fn a_render_ends_with_a_summary_line() {
     let place = TestFolder::new();
     for (arguments, lines) in [
         (&["-o", "a.png"][..], &["a.png: 10 x 6, 3 spp"][..]),
@@ -44,7 +44,7 @@ fn a_render_ends_with_a_line_about_its_files() {
         stream.summary
     );
     assert!(place.read("piped.png").starts_with(b"\x89PNG"));
-    // In JSON the line "render done" has the same facts.
+    // In JSON, the message "render done" replaces the summary line.
     let json = place.run(&[
         "render",
         "small.toml",
@@ -57,7 +57,7 @@ fn a_render_ends_with_a_line_about_its_files() {
     ]);
     assert_eq!(json.summary, [""; 0]);
     assert!(json.stderr.contains("\"render done\""), "{}", json.stderr);
-    // A failed render has none.
+    // A failed render prints no summary.
     let failed = place.run(&["render", "small.toml", "-o", "missing/a.png"]);
     assert_eq!((failed.code, failed.summary.len()), (8, 0));
 }
@@ -88,7 +88,7 @@ fn a_default_name_replaces_images_of_this_program_only() {
     let ours = place.read("small.png");
     place.quietly(&[&options[..], &["--reproducible", "--bit-depth", "16"]].concat());
     assert_ne!(place.read("small.png"), ours, "its own image is replaced");
-    // An image of another program, as it is without the chunk that names this one.
+    // Writing the image again removes the chunk that names wgray as its author, as in an image of another program.
     let picture = image::load_from_memory(&ours).expect("a PNG");
     picture.save(place.path("small.png")).expect("written");
     let of_others = place.read("small.png");
@@ -99,7 +99,7 @@ fn a_default_name_replaces_images_of_this_program_only() {
         place.write("small.png", content);
         refused(&[], "small.png");
     }
-    // A name that is given is replaced.
+    // An explicit output name replaces the file.
     place.quietly(&[&options[..], &["-o", "small.png"]].concat());
     place.write("small.depth.png", "notes");
     refused(&["--aov", "depth"], "small.depth.png");

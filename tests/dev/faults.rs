@@ -18,7 +18,7 @@ fn with_faults(running: &Running) -> Option<Arc<Frame>> {
 }
 
 #[test]
-fn faults_of_a_shader_are_counted_and_marked() {
+fn invalid_pixels_of_a_shader_are_counted_and_marked() {
     let files = Files::new(SCENE);
     let out = files.path("out.png");
     let running = Running::start(files.sources(), Some(out.clone()));
@@ -41,7 +41,7 @@ fn faults_of_a_shader_are_counted_and_marked() {
     let shown = |frame: &Frame| [(0, 3), (1, 3), (2, 3), (30, 20)].map(|(x, y)| pixel(&frame.pictures[0], x, y));
     let (magenta, cyan, green) = ([255, 0, 255], [0, 255, 255], [0, 255, 0]);
     assert_eq!(shown(&frame), [magenta, cyan, cyan, green]);
-    // The file is what `render` writes: without marks.
+    // The output file equals that of `render`, without marks.
     running.wait("the file", |_| {
         let picture = image::open(&out).ok()?.into_rgb8();
         (picture.get_pixel(1, 3).0 == [0, 255, 0]).then_some(())
@@ -60,7 +60,7 @@ fn faults_of_a_shader_are_counted_and_marked() {
 }
 
 #[test]
-fn negative_light_of_a_filter_with_negative_lobes_is_no_fault() {
+fn negative_values_of_a_filter_with_negative_lobes_are_not_faults() {
     let edges = SCENE
         .replace("[render]", "[render]\nfilter = { type = 'mitchell' }")
         .replace(

@@ -1,4 +1,4 @@
-//! Layers of the film as views: what `wgray render --aov` gives for the same samples, and what a scene does not have.
+//! Film layers as views: equal to `wgray render --aov` with the same samples, and rejected if the scene lacks them.
 
 use std::sync::Arc;
 
@@ -49,7 +49,7 @@ fn close(a: [f32; 3], b: [f32; 3]) -> bool {
 }
 
 #[test]
-fn layers_are_those_that_render_gives_and_light_is_their_sum() {
+fn layers_equal_those_of_render_and_sum_to_the_image() {
     for scene in [path(), adaptive()] {
         let files = Files::new(&scene);
         let running = files.start();
@@ -68,16 +68,16 @@ fn layers_are_those_that_render_gives_and_light_is_their_sum() {
                 "{view:?} is as another: the comparison cannot fail"
             );
             assert!(found.values.colors.iter().any(|value| *value != [0.0; 3]), "{view:?}");
-            let told = frame.pixel(20, 15).unwrap();
+            let values = frame.pixel(20, 15).unwrap();
             let value = found.values.colors[15 * 40 + 20].map(|v| v.to_string()).join("  ");
-            assert_eq!(told[0].1, value, "{view:?}");
+            assert_eq!(values[0].1, value, "{view:?}");
             assert_eq!(
                 frame.header.histogram.is_some(),
                 found.is_light(),
                 "albedo and normals are not radiance"
             );
             seen.push(found.values.colors);
-            // One kernel has them all.
+            // One kernel computes all layers.
             let now = running.state().compile_seconds;
             assert_ne!(now, light, "{view:?} takes a kernel");
             assert_eq!(*compiled.get_or_insert(now), now, "{view:?} takes no further one");
@@ -87,7 +87,7 @@ fn layers_are_those_that_render_gives_and_light_is_their_sum() {
             let sum = [0, 1, 2].map(|c| direct[c] + indirect[c] + emission[c]);
             assert!(close(*color, sum), "pixel {i}: {color:?} {sum:?}");
         }
-        // Color again: its kernel and its image are still available.
+        // When color is selected again, its kernel and its image are still cached.
         running.session.send(Command::View(View::Color));
         running.wait("light", |running| {
             let frame = running.frame()?;
@@ -119,7 +119,7 @@ fn layers_are_those_that_render_gives_and_light_is_their_sum() {
 }
 
 #[test]
-fn the_kernels_of_color_and_of_layers_are_kept() {
+fn the_kernels_of_color_and_layers_are_cached() {
     let files = Files::new(&path());
     let running = files.start();
     running.wait_rendered(&files);
@@ -142,7 +142,7 @@ fn the_kernels_of_color_and_of_layers_are_kept() {
 }
 
 #[test]
-fn what_a_scene_does_not_have_is_refused_and_an_edit_changes_that() {
+fn missing_layers_are_rejected_until_an_edit_adds_them() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -158,7 +158,7 @@ fn what_a_scene_does_not_have_is_refused_and_an_edit_changes_that() {
         notice.text
     );
     assert_eq!(running.state().view, View::Color);
-    // The normal is that of the first hits here.
+    // The shading normal of this scene is that of the first hits.
     running.session.send(Command::View(View::ShadingNormal));
     running.wait("the normals", |running| {
         let frame = running.frame()?;
@@ -170,7 +170,7 @@ fn what_a_scene_does_not_have_is_refused_and_an_edit_changes_that() {
     assert_eq!(running.state().missing_views, [variance]);
     running.session.send(Command::View(View::Direct));
     let (before, _) = wait_layer(&running, View::Direct);
-    // Edits of the scene and of shaders are followed.
+    // The layer follows edits of the scene and of shaders.
     let compiled = running.state().compile_seconds;
     files.edit("scene.toml", "color = [0.8, 0.1, 0.1]", "color = [0.1, 0.8, 0.1]");
     let wanted = || {
@@ -195,7 +195,7 @@ fn what_a_scene_does_not_have_is_refused_and_an_edit_changes_that() {
     assert!(shows(&running, &green).is_some(), "the last image stays");
     files.write_shaders();
     running.wait_well();
-    // Without paths there is no such light.
+    // The direct integrator has no such layer.
     files.write("scene.toml", SCENE);
     running.wait_rendered(&files);
     assert_eq!(running.state().view, View::Color);

@@ -1,4 +1,4 @@
-//! glTF files in the development mode: shown, and shown again whenever they are saved.
+//! glTF files in the development mode: shown, and reloaded whenever they are saved.
 
 use std::fs;
 use std::io::Write as _;
@@ -53,19 +53,19 @@ fn wait_for(running: &Running, strongest: [f64; 3]) {
 }
 
 #[test]
-fn a_model_is_shown_anew_when_it_is_saved() {
+fn saving_a_model_updates_the_image() {
     let folder = TempDir::new().unwrap();
     let write = |color: [f64; 3]| model(color).write_glb(folder.path(), "box.glb");
     write(RED);
     let running = start(folder.path(), "box.glb");
     wait_for(&running, RED);
-    // In place, as exporters write, and by another file that takes the name.
+    // The file is overwritten in place, as exporters do, and then replaced by renaming another file.
     write(GREEN);
     wait_for(&running, GREEN);
     model(BLUE).write_glb(folder.path(), "new~");
     fs::rename(folder.path().join("new~"), folder.path().join("box.glb")).unwrap();
     wait_for(&running, BLUE);
-    // Half of it is reported as an error until the rest follows.
+    // An incomplete file is reported as an error until the rest is written.
     let whole = model(RED).glb();
     fs::write(folder.path().join("box.glb"), &whole[..whole.len() / 2]).unwrap();
     assert!(running.wait_problem().message.contains("box.glb: "));
@@ -73,7 +73,8 @@ fn a_model_is_shown_anew_when_it_is_saved() {
     wait_for(&running, RED);
 }
 
-/// An exporter writes a file in pieces: incomplete pieces cause no error, and the page shows that files are read.
+/// Writes a file in pieces, as an exporter does: incomplete pieces cause no error, and the state reports that files are
+/// being read.
 #[test]
 fn incomplete_files_of_an_exporter_cause_no_error() {
     let folder = TempDir::new().unwrap();
@@ -82,7 +83,7 @@ fn incomplete_files_of_an_exporter_cause_no_error() {
     let running = start(folder.path(), "box.glb");
     wait_for(&running, RED);
     let whole = model(GREEN).glb();
-    // On a busy machine the writer may pause for too long, so that the file does look complete.
+    // On a busy machine the writer may pause for so long that the file seems complete.
     let shows_no_error = (0..20).any(|_| {
         let [start, mut written] = [Instant::now(); 2];
         let (mut was_read, mut has_paused) = (false, false);
@@ -112,14 +113,14 @@ fn incomplete_files_of_an_exporter_cause_no_error() {
 }
 
 #[test]
-fn what_a_model_names_is_watched_too() {
+fn files_that_a_model_refers_to_are_watched() {
     let folder = TempDir::new().unwrap();
     model(RED).write_gltf(folder.path(), "box");
     let running = start(folder.path(), "box.gltf");
     wait_for(&running, RED);
     model(GREEN).write_gltf(folder.path(), "box");
     wait_for(&running, GREEN);
-    // The buffer alone: an error without it, and the image with it.
+    // Only the buffer is removed and restored: an error without it, then the image again.
     let buffer = folder.path().join("box.bin");
     let bytes = fs::read(&buffer).unwrap();
     fs::remove_file(&buffer).unwrap();
@@ -136,7 +137,7 @@ fn what_a_model_names_is_watched_too() {
 }
 
 #[test]
-fn the_camera_moves_and_is_not_saved_into_a_model() {
+fn the_camera_moves_but_is_not_saved_into_a_model() {
     let folder = TempDir::new().unwrap();
     model(RED).write_glb(folder.path(), "box.glb");
     let before = fs::read(folder.path().join("box.glb")).unwrap();
@@ -148,8 +149,8 @@ fn the_camera_moves_and_is_not_saved_into_a_model() {
     assert_ne!(running.colors(), still);
     running.session.send(Command::SaveCamera);
     running.wait("why not", |running| {
-        let told = format!("{:?}", running.state());
-        told.contains("cannot save the camera: glTF files are read-only here")
+        let text = format!("{:?}", running.state());
+        text.contains("cannot save the camera: glTF files are read-only here")
             .then_some(())
     });
     assert_eq!(fs::read(folder.path().join("box.glb")).unwrap(), before);

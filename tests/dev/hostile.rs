@@ -1,4 +1,4 @@
-//! Messages of viewers that mean no good: each is refused in words, and the scene file stays.
+//! Malicious messages of viewers: each is rejected with a message, and the scene file is unchanged.
 
 use serde_json::{Value, json};
 use wgray_dev::{Command, Set};
@@ -11,7 +11,7 @@ fn set(path: &str, value: &Value) -> String {
 }
 
 #[test]
-fn what_is_no_value_is_refused_and_the_file_stays() {
+fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -69,7 +69,7 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
             "must be one of the allowed names",
         ),
         (set("materials.red.type", &json!("glass")), nothing),
-        // paths that lead elsewhere, or nowhere
+        // paths outside of the scene, or to no value
         (set("shapes[0].radius.x", &json!(1)), nothing),
         (set("shapes[18446744073709551616].radius", &json!(1)), "must"),
         (set("shapes[-1].radius", &json!(1)), "must"),
@@ -111,19 +111,19 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
         ("\u{0}".to_owned(), unknown),
         ("[".repeat(4000), unknown),
     ];
-    // Also for an absent key.
+    // The same for an absent key.
     messages.push((set("render.shadow_epsilon", &json!("0.01")), number));
     let mut wrong = Vec::new();
-    for (message, told) in messages {
-        let said = viewer.refused(&message);
-        let is_plain = said.chars().count() < 400 && !said.chars().any(char::is_control);
-        if !said.contains(told) || !is_plain || files.read("scene.toml") != SCENE {
-            wrong.push((message.chars().take(100).collect::<String>(), said));
+    for (message, expected) in messages {
+        let reason = viewer.refused(&message);
+        let is_plain = reason.chars().count() < 400 && !reason.chars().any(char::is_control);
+        if !reason.contains(expected) || !is_plain || files.read("scene.toml") != SCENE {
+            wrong.push((message.chars().take(100).collect::<String>(), reason));
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert_eq!(session.state().undo, None);
-    // The control: what is right is followed, and nothing of the above has been.
+    // Control: a valid message takes effect, and none of the messages above did.
     let mut other = Viewer::new(address);
     other.say(set("shapes[0].radius", &json!(0.25)).as_bytes()).unwrap();
     session.wait("the value that is right", |_| {
@@ -131,18 +131,18 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
     });
     session.wait_rendered(&files);
 
-    // Messages that are not text, or far too long, end only their own connection.
+    // Messages that are not text, or far too long, only close their own connection.
     for message in [&b"\xff\xfe{"[..], set(&"a".repeat(1 << 20), &json!(1)).as_bytes()] {
         let mut other = Viewer::new(address);
-        let _ = other.say(message); // it may be cut off while it speaks
+        let _ = other.say(message); // the server may close the connection during the message
         while other.hear().is_some() {}
     }
-    let said = viewer.refused(&set("shapes[0].radius", &json!([])));
-    assert!(said.contains(number), "{said}");
+    let reason = viewer.refused(&set("shapes[0].radius", &json!([])));
+    assert!(reason.contains(number), "{reason}");
 }
 
 #[test]
-fn a_path_of_a_megabyte_is_refused_in_few_words() {
+fn a_path_of_a_megabyte_is_rejected_with_a_short_message() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);

@@ -1,4 +1,4 @@
-//! Unused kernels are checked too, and kernels that a driver truncates are reported.
+//! Unused kernels are checked, too, and kernels whose loops a driver truncates are reported.
 
 use wgray_dev::{Command, Move, View};
 
@@ -18,7 +18,7 @@ fn problems(running: &Running) -> Vec<String> {
 }
 
 #[test]
-fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
+fn errors_in_unused_kernels_are_reported_at_once() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -43,7 +43,7 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
         );
     }
     assert_eq!(running.colors(), good);
-    // The session continues with the last good shaders, including that kernel.
+    // The session continues with the last valid shaders, including that kernel.
     let revision = running.revision();
     running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
     running.wait_done(revision);
@@ -62,7 +62,7 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
     running.wait_rendered(&files);
 }
 
-/// Adds a million rounds to a shader, which no compiler can leave out; they change nothing.
+/// Adds a loop of a million iterations to a shader. It does not change the result, but no compiler can remove it.
 fn long_loop(files: &Files, file: &str, before: &str) {
     let rounds = "var rounds = 0u;
     for (var i = 0u; i < 1000000u + 0u * params.origin.x; i++) { rounds += (rounds ^ i) & params.loop_probe.y; }
@@ -71,7 +71,7 @@ fn long_loop(files: &Files, file: &str, before: &str) {
 }
 
 #[test]
-fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
+fn a_truncated_loop_is_reported_or_the_image_is_complete() {
     let small = SCENE
         .replace("width = 40", "width = 8")
         .replace("height = 30", "height = 8");
@@ -92,8 +92,8 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
         let message = problems(running)
             .iter()
             .any(|message| message.contains("ends long loops early"));
-        let whole = running.frame().is_some_and(|frame| frame.header.done) && halved(running);
-        (message || whole).then_some(message)
+        let is_complete = running.frame().is_some_and(|frame| frame.header.done) && halved(running);
+        (message || is_complete).then_some(message)
     });
     if cut {
         assert_eq!(running.state().problems[0].kind, "shader");
@@ -110,7 +110,7 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
     );
     running.wait_rendered(&files);
 
-    // In a kernel of another view: only that view reports the error.
+    // The loop is in a kernel of another view: only that view reports the error.
     long_loop(&files, FIRST_HITS, "let pixel = params.origin");
     running.wait_well();
     running.session.send(Command::View(View::Normal));

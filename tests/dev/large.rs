@@ -1,11 +1,11 @@
-//! Images that are too large to display are shown smaller.
+//! Images that are too large to display are rendered at a smaller size.
 
 use wgray_dev::{Command, View};
 
 use super::running::{Files, SCENE};
 
 #[test]
-fn a_picture_that_is_too_large_is_shown_smaller() {
+fn an_image_too_large_to_display_is_rendered_smaller() {
     let cheap = SCENE.replace("count = 4 }", "count = 1 }");
     for (size, longest) in [((3000, 3000), 3000), ((65_536, 1), 16_384), ((1, 65_536), 16_384)] {
         let files = Files::new(&cheap);
@@ -24,7 +24,7 @@ fn a_picture_that_is_too_large_is_shown_smaller() {
         assert!(frame.pixel(size.0 - 1, size.1 - 1).is_some() && frame.pixel(size.0, 0).is_none());
         let colors = running.colors();
         assert_eq!([colors.width, colors.height], header.finest);
-        // The image of that size.
+        // The result equals a render at the smaller size.
         if size == (3000, 3000) {
             let [width, height] = header.finest;
             let smaller = cheap.replace("width = 40", &format!("width = {width}"));

@@ -1,5 +1,5 @@
-//! The development mode without a browser: whatever happens to the files, it shows the image that `render` makes of
-//! their last state, or the last good one with the error.
+//! The development mode without a browser: after any change of the files, it shows the image that `render` makes of
+//! their current state, or the last valid image together with the error.
 
 mod faults;
 mod film_layers;

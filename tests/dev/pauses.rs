@@ -1,4 +1,4 @@
-//! Rendering pauses without viewers.
+//! Rendering pauses while no viewer is connected.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use super::responsive::heavy;
 use super::running::{Files, Running, SCENE, SETTLED};
 
 #[test]
-fn rendering_rests_while_nobody_looks() {
+fn rendering_pauses_without_viewers() {
     let files = Files::new(&heavy());
     let settings = Settings {
         sources: files.sources(),
@@ -61,14 +61,14 @@ fn the_time_to_an_image_contains_the_time_to_compile() {
     let running = Running {
         session: Session::start(settings).unwrap(),
     };
-    // A viewer that comes once all is compiled has not waited for it.
+    // A viewer that connects after the compilation has not waited for it.
     running.wait("a kernel", |running| running.state().compile_seconds);
     std::thread::sleep(SETTLED);
     let _viewer = running.session.viewers().enter();
     running.wait_rendered(&files);
     files.tint(0.5);
     running.wait_rendered(&files);
-    // A preview that the viewer chooses is not reported as an image that is too large.
+    // A preview size that the viewer chooses is not reported as an image that is too large to display.
     running.session.send(Command::Preview(Preview::try_from(2).unwrap()));
     running.wait("a preview", |running| {
         (running.frame()?.header.finest == [20, 15]).then_some(())

@@ -9,20 +9,20 @@ use wgray_dev::{Command, Object, SceneView, Set, Sources};
 use super::running::{Files, Running};
 use crate::model::Model;
 
-/// A view of 40 x 30 pixels from -y, in which x from -2 to 2 is the whole width, nearly.
+/// A view of 40 x 30 pixels from -y. Its width covers nearly x = -2 to 2.
 const START: &str = "\
 image = { width = 40, height = 30 }
 camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
 render.pixel_samples = { count = 1 }
 ";
-/// Left, in the middle, and right.
+/// Pixels at the left, in the middle and at the right.
 const LEFT: [u32; 2] = [10, 15];
 const MIDDLE: [u32; 2] = [20, 15];
 const RIGHT: [u32; 2] = [30, 15];
 
 const TILE: &str = "v -0.4 0 -0.4\nv 0.4 0 -0.4\nv 0.4 0 0.4\nv -0.4 0 0.4\nf 1 2 3 4\n";
 
-/// Materials of a mesh file's own, the left part's and the right one's.
+/// A mesh with materials of its own for the left and the right part.
 const PAIR: &str = "\
 mtllib pair.mtl
 v -1.4 0 -0.4
@@ -42,7 +42,7 @@ f 5 6 7 8
 ";
 const MTL: &str = "newmtl bark\nKd 0.4 0.2 0.1\nnewmtl leaf\nKd 0.1 0.5 0.1\n";
 
-/// The scene, once there is one.
+/// Waits for the scene and returns it.
 fn seen(running: &Running) -> std::sync::Arc<SceneView> {
     running.wait("a scene", |running| running.session.seen.borrow().clone())
 }
@@ -51,13 +51,13 @@ fn groups(object: &Object) -> Vec<&str> {
     object.groups.iter().map(|group| group.name.as_str()).collect()
 }
 
-/// The number of the line that has a text.
+/// Returns the number of the line with this text.
 #[track_caller]
 fn line(text: &str, of: &str) -> usize {
     1 + text.lines().position(|line| line == of).unwrap()
 }
 
-/// Sets a value, and gives what was said against it.
+/// Sets a value and returns the error, if any.
 fn set(running: &Running, path: &str, value: serde_json::Value) -> Option<String> {
     let heard = running.state().heard;
     running.session.send(Command::Set(Set {
@@ -74,7 +74,7 @@ fn set(running: &Running, path: &str, value: serde_json::Value) -> Option<String
 }
 
 #[test]
-fn an_instance_of_a_mesh_is_named_with_its_lines_its_mesh_and_its_material() {
+fn picking_an_instance_returns_its_lines_mesh_and_material() {
     let text = format!(
         "{START}materials.red = {{ type = 'phong', color = [0.8, 0.1, 0.1] }}
 materials.green = {{ type = 'phong', color = [0.1, 0.8, 0.1] }}
@@ -128,7 +128,7 @@ translate = [1, 0, 0]
     let mesh = scene.object("meshes.tile", None);
     let file = mesh.groups[0].fields.iter().find(|field| field.name == "file").unwrap();
     assert!(file.fixed.is_some(), "no viewer says which files are read");
-    // It is moved away from where it was clicked, and is found where it is then.
+    // The instance is moved away from the clicked pixel; it is then picked at its new position.
     assert_eq!(set(&running, "instances[1].translate", json!([1, 0, 0.9])), None);
     assert_eq!(
         files.read("scene.toml"),
@@ -138,7 +138,7 @@ translate = [1, 0, 0]
     let scene = seen(&running);
     assert_eq!(scene.at(RIGHT).name, "render");
     assert_eq!(scene.at([30, 6]).name, "instances[1]");
-    // Keys that are absent, of either form that a scale has.
+    // Absent keys are added. A scale may be a number or a list.
     assert_eq!(set(&running, "instances[0].scale", json!(0.5)), None);
     assert!(
         files
@@ -146,13 +146,13 @@ translate = [1, 0, 0]
             .contains("translate = [-1, 0, 0]\nscale = 0.5\n")
     );
     running.wait_rendered(&files);
-    let told = set(&running, "instances[0].scale", json!(0)).unwrap();
-    assert!(told.contains("instances[0].scale: 0 must not be 0"), "{told}");
+    let message = set(&running, "instances[0].scale", json!(0)).unwrap();
+    assert!(message.contains("instances[0].scale: 0 must not be 0"), "{message}");
     assert!(files.read("scene.toml").contains("scale = 0.5\n"));
 }
 
 #[test]
-fn a_mesh_with_materials_of_its_own_is_named_and_these_are_told() {
+fn picking_a_mesh_returns_its_own_materials() {
     let text = format!(
         "{START}[materials.leaf]
 type = 'phong'
@@ -186,8 +186,8 @@ materials = {{ leaf = 'leaf' }}
         (groups(&crown), &crown.note),
         (vec!["shapes[0]", "materials.leaf"], &None)
     );
-    // A part gets one of the scene's materials, and values of other files cannot be set.
-    for (path, value, told) in [
+    // A mesh part can only be assigned materials of the scene, and values of other files cannot be set.
+    for (path, value, expected) in [
         (
             "shapes[0].materials.leaf",
             json!("bark"),
@@ -200,8 +200,8 @@ materials = {{ leaf = 'leaf' }}
         ),
         ("materials.bark.color", json!([1, 1, 1]), "cannot be changed"),
     ] {
-        let said = set(&running, path, value).unwrap();
-        assert!(said.contains(told), "{path}: {said}");
+        let message = set(&running, path, value).unwrap();
+        assert!(message.contains(expected), "{path}: {message}");
         assert_eq!(files.read("scene.toml"), text);
     }
     assert_eq!(set(&running, "shapes[0].scale", json!(0.75)), None);
@@ -211,7 +211,7 @@ materials = {{ leaf = 'leaf' }}
 }
 
 #[test]
-fn a_gltf_file_is_told_to_be_one_and_stays() {
+fn picking_a_gltf_file_reports_that_it_is_read_only() {
     let files = Files::new("");
     Model::default().write_glb(files.folder.path(), "box.glb");
     let before = fs::read(files.path("box.glb")).unwrap();
@@ -229,21 +229,21 @@ fn a_gltf_file_is_told_to_be_one_and_stays() {
     let scene = seen(&running);
     let clicked = scene.at([12, 11]);
     assert_eq!((clicked.name.as_str(), clicked.groups.len()), ("shapes[0]", 0));
-    let told = "glTF files are read-only here; run `wgray convert` for an editable scene";
-    assert_eq!(clicked.gone.as_deref(), Some(told));
+    let message = "glTF files are read-only here; run `wgray convert` for an editable scene";
+    assert_eq!(clicked.gone.as_deref(), Some(message));
     for (name, _) in scene.objects("").objects {
-        assert_eq!(scene.object(&name, None).gone.as_deref(), Some(told), "{name}");
+        assert_eq!(scene.object(&name, None).gone.as_deref(), Some(message), "{name}");
     }
     for path in ["shapes[0].file", "camera.fov", "render.seed"] {
-        let said = set(&running, path, json!(1)).unwrap();
-        assert!(said.ends_with("run `wgray convert` for an editable scene"), "{said}");
+        let error = set(&running, path, json!(1)).unwrap();
+        assert!(error.ends_with("run `wgray convert` for an editable scene"), "{error}");
     }
     assert_eq!(fs::read(files.path("box.glb")).unwrap(), before);
     assert_eq!(running.state().undo, None);
 }
 
 #[test]
-fn what_a_scene_has_of_gltf_files_is_of_the_shape_that_names_them() {
+fn objects_of_a_gltf_file_belong_to_the_shape_that_loads_it() {
     let files = Files::new(&format!(
         "{START}materials.red = {{ type = 'phong', color = [0.8, 0.1, 0.1] }}
 render.integrator = 'path'

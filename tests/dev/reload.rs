@@ -1,4 +1,4 @@
-//! Files that are saved, broken, renamed, linked, deleted: what is shown is what they say last.
+//! Files that are saved, invalid, renamed, linked or deleted: the image always shows their latest valid state.
 
 use std::fs;
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use wgray_render::gpu::compose::Shaders;
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
 
 #[test]
-fn the_first_picture_is_what_render_makes() {
+fn the_first_image_equals_that_of_render() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -19,11 +19,11 @@ fn the_first_picture_is_what_render_makes() {
     assert!(colors.iter().any(|color| *color != colors[0]), "the image is not empty");
     let (x, y) = (20, 20);
     let [r, g, b] = colors[y * 40 + x];
-    let told = frame.pixel(x as u32, y as u32).unwrap();
+    let values = frame.pixel(x as u32, y as u32).unwrap();
     let shown = [r, g, b].map(|value| wgray::image::encode(value).to_string()).join(" ");
     let bits = [r, g, b].map(|value| format!("{:08x}", value.to_bits())).join("  ");
     assert_eq!(
-        told,
+        values,
         [
             ("linear RGB", format!("{r}  {g}  {b}")),
             ("bits", bits),
@@ -34,12 +34,12 @@ fn the_first_picture_is_what_render_makes() {
 }
 
 #[test]
-fn half_of_a_scene_that_is_being_saved_is_no_error() {
+fn a_partly_written_scene_is_not_an_error() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
     let half = &SCENE[..SCENE.find("radius").unwrap() + 3];
-    // On a busy machine a save may take too long; not each of ten.
+    // On a busy machine a save may take too long, but not each of ten saves.
     let is_silent = (0..10).any(|i| {
         let start = Instant::now();
         files.write("scene.toml", half);
@@ -61,12 +61,12 @@ fn half_of_a_scene_that_is_being_saved_is_no_error() {
     });
     assert!(is_silent);
     running.wait_rendered(&files);
-    files.write("scene.toml", half); // left like that it is one
+    files.write("scene.toml", half); // a file that remains incomplete is an error
     running.wait_problem();
 }
 
 #[test]
-fn a_saved_scene_is_uploaded_and_what_it_did_not_use_is_compiled() {
+fn a_saved_scene_is_compiled_only_if_it_needs_another_kernel() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -95,7 +95,7 @@ fn a_saved_scene_is_uploaded_and_what_it_did_not_use_is_compiled() {
 }
 
 #[test]
-fn a_view_transform_is_shown_without_rendering_anew() {
+fn a_view_transform_is_applied_without_rendering_again() {
     let files = Files::new(SCENE);
     let out = files.path("out.png");
     let running = Running::start(files.sources(), Some(out.clone()));
@@ -119,7 +119,7 @@ fn a_view_transform_is_shown_without_rendering_anew() {
 }
 
 #[test]
-fn a_comment_starts_nothing_anew() {
+fn a_changed_comment_does_not_restart_the_render() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -127,12 +127,12 @@ fn a_comment_starts_nothing_anew() {
     files.edit("scene.toml", "# a small scene", "# a very small scene");
     std::thread::sleep(SETTLED);
     assert_eq!(running.revision(), revision);
-    files.edit("scene.toml", "fov = 40", "fov = 41"); // it was looking
+    files.edit("scene.toml", "fov = 40", "fov = 41"); // control: the file is being watched
     running.wait_rendered(&files);
 }
 
 #[test]
-fn a_broken_shader_is_told_and_the_picture_stays() {
+fn an_invalid_shader_is_reported_and_the_image_stays() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -153,7 +153,7 @@ fn a_broken_shader_is_told_and_the_picture_stays() {
     assert!(excerpt.contains("= sun;") && excerpt.contains("^^^"), "{excerpt}");
     std::thread::sleep(SETTLED);
     assert_eq!((running.colors(), running.revision()), (good, revision));
-    // Everything that does not need the broken shaders still works.
+    // Changes that do not need the invalid shader still take effect.
     running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
     running.wait_done(revision);
     running.session.send(Command::ResetCamera);
@@ -162,7 +162,7 @@ fn a_broken_shader_is_told_and_the_picture_stays() {
     running.wait("the changed scene by the last good shaders", |running| {
         (running.colors() == scene_changed).then_some(())
     });
-    // Even where it takes another kernel.
+    // Even if they need another kernel.
     files.edit(
         "scene.toml",
         "radius = 0.5",
@@ -178,7 +178,7 @@ fn a_broken_shader_is_told_and_the_picture_stays() {
 }
 
 #[test]
-fn a_shader_that_is_wrong_in_its_types_is_told_too() {
+fn a_type_error_in_a_shader_is_reported() {
     let files = Files::new(SCENE);
     files.edit(
         "shaders/camera.wgsl",
@@ -201,12 +201,12 @@ fn a_shader_that_is_wrong_in_its_types_is_told_too() {
 }
 
 #[test]
-fn a_broken_scene_is_told_and_the_picture_stays() {
+fn an_invalid_scene_is_reported_and_the_image_stays() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
     let good = running.colors();
-    for (old, new, line, said) in [
+    for (old, new, line, rule) in [
         ("radius = 0.5", "radius = -1", 33, "must be"),
         ("radius = -1", "radius = = 1", 33, "extra"),
         ("radius = = 1", "radius = 1\nradios = 2", 34, "radios"),
@@ -215,7 +215,7 @@ fn a_broken_scene_is_told_and_the_picture_stays() {
         let place = format!("{}:{line}", files.path("scene.toml").display());
         let problem = running.wait("the problem", |running| {
             let problem = running.state().problems.first().cloned()?;
-            (problem.place.as_ref()?.starts_with(&place) && problem.message.contains(said)).then_some(problem)
+            (problem.place.as_ref()?.starts_with(&place) && problem.message.contains(rule)).then_some(problem)
         });
         assert_eq!(problem.kind, "scene");
         assert!(problem.excerpt.unwrap().contains(new.lines().last().unwrap()));
@@ -226,7 +226,7 @@ fn a_broken_scene_is_told_and_the_picture_stays() {
 }
 
 #[test]
-fn of_a_burst_of_saves_the_last_one_counts() {
+fn after_a_burst_of_saves_the_last_one_is_shown() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -245,7 +245,7 @@ fn of_a_burst_of_saves_the_last_one_counts() {
 }
 
 #[test]
-fn saves_by_rename_and_links_are_seen() {
+fn saves_by_rename_and_links_are_detected() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -258,7 +258,7 @@ fn saves_by_rename_and_links_are_seen() {
     running.wait_rendered(&files);
     #[cfg(unix)]
     {
-        // The scene becomes a link to a file elsewhere, which is then edited there; likewise a shader.
+        // The scene becomes a link to a file in another folder, which is then edited; likewise a shader.
         let elsewhere = Files::new(&SCENE.replace("fov = 40", "fov = 60"));
         for name in ["scene.toml", "shaders/phong.wgsl"] {
             fs::remove_file(files.path(name)).unwrap();
@@ -277,7 +277,7 @@ fn saves_by_rename_and_links_are_seen() {
 }
 
 #[test]
-fn deleted_files_are_told_and_seen_again() {
+fn deleted_files_are_reported_until_they_return() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -299,7 +299,7 @@ fn deleted_files_are_told_and_seen_again() {
     files.write("shaders/phong.wgsl", Shaders::built_in().text("phong.wgsl"));
     running.wait_well();
 
-    // A whole folder goes and comes back, as when another branch is checked out.
+    // A whole folder is removed and restored, as when another branch is checked out.
     for name in ["shaders/kernels", "shaders"] {
         fs::rename(files.path(name), files.path("away")).unwrap();
         assert_eq!(running.wait_problem().kind, "file");
@@ -319,7 +319,7 @@ fn deleted_files_are_told_and_seen_again() {
 }
 
 #[test]
-fn an_edited_texture_is_seen() {
+fn an_edited_texture_updates_the_image() {
     let textured = SCENE.replacen("color = [0.8, 0.1, 0.1]", "color = { texture = 'wood' }", 1)
         + "\n[textures.wood]\ntype = 'image'\nfile = 'textures/wood.png'\n";
     let files = Files::new(&textured);
@@ -336,7 +336,7 @@ fn an_edited_texture_is_seen() {
     paint([30, 30, 200]);
     running.wait_rendered(&files);
     assert_ne!(running.colors(), red);
-    // A missing or damaged texture is rendered as a stand-in, as by `render`.
+    // A missing or damaged texture is replaced by a stand-in, as in `render`.
     fs::remove_dir_all(files.path("textures")).unwrap();
     running.wait_rendered(&files);
     assert_ne!(running.colors(), red);
@@ -353,7 +353,7 @@ fn an_edited_texture_is_seen() {
 
 #[cfg(unix)]
 #[test]
-fn a_pipe_or_a_device_in_the_scenes_place_is_told_and_left() {
+fn a_pipe_or_a_device_instead_of_the_scene_is_reported() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -393,7 +393,7 @@ fn a_finished_kernel_is_shown_while_a_newer_save_waits_for_the_compiler() {
         std::thread::sleep((compile / 3).max(Duration::from_millis(60)));
     }
     assert!(saves > 1);
-    // In the end the newest save is shown.
+    // Finally the latest save is shown.
     running.wait_rendered(&files);
 }
 
@@ -418,7 +418,7 @@ fn a_comment_in_a_shader_is_not_compiled_and_later_errors_have_the_right_line() 
     let text = files.read(KERNEL);
     let line = text.lines().position(|line| line.contains("= sun;")).unwrap() + 1;
     assert_eq!(running.wait_problem().line, Some(line));
-    // The same below a comment: the error moves along.
+    // The same with an additional comment above it: the line of the error moves.
     files.write(KERNEL, &format!("// zero\n{text}"));
     running.wait("the error at its new line", |running| {
         (running.state().problems.first()?.line == Some(line + 1)).then_some(())
@@ -440,7 +440,7 @@ fn reading_a_changed_scene_is_reported_until_it_is_read() {
     files.write("scene.toml", SCENE);
     running.wait_rendered(&files);
     running.wait("the end", |running| (!running.state().reading).then_some(()));
-    // The file as it was: it is read, or not, and that ends as well.
+    // The file returns to its previous content before it is read again: `reading` must end in this case, too.
     files.write("scene.toml", half);
     running.wait("reading", |running| running.state().reading.then_some(()));
     files.write("scene.toml", SCENE);

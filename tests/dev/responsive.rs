@@ -15,7 +15,7 @@ pub fn heavy() -> String {
 }
 
 #[test]
-fn a_save_or_a_move_does_not_wait_for_the_picture() {
+fn a_save_or_a_move_does_not_wait_for_the_image() {
     let files = Files::new(&heavy());
     let running = files.start();
     let frame = running.wait("a first image", |running| running.frame());
@@ -39,13 +39,13 @@ fn a_save_or_a_move_does_not_wait_for_the_picture() {
         });
         worst = worst.max(start.elapsed());
     }
-    // The complete image takes minutes; the goal is 0.3 s on an idle machine.
+    // The complete image takes minutes; the target is 0.3 s on an idle machine.
     assert!(worst < Duration::from_secs(5), "{worst:?}");
     assert!(!running.frame().unwrap().header.done);
 }
 
 #[test]
-fn a_camera_that_never_rests_is_shown_all_the_same() {
+fn a_camera_in_constant_motion_is_shown() {
     let files = Files::new(&heavy());
     let running = files.start();
     running.wait("a first image", |running| running.frame());

@@ -1,4 +1,4 @@
-//! A scene and shaders in a folder of their own, and the development mode that watches them.
+//! A temporary folder with a scene and shaders, and a development session that watches it.
 
 use std::fs;
 use std::net::SocketAddr;
@@ -18,9 +18,9 @@ use wgray_render::job::{self, WorkSplit};
 use wgray_render::pack::pack;
 use wgray_render::records::Packed;
 
-/// However busy the machine is, what is waited for comes within this time, or never.
+/// Timeout of all waits, sufficient even on a busy machine.
 pub const LONGEST: Duration = Duration::from_secs(40);
-/// Nothing happens for so long: then nothing will.
+/// Time after which a session without events is idle.
 pub const SETTLED: Duration = Duration::from_millis(400);
 
 pub const SCENE: &str = "# a small scene
@@ -65,12 +65,12 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 ";
 
-/// A shader whose image depends on every line.
+/// A shader on which every pixel of the image depends.
 pub const KERNEL: &str = "shaders/kernels/render.wgsl";
-/// The expression that it sums.
+/// The expression that the kernel sums.
 pub const RADIANCE: &str = "path_value(path)";
 
-/// A scene and shaders in a folder of their own.
+/// A temporary folder with a scene and shaders.
 pub struct Files {
     pub folder: TempDir,
 }
@@ -85,7 +85,7 @@ impl Files {
         files
     }
 
-    /// All shaders as they are in the program.
+    /// Writes all built-in shaders.
     pub fn write_shaders(&self) {
         for (name, text) in built_in() {
             let file = self.path(&format!("shaders/{name}"));
@@ -106,7 +106,7 @@ impl Files {
         fs::write(self.path(name), text).unwrap();
     }
 
-    /// Saves like most editors: another file takes the name.
+    /// Saves a file by renaming another one, as most editors do.
     pub fn save_by_rename(&self, name: &str, text: &str) {
         self.write("new~", text);
         fs::rename(self.path("new~"), self.path(name)).unwrap();
@@ -144,7 +144,7 @@ impl Files {
         pack(&Scene::load(self.path("scene.toml")).unwrap())
     }
 
-    /// Returns what `render` makes of the files.
+    /// Returns the image that `render` makes of the files.
     pub fn rendered(&self) -> Pixels {
         let packed = self.packed();
         let (width, height) = (packed.camera.width, packed.camera.height);
@@ -152,7 +152,7 @@ impl Files {
         Pixels { width, height, colors }
     }
 
-    /// A value of each pixel of the film that `render` makes of a scene.
+    /// Returns `value` of each pixel of the film that `render` makes of a scene.
     pub fn rendered_as<T>(&self, packed: &Packed, value: &dyn Fn(&Film, usize) -> T) -> Vec<T> {
         let device = choose(&AdapterChoice::Auto).unwrap();
         let shaders = Shaders::read(&self.path("shaders")).unwrap();
@@ -183,7 +183,7 @@ pub struct Running {
     pub session: Session,
 }
 
-/// Shows a session on a server; it runs as long as the program.
+/// Serves a session for the rest of the process. Returns the session and its address.
 pub fn serve(running: Running) -> (&'static Running, SocketAddr) {
     let listener = Listener::open("127.0.0.1:0").unwrap();
     let address = listener.address().unwrap();
@@ -231,7 +231,7 @@ impl Running {
         );
     }
 
-    /// Waits until an image with all samples is shown that is newer than a revision.
+    /// Waits for a complete image that is newer than a revision.
     #[track_caller]
     pub fn wait_done(&self, after: u64) -> Arc<Frame> {
         self.wait("a finished image", |running| {
@@ -241,7 +241,7 @@ impl Running {
         })
     }
 
-    /// Waits until the image is the one that `render` makes of the files.
+    /// Waits until the complete image equals that of `render`.
     #[track_caller]
     pub fn wait_rendered(&self, files: &Files) {
         let wanted = files.rendered();

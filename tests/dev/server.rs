@@ -1,4 +1,4 @@
-//! The server answers requests of its own pages only.
+//! The server only answers requests of its own pages.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -8,7 +8,7 @@ use wgray_dev::{Command, Listener, Move};
 
 use super::running::{Files, LONGEST, SCENE, serve};
 
-/// A request, and the answer's first line and whole text.
+/// Sends a request. Returns the first line and the whole text of the answer.
 fn ask(address: SocketAddr, request: &str) -> (String, String) {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(LONGEST)).unwrap();
@@ -118,7 +118,7 @@ fn the_server_answers_its_own_pages_only() {
     let accepted = ask(address, &upgrade(&own, &format!("Origin: http://{own}\r\n"))).0;
     assert_eq!(accepted, "HTTP/1.1 101 Switching Protocols");
 
-    // The number of viewers is bounded, and a place that is left is free again.
+    // The number of viewers is limited, and a viewer that disconnects makes room for another one.
     let request = upgrade(&own, &format!("Origin: http://{own}\r\n"));
     let mut open = Vec::new();
     let full = loop {
@@ -135,7 +135,7 @@ fn the_server_answers_its_own_pages_only() {
     };
     assert_eq!(full, *b"HTTP/1.1 503");
     assert!(open.len() >= 15, "{}", open.len());
-    // Viewers that read nothing do not block anything.
+    // Viewers that read no messages do not block the session.
     for _ in 0..20 {
         let revision = session.revision();
         session.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
@@ -156,7 +156,7 @@ fn the_server_answers_its_own_pages_only() {
 }
 
 #[test]
-fn pictures_are_given_to_who_asks_and_taken_from_the_page_alone() {
+fn images_are_sent_to_same_origin_requests_and_accepted_from_the_page_only() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -188,7 +188,7 @@ fn pictures_are_given_to_who_asks_and_taken_from_the_page_alone() {
 }
 
 #[test]
-fn half_a_request_is_given_up_and_keeps_nobody_out() {
+fn incomplete_requests_time_out_and_do_not_block_others() {
     let files = Files::new(SCENE);
     let (_, address) = serve(files.start());
     let halves = [
@@ -214,9 +214,9 @@ fn half_a_request_is_given_up_and_keeps_nobody_out() {
 }
 
 #[test]
-fn what_cannot_be_listened_on_is_told() {
-    let taken = Listener::open("127.0.0.1:0").unwrap();
-    let place = taken.address().unwrap().to_string();
+fn an_address_that_is_in_use_or_invalid_is_reported() {
+    let listener = Listener::open("127.0.0.1:0").unwrap();
+    let place = listener.address().unwrap().to_string();
     let error = Listener::open(&place).err().unwrap().to_string();
     assert!(error.starts_with(&place), "{error}");
     assert!(Listener::open("nowhere").is_err());

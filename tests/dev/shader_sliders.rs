@@ -1,4 +1,4 @@
-//! Overrides of shaders as sliders: a slider shows what an edit of the file would, bit for bit, and without the compiler.
+//! Shader overrides as sliders: moving a slider gives the same bits as editing the file, without a compilation.
 
 use wgray::image::Pixels;
 use wgray_dev::{Command, Content, Kind, Slider, SliderState, Value};
@@ -7,7 +7,7 @@ use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
 
 const FILE: &str = "kernels/render.wgsl";
 
-/// Adds declarations to the kernel, and multiplies its light by an expression.
+/// Adds declarations to the kernel and multiplies its radiance by an expression.
 fn declare(files: &Files, declared: &str, factor: &str) {
     let text = files.read(KERNEL);
     let text = text.replace(RADIANCE, &format!("({RADIANCE} * vec4f(vec3f({factor}), 1.0))"));
@@ -30,7 +30,7 @@ fn line_of(files: &Files, what: &str) -> usize {
     text.lines().position(|line| line.contains(what)).unwrap() + 1
 }
 
-/// Waits until a finished image is this one.
+/// Waits for a complete image that equals `wanted`.
 #[track_caller]
 fn wait_for(running: &Running, wanted: &Pixels) {
     running.wait("the image of the sliders", |running| {
@@ -39,20 +39,20 @@ fn wait_for(running: &Running, wanted: &Pixels) {
     });
 }
 
-/// Returns what `render` makes of the files with edits of the kernel.
+/// Returns the image that `render` makes of the files after edits of the kernel.
 fn rendered(files: &Files, edits: &[(&str, &str)]) -> Pixels {
     let text = files.read(KERNEL);
-    let other = Files::new(&files.read("scene.toml"));
+    let edited = Files::new(&files.read("scene.toml"));
     let new = edits.iter().fold(text.clone(), |text, (old, new)| {
         assert!(text.contains(old), "{old}");
         text.replace(old, new)
     });
-    other.write(KERNEL, &new);
-    other.rendered()
+    edited.write(KERNEL, &new);
+    edited.rendered()
 }
 
 #[test]
-fn a_slider_shows_what_an_edit_would_without_the_compiler() {
+fn a_slider_equals_an_edit_without_a_compilation() {
     let files = Files::new(SCENE);
     declare(
         &files,
@@ -104,7 +104,7 @@ fn a_slider_shows_what_an_edit_would_without_the_compiler() {
     running.session.send(Command::ResetSliders);
     wait_for(&running, &first);
 
-    // A range and a line follow the file, without the compiler.
+    // The range and the line number of a slider follow the file without a compilation.
     files.edit(
         KERNEL,
         "override tint: f32 = 0.5; // 0..1",
@@ -115,7 +115,7 @@ fn a_slider_shows_what_an_edit_would_without_the_compiler() {
     });
     assert_eq!(slider(&running, "tint").slider.line, wanted.slider.line + 1);
     assert_eq!(running.state().compile_seconds, compiled);
-    // A value that is edited in the file replaces that of the slider. The others stay through a compilation.
+    // An edited value in the file replaces that of its slider. Other sliders keep their values through a compilation.
     slide(&running, "tint", Value::Number(0.9));
     slide(&running, "level", Value::Number(5.0));
     files.edit(KERNEL, "tint: f32 = 0.5", "tint: f32 = 0.75");
@@ -125,7 +125,7 @@ fn a_slider_shows_what_an_edit_would_without_the_compiler() {
 }
 
 #[test]
-fn an_override_that_is_needed_to_compile_is_no_slider() {
+fn an_override_that_is_needed_to_compile_has_no_slider() {
     let files = Files::new(SCENE);
     declare(
         &files,
@@ -155,7 +155,7 @@ fn an_override_that_is_needed_to_compile_is_no_slider() {
 }
 
 #[test]
-fn sliders_stay_while_a_shader_has_errors() {
+fn sliders_remain_while_a_shader_has_errors() {
     let files = Files::new(SCENE);
     declare(&files, "override c: f32 = 0.5;", "min(1.0 / c, 1.0)");
     let running = files.start();

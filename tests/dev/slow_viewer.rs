@@ -1,4 +1,4 @@
-//! Viewers behind slow connections: what they see is recent.
+//! Viewers behind slow connections receive recent frames.
 
 use std::time::{Duration, Instant};
 
@@ -8,7 +8,7 @@ use wgray_dev::{Command, Move};
 use super::running::{Files, SCENE, serve};
 use super::viewer::{Received, Viewer};
 
-/// A scene whose frames are noisy, so that PNG hardly compresses them.
+/// Returns a scene with noisy frames, which PNG hardly compresses.
 fn noisy() -> String {
     SCENE
         .replace("width = 40", "width = 320")
@@ -37,7 +37,7 @@ fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
         session.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         session.wait_done(revision);
     }
-    // Without acknowledgements: two frames, and every state.
+    // Without acknowledgements, the viewer receives two frames and every state.
     let newest = session.state().frame;
     while states < newest {
         match viewer.receive().unwrap() {
@@ -52,7 +52,7 @@ fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
         }
     }
     assert_eq!(frames.len(), 2, "{frames:?}");
-    // An acknowledgement of the first is room for one, which is the newest.
+    // An acknowledgement of one frame permits one more, which is the newest.
     viewer.acknowledge(&frames[0]);
     let next = loop {
         if let Received::Frame(header, _) = viewer.receive().expect("a frame") {
@@ -63,7 +63,7 @@ fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
 }
 
 #[test]
-fn a_slow_connection_does_not_delay_the_cameras_answer() {
+fn a_slow_connection_does_not_delay_camera_moves() {
     const RATE: f64 = 30_000.0; // bytes per second
     let files = Files::new(&noisy());
     let running = files.start();
@@ -95,7 +95,7 @@ fn a_slow_connection_does_not_delay_the_cameras_answer() {
     loop {
         match viewer.receive().unwrap() {
             Received::Frame(header, size) => {
-                largest = largest.max(size); // a camera at rest has finer frames
+                largest = largest.max(size); // frames are finer when the camera is at rest
                 viewer.acknowledge(&header);
             }
             Received::Text(message) if message["state"]["heard"].as_u64() >= Some(heard) => break,

@@ -8,16 +8,16 @@ use serde_json::{Value, json};
 
 use super::running::LONGEST;
 
-/// A viewer's connection.
+/// A connection of a viewer.
 pub struct Viewer {
     stream: TcpStream,
-    /// Maximum bytes per second that are read.
+    /// Maximum number of bytes read per second.
     rate: Option<f64>,
 }
 
-/// A message of the server.
+/// A message from the server.
 pub enum Received {
-    /// A message of text.
+    /// A text message.
     Text(Value),
     /// The header of a frame, and the size of its message in bytes.
     Frame(Value, usize),
@@ -42,7 +42,7 @@ impl Viewer {
         Viewer { stream, rate: None }
     }
 
-    /// A viewer behind a slow connection, in bytes per second.
+    /// Connects a viewer that reads at most `rate` bytes per second.
     pub fn slow(address: SocketAddr, rate: f64) -> Viewer {
         Viewer {
             rate: Some(rate),
@@ -50,7 +50,7 @@ impl Viewer {
         }
     }
 
-    /// Sends bytes as a message of text, masked with zeros.
+    /// Sends bytes as a text message, masked with zeros.
     pub fn say(&mut self, text: &[u8]) -> std::io::Result<()> {
         let mut bytes = vec![0x81, 0x80 | 127];
         bytes.extend((text.len() as u64).to_be_bytes());
@@ -59,7 +59,7 @@ impl Viewer {
         self.stream.write_all(&bytes)
     }
 
-    /// Another handle on the same connection, which only sends.
+    /// Returns a second handle of the connection, for sending only.
     pub fn sender(&self) -> Viewer {
         Viewer {
             stream: self.stream.try_clone().unwrap(),
@@ -73,12 +73,12 @@ impl Viewer {
         self.say(message.as_bytes()).unwrap();
     }
 
-    /// Waits at most this long for each message.
+    /// Sets the maximum time to wait for each message.
     pub fn set_timeout(&self, timeout: Duration) {
         self.stream.set_read_timeout(Some(timeout)).unwrap();
     }
 
-    /// The next message; none once the connection has ended, or after the timeout.
+    /// Returns the next message, or `None` at the end of the connection or after the timeout.
     pub fn receive(&mut self) -> Option<Received> {
         loop {
             let [kind, short] = self.read::<2>()?;
@@ -102,7 +102,7 @@ impl Viewer {
         }
     }
 
-    /// The next message of text; none once the connection has ended.
+    /// Returns the next text message, or `None` at the end of the connection or after the timeout.
     pub fn hear(&mut self) -> Option<Value> {
         loop {
             if let Received::Text(message) = self.receive()? {
@@ -130,7 +130,7 @@ impl Viewer {
         Some(())
     }
 
-    /// Sends a message that must be refused, and returns the reason: from the answer, or from the state that follows.
+    /// Sends a message that must be rejected, and returns the reason from the answer or from the following state.
     #[track_caller]
     pub fn refused(&mut self, text: &str) -> String {
         self.say(text.as_bytes()).unwrap();

@@ -20,7 +20,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
         running.session.send(Command::Move(by));
         running.wait_done(revision);
     }
-    // Moved and at once seen otherwise: neither is forgotten.
+    // Commands in quick succession are all executed.
     running.session.send(Command::Move(Move::Orbit(-0.1, 0.0)));
     running.session.send(Command::View(View::Normal));
     running.session.send(Command::View(View::Color));
@@ -32,7 +32,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     running.wait("a finished image", settled);
     let state = running.state();
     assert!(state.camera_moved);
-    // The text is that of a scene file: in a scene file it gives the displayed image.
+    // The camera's text, pasted into a scene file, gives the displayed image.
     let from_text = {
         let (start, end) = (SCENE.find("[camera]").unwrap(), SCENE.find("[render]").unwrap());
         Files::new(&format!("{}{}\n{}", &SCENE[..start], state.camera, &SCENE[end..]))
@@ -45,19 +45,19 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     });
     assert_eq!(files.rendered(), shown);
     let saved = files.read("scene.toml");
-    for kept in [
+    for text in [
         "# a small scene\n",
         "[camera] # looks from the front\n",
         "] # a comment\n",
         "fov = 40\n",
     ] {
-        assert!(saved.contains(kept), "{saved}");
+        assert!(saved.contains(text), "{saved}");
     }
     let notice = running.state().notice.clone().unwrap();
     assert!(!notice.bad && notice.text.contains("scene.toml"), "{}", notice.text);
     std::thread::sleep(SETTLED);
     assert_eq!(running.revision(), revision, "nothing was rendered again");
-    // The save is taken back: the file's text is what it was, and the view stays.
+    // Undoing the save restores the text of the file, but not the view.
     assert_eq!(running.state().undo.as_deref(), Some("camera"));
     running.session.send(Command::UndoWrite);
     running.wait("the file to be as it was", |running| {
@@ -75,7 +75,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
 }
 
 #[test]
-fn an_edit_of_the_file_changes_of_a_moved_camera_what_it_changes() {
+fn an_edit_of_the_file_changes_only_the_edited_keys_of_a_moved_camera() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -112,10 +112,10 @@ fn the_views_show_the_first_hits() {
             panic!("{:?}", frame.content)
         };
         assert_eq!(*hits, wanted);
-        let told = frame.pixel(20, 15).unwrap();
+        let values = frame.pixel(20, 15).unwrap();
         assert!(
-            told.contains(&("on", "shapes[0]".to_string())) && told.contains(&("material", "red".to_string())),
-            "{told:?}"
+            values.contains(&("on", "shapes[0]".to_string())) && values.contains(&("material", "red".to_string())),
+            "{values:?}"
         );
     }
     running.session.send(Command::View(View::Samples));
@@ -128,8 +128,8 @@ fn the_views_show_the_first_hits() {
 }
 
 #[test]
-fn another_view_shows_what_is_rendered_while_it_is_paused() {
-    // It takes minutes, but soon all pixels have a sample.
+fn another_view_shows_the_samples_of_a_paused_render() {
+    // The render takes minutes, but soon has a sample of each pixel.
     let long = SCENE
         .replace("width = 40", "width = 120")
         .replace("height = 30", "height = 90");
@@ -182,7 +182,7 @@ fn the_cpu_agrees_until_a_shader_is_changed() {
 }
 
 #[test]
-fn the_file_of_out_is_the_finished_picture() {
+fn the_output_file_is_the_finished_image() {
     let files = Files::new(SCENE);
     let out = files.path("pictures.png");
     let running = Running::start(files.sources(), Some(out.clone()));
@@ -200,7 +200,7 @@ fn the_file_of_out_is_the_finished_picture() {
             (picture.dimensions() == (40, 30) && *picture.as_raw() == wanted).then_some(())
         });
     }
-    // An image that is written next to the scene does not wake the session, and no temporary file is left.
+    // Writing the image next to the scene does not trigger a reload, and no temporary file remains.
     let mut names: Vec<_> = fs::read_dir(files.folder.path())
         .unwrap()
         .map(|entry| entry.unwrap().file_name())

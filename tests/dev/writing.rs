@@ -1,4 +1,4 @@
-//! Values that are set on the page: written into the scene file, shown at once, taken back, or refused.
+//! Values set on the page: written into the scene file, shown at once, undone, or rejected.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use wgray_dev::{Command, Move, Set, Sources};
 
 use super::running::{Files, Running, SCENE, SETTLED};
 
-/// Sets a value, and waits until that was followed.
+/// Sets a value and waits until the command is executed.
 #[track_caller]
 fn set(running: &Running, path: &str, value: Value, gesture: Option<u64>) {
     let path = path.to_owned();
@@ -34,7 +34,7 @@ fn refused(running: &Running) -> String {
 }
 
 #[test]
-fn a_value_that_is_set_is_written_and_shown() {
+fn a_new_value_is_written_and_shown() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -47,17 +47,17 @@ fn a_value_that_is_set_is_written_and_shown() {
     running.wait_rendered(&files);
     assert_ne!(running.colors(), before);
     assert_eq!(running.state().undo.as_deref(), Some("materials.red.color"));
-    // Keys that are absent are added, and go again; what the file has is not written again.
+    // Absent keys are added and removed again. A value that equals that of the file is not written.
     set(&running, "shapes[0].radius", json!(0.5), None);
     assert_eq!(running.state().undo.as_deref(), Some("materials.red.color"));
     set(&running, "render.seed", json!(3), None);
     assert!(files.read("scene.toml").contains("count = 4 }\nseed = 3\n\n[materials"));
     set(&running, "render.seed", Value::Null, None);
     assert!(!files.read("scene.toml").contains("seed"));
-    // Another kernel, by a value that is one of some names.
+    // An enumeration value that needs another kernel.
     set(&running, "render.pixel_samples.pattern", json!("random"), None);
     running.wait_rendered(&files);
-    // The page hears of every scene, and the watcher of none that was written here.
+    // Changes of the session do not trigger the file watcher; an edit of the file does.
     let scenes = running.state().scenes;
     std::thread::sleep(SETTLED);
     assert_eq!(running.state().scenes, scenes);
@@ -69,11 +69,11 @@ fn a_value_that_is_set_is_written_and_shown() {
 }
 
 #[test]
-fn what_somebody_else_saves_at_the_same_moment_stays() {
+fn concurrent_saves_of_an_editor_are_kept() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
-    // An editor's save, and a value of the page before anything has been read again.
+    // The editor saves, and the page sets a value before the file is read again.
     for round in 0..10 {
         let fov = |round: i32| format!("fov = {}", 40 + round);
         files.edit("scene.toml", &fov(round), &fov(round + 1));
@@ -90,7 +90,7 @@ fn what_somebody_else_saves_at_the_same_moment_stays() {
 }
 
 #[test]
-fn a_number_of_a_list_leaves_the_others_alone() {
+fn setting_a_list_element_keeps_the_other_elements() {
     let files = Files::new(&SCENE.replace("center = [0, 0, 0.5]", "center = [0,  0, # here\n 0.5]"));
     let start = files.read("scene.toml");
     let running = files.start();
@@ -101,11 +101,11 @@ fn a_number_of_a_list_leaves_the_others_alone() {
     let center = |numbers: &str| start.replace("[0,  0, # here\n 0.5]", numbers);
     assert_eq!(files.read("scene.toml"), center("[0.25,  0, # here\n 1]"));
     running.wait_rendered(&files);
-    // In an absent list the other values are the defaults.
+    // The other elements of an absent list get their default values.
     set(&running, "camera.up[0]", json!(0.5), None);
     assert!(files.read("scene.toml").contains("fov = 40\nup = [0.5, 0, 1]\n"));
     let text = files.read("scene.toml");
-    for (path, value, told) in [
+    for (path, value, expected) in [
         ("shapes[0].center[3]", json!(1), "cannot be changed"),
         ("shapes[0].center[0][0]", json!(1), "cannot be changed"),
         ("shapes[0].radius[0]", json!(1), "cannot be changed"),
@@ -114,10 +114,10 @@ fn a_number_of_a_list_leaves_the_others_alone() {
         ("shapes[0].center[0]", json!(1e300), "shapes[0].center: "),
     ] {
         set(&running, path, value, None);
-        assert!(refused(&running).contains(told), "{path}: {}", refused(&running));
+        assert!(refused(&running).contains(expected), "{path}: {}", refused(&running));
     }
     assert_eq!(files.read("scene.toml"), text);
-    // A valid value withdraws the error.
+    // A valid value clears the error.
     set(&running, "shapes[0].center[0]", json!(0), None);
     let notice = running.state().notice.clone().unwrap();
     assert!(!notice.bad && notice.text.is_empty(), "{notice:?}");
@@ -126,7 +126,7 @@ fn a_number_of_a_list_leaves_the_others_alone() {
 }
 
 #[test]
-fn what_was_written_is_taken_back_and_written_again() {
+fn written_values_are_undone_and_redone() {
     let files = Files::new(&SCENE.replace('\n', "\r\n"));
     let start = files.read("scene.toml");
     let running = files.start();
@@ -140,14 +140,14 @@ fn what_was_written_is_taken_back_and_written_again() {
         set(&running, path, value, None);
         texts.push(files.read("scene.toml"));
     }
-    // A slider that is drawn is one step.
+    // A drag of a slider is one undo step.
     for i in 1..=20 {
         set(&running, "materials.red.shininess", json!(16 + i), Some(7));
     }
     assert_eq!(running.state().undo.as_deref(), Some("materials.red.shininess"));
     let last = files.read("scene.toml");
     assert!(last.contains("shininess = 36\r\n"), "{last}");
-    // The camera's save is a step too, and the view stays when it is taken back.
+    // Saving the camera is an undo step, too. Undoing it keeps the view.
     follow(&running, Command::Move(Move::Orbit(0.3, 0.1)));
     follow(&running, Command::SaveCamera);
     assert_eq!(running.state().undo.as_deref(), Some("camera"));
@@ -163,7 +163,7 @@ fn what_was_written_is_taken_back_and_written_again() {
         (state.undo.as_deref(), state.redo.as_deref()),
         (None, Some("shapes[0].radius"))
     );
-    follow(&running, Command::UndoWrite); // there is nothing
+    follow(&running, Command::UndoWrite); // nothing to undo
     assert_eq!(files.read("scene.toml"), start);
     for text in &texts[1..] {
         follow(&running, Command::RedoWrite);
@@ -176,12 +176,12 @@ fn what_was_written_is_taken_back_and_written_again() {
 }
 
 #[test]
-fn a_value_that_breaks_a_rule_is_refused_and_the_file_stays() {
+fn invalid_values_are_rejected_and_the_file_is_unchanged() {
     let files = Files::new(SCENE);
     fs::write(files.path("other.png"), "").unwrap();
     let running = files.start();
     running.wait_rendered(&files);
-    for (path, value, told) in [
+    for (path, value, expected) in [
         (
             "shapes[0].radius",
             json!(-1),
@@ -205,12 +205,12 @@ fn a_value_that_breaks_a_rule_is_refused_and_the_file_stays() {
         ("", json!(1), "must be"),
     ] {
         set(&running, path, value, None);
-        let said = refused(&running);
-        assert!(said.contains(told), "{path}: {said}");
+        let message = refused(&running);
+        assert!(message.contains(expected), "{path}: {message}");
         assert_eq!(files.read("scene.toml"), SCENE, "{path}");
     }
     assert_eq!(running.state().undo, None);
-    // A broken file must be fixed by hand.
+    // A file with a syntax error must be fixed by hand.
     files.edit("scene.toml", "radius = 0.5", "radius = ");
     let broken = files.read("scene.toml");
     set(&running, "camera.fov", json!(50), None);
@@ -223,32 +223,32 @@ fn a_value_that_breaks_a_rule_is_refused_and_the_file_stays() {
 }
 
 #[test]
-fn what_somebody_else_has_changed_is_not_taken_back() {
+fn changes_of_another_program_are_not_undone() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
     set(&running, "camera.fov", json!(50), None);
     files.edit("scene.toml", "# a small scene", "# another scene");
-    let theirs = files.read("scene.toml");
-    running.session.send(Command::UndoWrite); // noticed or not
+    let edited = files.read("scene.toml");
+    running.session.send(Command::UndoWrite); // whether or not the change was detected by then
     running.wait("nothing to be taken back", |running| {
         running.state().undo.is_none().then_some(())
     });
-    assert_eq!(files.read("scene.toml"), theirs);
+    assert_eq!(files.read("scene.toml"), edited);
     running.wait("the change", |running| running.state().undo_blocked.clone());
     follow(&running, Command::UndoWrite);
     let refused = refused(&running);
     assert!(refused.contains("changed by another program"), "{refused}");
-    // The next change builds on theirs.
+    // The next change keeps that of the editor.
     set(&running, "camera.fov", json!(55), None);
-    assert_eq!(files.read("scene.toml"), theirs.replace("fov = 50", "fov = 55"));
+    assert_eq!(files.read("scene.toml"), edited.replace("fov = 50", "fov = 55"));
     follow(&running, Command::UndoWrite);
-    assert_eq!(files.read("scene.toml"), theirs);
+    assert_eq!(files.read("scene.toml"), edited);
     running.wait_rendered(&files);
 }
 
 #[test]
-fn what_an_option_stands_in_for_stays() {
+fn values_overridden_by_options_cannot_be_set() {
     let files = Files::new(SCENE);
     let sources = Sources {
         overrides: Overrides {
@@ -260,7 +260,7 @@ fn what_an_option_stands_in_for_stays() {
     };
     let running = Running::start(sources, None);
     running.wait_done(0);
-    for (path, value, told) in [
+    for (path, value, expected) in [
         (
             "shapes[0].radius",
             json!(0.25),
@@ -273,10 +273,10 @@ fn what_an_option_stands_in_for_stays() {
         ),
     ] {
         set(&running, path, value, None);
-        assert_eq!(refused(&running), told);
+        assert_eq!(refused(&running), expected);
         assert_eq!(files.read("scene.toml"), SCENE);
     }
-    // Beside it values are set, and the defined one stays.
+    // Other values can be set. The defined value stays in effect.
     let revision = running.revision();
     set(&running, "shapes[0].center", json!([0, 0, 0.75]), None);
     running.wait_done(revision);
@@ -295,7 +295,7 @@ fn what_an_option_stands_in_for_stays() {
 }
 
 #[test]
-fn a_link_stays_one_and_the_file_keeps_its_permissions() {
+fn links_and_permissions_are_preserved() {
     let files = Files::new(SCENE);
     #[cfg(unix)]
     {

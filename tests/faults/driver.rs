@@ -157,7 +157,7 @@ impl TestFolder {
     pub fn run_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Ran {
         let out = self.path("out.exr");
         for name in ["out.exr", "log"] {
-            let _ = fs::remove_file(self.path(name)); // of an earlier run
+            let _ = fs::remove_file(self.path(name)); // the image of an earlier run
         }
         let mut command = assert_cmd::Command::from_std(self.command_on(driver, arguments, faults));
         let output = command
@@ -165,8 +165,8 @@ impl TestFolder {
             .output()
             .expect("the program runs");
         let known = |name: &str| ["scene.toml", "log", "out.exr"].contains(&name) || name.ends_with(".png");
-        let strange = self.files_but(known);
-        assert_eq!(strange, [""; 0], "temporary files are left");
+        let unexpected = self.files_but(known);
+        assert_eq!(unexpected, [""; 0], "temporary files are left");
         let stderr = without_summary(&String::from_utf8(output.stderr).expect("UTF-8"));
         assert!(
             !stderr.contains("panicked") && !stderr.contains("backtrace"),

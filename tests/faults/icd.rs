@@ -46,9 +46,9 @@ const RTLD_NODELETE: c_int = 0x1000;
 static SUBMITS: AtomicU64 = AtomicU64::new(0);
 static SUBMITS_OF_DEVICE: AtomicU64 = AtomicU64::new(0);
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// The device is lost, and every function returns the loss.
+/// True once a function has returned the loss: every later call returns it, too.
 static LOST: AtomicBool = AtomicBool::new(false);
-/// The device is lost, but the function of `FAULTS_LOSE_IN` has not been called yet.
+/// True if the device is lost, but the function of `FAULTS_LOSE_IN` has not been called yet.
 static LOST_UNTOLD: AtomicBool = AtomicBool::new(false);
 /// Number of device creations still to fail.
 static TO_REFUSE: AtomicI64 = AtomicI64::new(-1);
@@ -102,7 +102,7 @@ macro_rules! replacements {
     ($($name:literal $($other:literal)* => $place:ident, $function:ident: fn($($ty:ty),*) -> $result:ty;)*) => {
         $(static $place: AtomicPtr<c_void> = AtomicPtr::new(null_mut());)*
 
-        /// Returns the replacement of a function of the driver, or the function.
+        /// Returns the replacement of a function of the driver, or the function itself.
         unsafe fn replaced(name: *const c_char, real: Function) -> Function {
             if real.is_null() {
                 return real;
@@ -204,7 +204,7 @@ fn lose(by: &str) -> Code {
     DEVICE_LOST
 }
 
-/// Returns true if `by` is the first function to return the pending loss.
+/// Returns true if `by` is the function that returns the pending loss first.
 fn tells(by: &str) -> bool {
     LOST_UNTOLD.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == by)
 }
@@ -251,7 +251,7 @@ unsafe extern "system" fn queue_submit_2(queue: Handle, count: u32, submits: Han
     unsafe { submit(queue, || real::queue_submit_2()(queue, count, submits, fence)) }
 }
 
-/// Returns the loss if the device is lost, or forwards.
+/// Returns the loss if the device is lost, and forwards the call otherwise.
 fn asked(by: &str, forward: impl FnOnce() -> Code) -> Code {
     if LOST.load(SeqCst) {
         return DEVICE_LOST;

@@ -20,7 +20,7 @@ fn render(scene: &Scene, device: Device) -> Picture {
     wgray::render(scene, &options).expect("an image")
 }
 
-/// Does nothing, except in the process that [`pictures_survive`] starts.
+/// Renders in the child process that [`pictures_survive`] starts; otherwise does nothing.
 #[test]
 fn in_a_process_of_its_own() {
     let Ok(file) = std::env::var(FILE) else { return };

@@ -152,7 +152,7 @@ fn a_permanently_lost_device_is_an_error_or_the_cpu_renders() {
     let ran = place.run_on(driver, &["--device", "auto", "--quiet"], &faults);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(ran.picture == Some(expected.clone()));
-    // A device that reopens late is waited for.
+    // The program waits for a device that reopens late.
     let late = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
     let ran = place.run_on(driver, &GPU, &late);
     assert_eq!((ran.code, ran.count("device refused")), (0, 2), "{}", ran.stderr);
@@ -166,7 +166,7 @@ fn repeated_losses_reach_a_limit() {
     let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
     // In the warm-up the device never becomes ready. In the samples it does, and each loss is reported.
-    let again = |lose: &str, told: usize| {
+    let again = |lose: &str, reopened: usize| {
         let place = TestFolder::of(SCENE);
         let ran = place.run_on(driver, &GPU, &[("FAULTS_LOSE", lose)]);
         assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{lose}");
@@ -176,16 +176,16 @@ fn repeated_losses_reach_a_limit() {
             "{lose}: {:?}",
             ran.log
         );
-        warned(&ran, told, &["error: llvmpipe"]);
+        warned(&ran, reopened, &["error: llvmpipe"]);
         let ran = place.run_on(driver, &AUTO, &[("FAULTS_LOSE", lose)]);
         assert_eq!((ran.code, ran.count("lost")), (0, 4), "{lose}: {}", ran.stderr);
-        warned(&ran, told, &["warning: rendering on the CPU: llvmpipe"]);
+        warned(&ran, reopened, &["warning: rendering on the CPU: llvmpipe"]);
         assert!(ran.picture == Some(expected.clone()), "{lose}");
     };
     std::thread::scope(|scope| {
-        for (lose, told) in [("every:1", 1), ("every:2", 3)] {
+        for (lose, reopened) in [("every:1", 1), ("every:2", 3)] {
             let again = &again;
-            scope.spawn(move || again(lose, told));
+            scope.spawn(move || again(lose, reopened));
         }
     });
 }
@@ -261,16 +261,16 @@ fn waiting_for_a_device_can_be_interrupted() {
     assert!(sent.elapsed() < Duration::from_millis(1500), "{:?}", sent.elapsed());
     assert_eq!(status.code(), Some(130));
     assert_eq!(refused(), 2, "it did not stop during the pause");
-    let mut told = String::new();
-    child.stderr.unwrap().read_to_string(&mut told).unwrap();
-    assert!(!told.contains("panicked"), "{told}");
+    let mut message = String::new();
+    child.stderr.unwrap().read_to_string(&mut message).unwrap();
+    assert!(!message.contains("panicked"), "{message}");
     assert!(!place.path("out.exr").exists());
 }
 
 /// Environment variable with the number of random cases.
 const CASES: &str = "WGRAY_TEST_FAULTS";
 
-/// Random faults, of devices that come back and of those that do not. `scripts/test-slow faults` runs many.
+/// Injects random faults into devices that can or cannot be re-opened. `scripts/test-slow faults` runs many cases.
 #[test]
 fn random_faults_do_not_change_the_image() {
     let Some(driver) = driver() else { return };

@@ -18,7 +18,7 @@ fn told(ran: &Ran, parts: &[&str]) {
 }
 
 #[test]
-fn a_film_that_does_not_fit_tells_its_size() {
+fn a_film_that_does_not_fit_is_reported_with_its_size() {
     let Some(driver) = driver() else { return };
     let place = TestFolder::of(SCENE);
     let (large, gpu) = (["--size", "1024x1024"], ["--device", "gpu"]);
@@ -30,7 +30,7 @@ fn a_film_that_does_not_fit_tells_its_size() {
     ];
     told(&ran, &parts);
     assert!(ran.count("allocation") > 0 && ran.log.iter().any(|line| line.ends_with("of 16777216 refused")));
-    // A crop fits, as does the whole film below a higher limit.
+    // A crop fits; with a higher limit, the whole film does.
     let crop = ["--size", "1024x1024", "--crop", "0,0,1024,64", "--device", "gpu"];
     let ran = place.run_on(driver, &crop, &[("FAULTS_LARGEST", "8388608")]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
@@ -53,7 +53,7 @@ fn a_film_that_does_not_fit_tells_its_size() {
 
 /// Fails each allocation in turn: those of opening the device, of the film and of the readbacks.
 #[test]
-fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
+fn exhausted_memory_is_reported_or_the_cpu_renders() {
     let Some(driver) = driver() else { return };
     let place = TestFolder::of(SCENE);
     let large = ["--size", "1024x1024"];
@@ -81,7 +81,7 @@ fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
 }
 
 #[test]
-fn a_scene_that_does_not_fit_tells_its_size() {
+fn a_scene_that_does_not_fit_is_reported_with_its_size() {
     let Some(driver) = driver() else { return };
     let textured = SCENE.replace("color = [0.5, 0.4, 0.3]", "color = { texture = \"large\" }")
         + "[textures.large]\ntype = \"image\"\nfile = \"large.png\"\n";
@@ -101,7 +101,7 @@ fn a_scene_that_does_not_fit_tells_its_size() {
 
 /// wgpu drops the device when a submit runs out of memory.
 #[test]
-fn a_call_that_has_no_memory_is_no_loss() {
+fn a_submit_without_memory_is_not_a_device_loss() {
     let Some(driver) = driver() else { return };
     let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);

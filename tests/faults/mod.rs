@@ -1,5 +1,5 @@
-//! The program and the library on a driver that loses its device, opens none, has no memory, or is slow: `icd.rs`, which hands
-//! all else on to lavapipe.
+//! The program and the library on a fault-injecting driver (`icd.rs`), which loses its device, opens none, runs out of
+//! memory or is slow, and otherwise forwards to lavapipe.
 
 mod driver;
 mod library;

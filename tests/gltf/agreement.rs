@@ -8,7 +8,7 @@ use super::read::scene_with;
 use crate::pictures::{Way, differing, exact_ways, reference, render};
 
 #[test]
-fn a_file_has_the_same_bits_on_both_paths() {
+fn a_file_has_the_same_bits_on_cpu_and_gpu() {
     let mut builder = Builder::new();
     let colors = builder.texture(
         2,
@@ -72,7 +72,7 @@ fn a_file_has_the_same_bits_on_both_paths() {
     for way in exact_ways().into_iter().filter(|way| *way == Way::Baked) {
         assert_eq!(differing(&render(&packed, way), &known), 0, "{way:?}");
     }
-    // The control.
+    // Control: another strength of the normal map.
     builder.get("materials")[material]["normalTexture"]["scale"] = json!(0.6);
     let mut other = scene_with(&builder.write(folder.path(), "other", Packing::Binary), "");
     (other.width, other.height) = (24, 24);

@@ -65,7 +65,7 @@ fn steps_stay_until_the_next_key() {
 }
 
 #[test]
-fn linear_values_go_straight_and_stay_beyond_their_keys() {
+fn linear_values_are_interpolated_and_clamped_beyond_their_keys() {
     let builder = moving(
         "translation",
         "LINEAR",
@@ -128,7 +128,7 @@ fn turns_go_the_shortest_way_at_constant_speed() {
 }
 
 #[test]
-fn turns_on_splines_are_normalized() {
+fn rotations_on_splines_are_normalized() {
     let (a, b) = (DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::Z, 2.0));
     let keys = [[0.0; 4], a.to_array(), [0.0; 4], [0.0; 4], b.to_array(), [0.0; 4]];
     let builder = moving("rotation", "CUBICSPLINE", &[0.0, 1.0], &keys);
@@ -139,7 +139,7 @@ fn turns_on_splines_are_normalized() {
 }
 
 #[test]
-fn turns_may_be_whole_numbers() {
+fn rotations_may_be_normalized_integers() {
     for component in [Component::I8, Component::U8, Component::I16, Component::U16] {
         let mut builder = Builder::new();
         let mesh = builder.quad(None);
@@ -161,7 +161,7 @@ fn turns_may_be_whole_numbers() {
 }
 
 #[test]
-fn an_animation_is_chosen_by_its_name_or_number() {
+fn an_animation_is_selected_by_its_name_or_number() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     let node = builder.root_node(json!({ "mesh": mesh }));
@@ -224,7 +224,7 @@ fn animations_of_different_properties_play_together() {
 }
 
 #[test]
-fn weights_of_targets_may_be_animated() {
+fn morph_target_weights_may_be_animated() {
     let mut builder = Builder::new();
     let attributes = builder.quad_attributes();
     let indices = builder.indices(&[0, 1, 2, 0, 2, 3]);
@@ -335,7 +335,7 @@ fn skinned_corners_follow_their_joints() {
 }
 
 #[test]
-fn the_place_of_a_skinned_node_is_ignored() {
+fn the_transform_of_a_skinned_node_is_ignored() {
     let mut builder = arm(Component::F32);
     builder.get("nodes")[2]["translation"] = json!([5, 6, 7]);
     assert_corners(&scene(&builder, "skin-moved-node"), &arm_corners(|p| p));
@@ -379,7 +379,7 @@ fn a_vertex_may_have_eight_joints() {
 }
 
 #[test]
-fn targets_come_before_joints() {
+fn morph_targets_are_applied_before_skinning() {
     let mut builder = arm(Component::F32);
     let target = builder.floats(&[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]);
     let mesh = &mut builder.get("meshes")[0];
@@ -394,7 +394,7 @@ fn targets_come_before_joints() {
 }
 
 #[test]
-fn a_pointer_to_what_is_not_animated_here_is_left_out() {
+fn pointers_to_unsupported_properties_are_ignored() {
     let mut builder = moving("translation", "STEP", &[0.0], &[[1.0, 0.0, 0.0]]);
     builder.uses("KHR_animation_pointer");
     let animation = &mut builder.get("animations")[0];

@@ -99,7 +99,7 @@ fn an_orthographic_camera_sees_twice_its_ymag() {
 }
 
 #[test]
-fn a_file_without_a_camera_is_in_the_picture() {
+fn a_file_without_a_camera_is_framed() {
     for (i, scale) in [
         [1.0, 1.0, 1.0],
         [1e-3, 1.0, 1.0],
@@ -130,7 +130,7 @@ fn a_file_without_a_camera_is_in_the_picture() {
                 most = most.max((to.dot(to_file(axis)) / away / (fov / 2.0).tan()).abs());
             }
         }
-        // Inside of the image, and at least half as large.
+        // The model is inside of the image and covers at least half of its extent.
         assert!(most < 1.0 && most > 0.5, "{scale:?}: {most}");
         assert!(to_file(camera.forward).z < 0.0, "{:?}", camera.forward);
     }

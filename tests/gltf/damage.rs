@@ -1,4 +1,4 @@
-//! Damaged parts of files: a stand-in with a warning, or an error under `strict`.
+//! Damaged glTF files: a stand-in with a warning, or an error under `strict`.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ fn load(file: &Path, strict: bool) -> Result<Scene, String> {
     Scene::load_with(file, &overrides).map_err(|error| error.to_string())
 }
 
-/// The triangles of all meshes.
+/// Returns the number of triangles of all meshes.
 fn triangles(scene: &Scene) -> usize {
     let meshes = wgray_render::pack::pack(scene).bvh.meshes;
     meshes.iter().map(|mesh| mesh.triangles.len()).sum()
@@ -93,7 +93,7 @@ fn triangles_without_a_position_are_left_out() {
         for value in [f64::NAN, f64::INFINITY, -2e9] {
             let mut builder = Builder::new();
             let mut points = QUAD.to_vec();
-            points.push([9.0, 9.0, 0.0]); // no triangle has it
+            points.push([9.0, 9.0, 0.0]); // an unused vertex
             points[bad][1] = value;
             let position = builder.attribute(Component::F32, false, &points);
             let indices = builder.indices(&QUAD_INDICES);
@@ -102,7 +102,7 @@ fn triangles_without_a_position_are_left_out() {
             builder.root_node(json!({ "mesh": mesh }));
             let whole = builder.quad(None);
             builder.root_node(json!({ "mesh": whole }));
-            // JSON has no NaN: the bounds are of what is sound.
+            // JSON has no NaN, so that the bounds are those of the valid vertices.
             builder.get("accessors")[position]["min"] = json!([-1, -1, 0]);
             builder.get("accessors")[position]["max"] = json!([9, 9, 0]);
             let file = builder.write_unsound(place.folder(), "positions", Packing::Binary);
@@ -148,7 +148,7 @@ fn a_node_may_have_any_scale() {
             "{scale}: {wide}"
         );
     }
-    // Nothing is left of what is too large.
+    // Triangles that a node scales beyond the coordinate limit are left out.
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh }));

@@ -39,7 +39,7 @@ fn a_buffer_in_the_file_beside_it_and_in_a_data_uri_is_the_same() {
 }
 
 #[test]
-fn indices_may_be_of_each_type() {
+fn indices_may_have_any_integer_type() {
     for component in [Component::U8, Component::U16, Component::U32] {
         let mut builder = Builder::new();
         let attributes = builder.quad_attributes();
@@ -51,7 +51,7 @@ fn indices_may_be_of_each_type() {
     }
 }
 
-/// Returns a value as a normalized integer stores it (glTF 2.0, 3.6.2.2; `KHR_mesh_quantization`).
+/// Returns a value after quantization to a normalized integer (glTF 2.0, 3.6.2.2; `KHR_mesh_quantization`).
 fn rounded(component: Component, value: f64) -> f64 {
     (value * component.one()).round() / component.one()
 }
@@ -87,7 +87,7 @@ fn positions_may_be_whole_numbers_of_each_type() {
 }
 
 #[test]
-fn texture_coordinates_may_be_of_each_type() {
+fn texture_coordinates_may_have_any_type() {
     let cases = [
         (Component::F32, false, false),
         (Component::U8, true, false),
@@ -124,7 +124,7 @@ fn texture_coordinates_may_be_of_each_type() {
 }
 
 #[test]
-fn normals_of_whole_numbers_are_unit_vectors() {
+fn normals_of_integer_types_are_unit_vectors() {
     for component in [Component::I8, Component::I16] {
         let mut builder = Builder::new();
         builder.requires("KHR_mesh_quantization");
@@ -263,7 +263,7 @@ fn sparse_accessors_replace_what_is_there_or_zeros() {
 }
 
 #[test]
-fn attributes_may_lie_between_each_other() {
+fn attributes_may_be_interleaved() {
     let mut builder = Builder::new();
     let mut flat = Vec::new();
     for (position, uv) in QUAD.iter().zip(QUAD_UVS) {
@@ -394,7 +394,7 @@ fn morph_targets_are_added_by_their_weights() {
 }
 
 #[test]
-fn a_file_by_itself_is_a_scene() {
+fn a_file_renders_without_a_scene() {
     let place = TestFolder::with_file("a", "");
     for packing in Packing::ALL {
         let file = quad().write(place.folder(), &format!("whole-{packing:?}"), packing);

@@ -77,7 +77,7 @@ fn spots_have_two_angles() {
 }
 
 #[test]
-fn a_light_that_many_nodes_have_is_many_lights() {
+fn each_node_of_a_light_is_a_light() {
     let mut builder = lit(json!({ "type": "point" }));
     for x in 0..3 {
         builder.root_node(json!({ "translation": [x, 0, 5], "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
@@ -87,13 +87,13 @@ fn a_light_that_many_nodes_have_is_many_lights() {
 }
 
 #[test]
-fn a_light_of_no_intensity_is_taken() {
+fn a_light_of_intensity_zero_is_accepted() {
     let scene = scene(&lit(json!({ "type": "point", "intensity": 0 })), "light-dark");
     assert!(scene.lights.len() <= 1);
 }
 
 #[test]
-fn a_rough_white_surface_under_lux_is_as_bright_as_the_formula_says() {
+fn a_rough_white_surface_under_lux_has_the_closed_form_radiance() {
     // Without specular reflection at an IOR of 1 the BRDF is albedo / pi.
     let mut builder = Builder::new();
     builder.uses("KHR_lights_punctual");
@@ -137,7 +137,7 @@ fn a_rough_white_surface_under_lux_is_as_bright_as_the_formula_says() {
 }
 
 #[test]
-fn a_file_with_lights_is_lit_by_these() {
+fn a_file_with_lights_has_no_default_environment() {
     let place = TestFolder::with_file("a", "");
     let file = lit(json!({ "type": "point" })).write(place.folder(), "lights-alone", Packing::Binary);
     let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));

@@ -160,7 +160,7 @@ fn extensions_of_what_reflects_are_taken() {
 }
 
 #[test]
-fn specular_and_glossiness_of_older_files_become_a_dielectric() {
+fn specular_glossiness_materials_become_dielectrics() {
     let values =
         json!({ "diffuseFactor": [0.1, 0.2, 0.3, 0.5], "specularFactor": [0.04, 0.08, 1], "glossinessFactor": 0.75 });
     let scene = scene(
@@ -170,7 +170,7 @@ fn specular_and_glossiness_of_older_files_become_a_dielectric() {
     let principled = principled(&scene);
     assert_near(plain_color(principled.base_color), [0.1, 0.2, 0.3]);
     assert_near([plain(principled.metallic), plain(principled.roughness)], [0.0, 0.25]);
-    // F0 is the specular color times that of the IOR.
+    // F0 is the specular color times the F0 of the IOR.
     let head_on = ((principled.ior - 1.0) / (principled.ior + 1.0)).powi(2);
     assert_near(
         plain_color(principled.specular_color).map(|x| x * head_on),
@@ -179,7 +179,7 @@ fn specular_and_glossiness_of_older_files_become_a_dielectric() {
 }
 
 #[test]
-fn a_coat_may_have_a_normal_map_of_its_own() {
+fn a_clearcoat_may_have_its_own_normal_map() {
     let mut builder = Builder::new();
     builder.uses("KHR_materials_clearcoat");
     let maps = [[204, 128, 226, 255], [128, 204, 226, 255]].map(|texel| builder.plain_texture(texel));
@@ -216,7 +216,7 @@ fn what_is_unlit_has_its_base_color() {
 }
 
 #[test]
-fn polished_metal_in_white_light_has_its_base_color() {
+fn smooth_metal_in_a_white_environment_has_its_base_color() {
     // At normal incidence Schlick's Fresnel term is the base color.
     let metal = json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.25, 0.5, 0.75, 1], "roughnessFactor": 0 } });
     assert_all(&scene(&quad_of(metal), "metal"), [0.25, 0.5, 0.75]);

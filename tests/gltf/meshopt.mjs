@@ -1,12 +1,13 @@
-// Makes crates/scene/src/gltf/meshopt/streams.txt: streams by the encoder of npm's meshoptimizer, and what its decoder makes of them.
+// Writes crates/scene/src/gltf/meshopt/streams.txt: streams encoded by npm's meshoptimizer, with the results of its
+// decoder.
 //
 //     npm install meshoptimizer@1.3.0
 //     node tests/gltf/meshopt.mjs > crates/scene/src/gltf/meshopt/streams.txt
 //
-// With a number behind it, so many streams of random kinds are made, too many to be kept.
+// With a number as argument, generates that many random streams instead, for tests that do not store them.
 //
-// A line is: name, mode, filter, stride, count, the stream in base64, and what it decodes to: in base64 where a filter may
-// round, else as its FNV-1a hash of 64 bits.
+// Each line contains: name, mode, filter, stride, count, the stream in base64, and the decoded bytes: in base64 for
+// filters, whose results may be rounded, otherwise as their 64-bit FNV-1a hash.
 
 import { createRequire } from "node:module";
 import path from "node:path";
@@ -15,7 +16,7 @@ const { MeshoptDecoder, MeshoptEncoder } = createRequire(path.join(process.cwd()
 await Promise.all([MeshoptDecoder.ready, MeshoptEncoder.ready]);
 
 let state = 1;
-// Whole numbers below `count`, the same in every run (a linear congruential generator of 32 bits).
+// Returns an integer below `count` from a 32-bit linear congruential generator, the same in every run.
 function random(count) {
 	state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
 	return Math.floor((state / 2 ** 32) * count);
@@ -37,11 +38,11 @@ function line(name, mode, filter, stride, count, stream) {
 	console.log([name, mode, filter, stride, count, base64(stream), wanted].join(" "));
 }
 
-// Elements of a kind, as bytes.
+// Generators of the elements of a kind, as bytes.
 const KINDS = {
 	zeros: (count, stride) => new Uint8Array(count * stride),
 	random: (count, stride) => Uint8Array.from({ length: count * stride }, () => random(256)),
-	// Bytes that change little, some of them much at times.
+	// Bytes with small changes and occasional large ones.
 	smooth: (count, stride) => {
 		const now = Uint8Array.from({ length: stride }, () => random(256));
 		return Uint8Array.from({ length: count * stride }, (_, i) => {
@@ -66,7 +67,7 @@ const KINDS = {
 		}
 		return new Uint8Array(values.buffer);
 	},
-	// The lowest bits of every float are zero.
+	// Floats whose lowest bits are zero.
 	rounded: (count, stride) => {
 		const bytes = KINDS.floats(count, stride);
 		const words = new Uint32Array(bytes.buffer);
@@ -81,7 +82,7 @@ function attributes(kind, stride, count, level, version) {
 	line(`${kind}-${stride}-${count}-${level}-v${version}`, "ATTRIBUTES", "NONE", stride, count, stream);
 }
 
-// Triangles of a grid, each row one way, and some that have nothing to do with it.
+// Returns the triangles of a grid, row by row, and `strays` random triangles between them.
 function grid(side, strays) {
 	const indices = [];
 	for (let y = 0; y < side; y++) {
@@ -105,7 +106,7 @@ function indices(name, all, mode, stride) {
 	line(name, mode, "NONE", stride, typed.length, encode(bytes, typed.length, stride));
 }
 
-// Random unit vectors of so many dimensions, one of the axes among them, and a fourth number.
+// Returns random unit vectors, some along an axis. Vectors of three dimensions get 1 or -1 as fourth component.
 function units(count, dimensions) {
 	const values = [];
 	for (let i = 0; i < count; i++) {

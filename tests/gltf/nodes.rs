@@ -66,7 +66,7 @@ fn mirrored_things_keep_their_outside() {
 }
 
 #[test]
-fn nodes_that_are_flat_are_left_out() {
+fn degenerate_nodes_are_left_out() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh, "scale": [0, 0, 0] }));
@@ -75,7 +75,7 @@ fn nodes_that_are_flat_are_left_out() {
 }
 
 #[test]
-fn what_a_scale_flattens_is_there() {
+fn flattened_meshes_are_kept() {
     let flattened = |scale: [f64; 3]| {
         let mut builder = Builder::new();
         let mesh = builder.quad(None);
@@ -151,7 +151,7 @@ fn instances_of_a_node_are_below_it() {
 }
 
 #[test]
-fn instances_may_be_turned_by_whole_numbers() {
+fn instance_rotations_may_be_normalized_integers() {
     let mut builder = Builder::new();
     builder.requires("EXT_mesh_gpu_instancing");
     let mesh = builder.quad(None);
@@ -197,7 +197,7 @@ fn one_of_several_scenes_is_shown() {
 }
 
 #[test]
-fn nodes_that_go_in_circles_are_refused() {
+fn cyclic_nodes_are_rejected() {
     let mut builder = two_scenes();
     builder.get("nodes")[0]["children"] = json!([1]);
     builder.get("nodes")[1]["children"] = json!([0]);
@@ -210,7 +210,7 @@ fn nodes_that_go_in_circles_are_refused() {
 }
 
 #[test]
-fn a_long_chain_of_nodes_is_followed() {
+fn long_chains_of_nodes_are_supported() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     let mut node = builder.add("nodes", json!({ "mesh": mesh, "translation": [0.001, 0, 0] }));
@@ -253,7 +253,7 @@ fn names_may_be_missing_or_equal() {
 }
 
 #[test]
-fn a_file_may_be_moved_turned_and_scaled() {
+fn a_file_may_be_translated_rotated_and_scaled() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh, "translation": [1, 0, 0] }));

@@ -318,7 +318,7 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
 }
 
 #[test]
-fn files_that_would_wait_or_never_end_are_none() {
+fn pipes_and_devices_are_not_read() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     super::seeds::put(folder);
@@ -428,7 +428,7 @@ fn what_acts_on_a_terminal_is_shown() {
         assert_eq!((ran.code, ran.said.lines().count()), (3, 1), "{text:?}: {}", ran.said);
         assert!(!ran.said.contains('\u{202e}'), "{}", ran.said);
     }
-    // The name of the file.
+    // Control characters in the name of the file.
     let name = "a\u{1b}[31m\nerror: b.toml";
     fs::copy(folder.join("plain.toml"), folder.join(name)).unwrap();
     let ran = run(folder, &["check", name]);

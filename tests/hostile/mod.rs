@@ -85,7 +85,7 @@ fn run(folder: &Path, arguments: &[&str]) -> Ran {
     }
 }
 
-/// Renders a scene at 8 x 6 pixels.
+/// Renders a scene with 8 x 6 pixels.
 fn render(folder: &Path, scene: &str) -> Ran {
     render_with(folder, scene, &[])
 }

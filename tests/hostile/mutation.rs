@@ -57,7 +57,7 @@ fn bytes_changed(bytes: &mut Vec<u8>, random: &Random) {
             }
             6 => drop(bytes.splice(at..at + length.min(3), random.pick(&TEXTS).iter().copied())),
             _ if random.once_in(8) => bytes.truncate(at),
-            // The next number of a text.
+            // Replaces the next number of a text.
             _ => {
                 let is_digit = |byte: &u8| byte.is_ascii_digit() || b".-".contains(byte);
                 if let Some(start) = bytes[at..].iter().position(is_digit).map(|start| at + start) {
@@ -144,7 +144,7 @@ fn changed_files_are_read_or_told() {
                 How::Part => vec![run(folder, &["merge", &file, "-o", "out.exr", "-o", "out.png", "-q"])],
             }
         };
-        // The control.
+        // Control: the original file is accepted.
         for ran in meet(&kind.bytes) {
             assert!(
                 [0, 1, 5].contains(&ran.code) && (ran.code == 0 || matches!(kind.how, How::Picture(_))),
@@ -168,8 +168,8 @@ fn changed_files_are_read_or_told() {
                 longest = longest.max(ran.seconds);
             }
         }
-        let told: Vec<String> = codes.iter().map(|(code, count)| format!("{count} x {code}")).collect();
-        println!("| {} | {count} | {} | {longest:.1} s |", kind.ending, told.join(", "));
+        let counts: Vec<String> = codes.iter().map(|(code, count)| format!("{count} x {code}")).collect();
+        println!("| {} | {count} | {} | {longest:.1} s |", kind.ending, counts.join(", "));
         put(folder);
     }
 }

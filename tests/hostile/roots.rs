@@ -73,7 +73,7 @@ fn is_refused(ran: &Ran, name: &str) {
 }
 
 #[test]
-fn a_scene_names_nothing_outside() {
+fn a_scene_reads_no_file_outside_the_asset_root() {
     let (outer, folder) = place();
     let material = "\n[materials.m]\ntype = 'diffuse'\ncolor = [1, 1, 1]\n";
     let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
@@ -113,7 +113,7 @@ fn a_scene_names_nothing_outside() {
 }
 
 #[test]
-fn a_gltf_file_names_nothing_outside() {
+fn a_gltf_file_reads_no_file_outside_the_asset_root() {
     let (outer, folder) = place();
     let (json, binary) = triangle();
     for ending in ["bin", "png"] {
@@ -145,7 +145,7 @@ fn a_gltf_file_names_nothing_outside() {
 }
 
 #[test]
-fn a_mesh_names_nothing_outside() {
+fn a_mesh_reads_no_file_outside_the_asset_root() {
     let (outer, folder) = place();
     fs::write(
         folder.join("a.toml"),

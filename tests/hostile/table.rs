@@ -24,7 +24,7 @@ fn texts(folder: &Path, all: &mut String) {
 #[test]
 fn every_limit_in_the_table_has_a_message_and_a_test() {
     let docs = fs::read_to_string(project("docs/reliability.md")).unwrap();
-    let section = docs.split("## Files from strangers").nth(1).unwrap();
+    let section = docs.split("## Untrusted files").nth(1).unwrap();
     let section = section.split("\n## ").next().unwrap();
     let mut all = [String::new(), String::new()];
     for folder in ["src", "crates"] {

@@ -8,7 +8,7 @@ use super::load;
 use super::readers::in_all_formats;
 use crate::random::Random;
 
-/// File name, contents, error.
+/// File name, contents, expected error.
 const BAD: &[(&str, &str, &str)] = &[
     ("a.fbx", "", "a.fbx: the name of a mesh must end in .obj, .ply or .stl"),
     ("a", "", "a: the name of a mesh must end in .obj, .ply or .stl"),
@@ -177,9 +177,9 @@ const BAD: &[(&str, &str, &str)] = &[
 ];
 
 #[test]
-fn bad_files_are_told() {
-    for (name, text, told) in BAD {
-        assert_eq!(load(name, text, None).unwrap_err(), *told, "{text:?}");
+fn invalid_files_are_reported() {
+    for (name, text, message) in BAD {
+        assert_eq!(load(name, text, None).unwrap_err(), *message, "{text:?}");
     }
 }
 
@@ -189,11 +189,11 @@ fn ply(vertex: &str, face: &str, lines: &str) -> String {
 }
 
 #[test]
-fn bad_ply_bodies_are_told() {
+fn invalid_ply_bodies_are_reported() {
     let vertex = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
     let face = "element face 1\nproperty list char int vertex_indices\n";
     let points = "0 0 0\n1 0 0\n0 1 0\n";
-    for (text, told) in [
+    for (text, message) in [
         (ply("", face, ""), "a.ply: the header must have an element \"vertex\""),
         (
             ply(vertex, "", points),
@@ -265,7 +265,7 @@ fn bad_ply_bodies_are_told() {
         ),
     ] {
         let error = load("a.ply", &text, None).unwrap_err();
-        assert_eq!(error, told, "{text}");
+        assert_eq!(error, message, "{text}");
     }
 }
 
@@ -275,7 +275,7 @@ fn counts_without_bytes_are_refused_at_once() {
     let xyz = "property float x\nproperty float y\nproperty float z\n";
     let face = "element face 1\nproperty list int int vertex_indices\n";
     for format in ["ascii", "binary_little_endian"] {
-        for (elements, told) in [
+        for (elements, message) in [
             (vertex("99999999999", xyz) + face, "must be at most 1073741824"),
             (
                 vertex("99999999999999999999", xyz) + face,
@@ -299,7 +299,7 @@ fn counts_without_bytes_are_refused_at_once() {
                 "0 0 0 0 0 0 ".repeat(4)
             );
             let error = load("a.ply", text, None).unwrap_err();
-            assert!(error.contains(told), "{error}");
+            assert!(error.contains(message), "{error}");
         }
     }
     // A list, and a triangle count, that exceed the file.
@@ -326,7 +326,7 @@ fn counts_without_bytes_are_refused_at_once() {
 }
 
 #[test]
-fn what_is_no_file_is_told() {
+fn unusable_paths_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("none.obj");
     let error = Mesh::load(&path, None).unwrap_err();
@@ -379,7 +379,7 @@ fn check(name: &str, result: Result<Mesh, String>) -> bool {
 const ALL_NORMALS: [Option<Normals>; 4] = [None, Some(Normals::Smooth), Some(Normals::Flat), Some(Normals::File)];
 
 #[test]
-fn files_that_are_cut_anywhere_are_meshes_or_errors() {
+fn truncated_files_are_meshes_or_errors() {
     for (name, bytes) in good_files() {
         let mut errors = 0;
         for end in 0..=bytes.len() {
@@ -440,16 +440,16 @@ fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
 }
 
 #[test]
-fn materials_that_are_cut_anywhere_are_scenes() {
+fn truncated_material_files_are_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let scenes = (0..=MTL.len()).filter(|end| check_mtl(folder.path(), &MTL.as_bytes()[..*end]));
     let last = MTL.find("b c").unwrap() + 3;
-    // From the end of the second name on.
+    // Both materials are defined once the file contains the end of the second name.
     assert_eq!(scenes.collect::<Vec<_>>(), (last..=MTL.len()).collect::<Vec<_>>());
 }
 
 #[test]
-fn materials_with_random_bytes_are_scenes() {
+fn material_files_with_random_bytes_are_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let random = Random::new(17);
     let long = [b"newmtl ".as_slice(), &[b'x'; 5000], b"\nmap_Kd ", &[b'y'; 5000], b"\n"].concat();

@@ -1,4 +1,4 @@
-//! Bounds of meshes that are away from the origin, compared with the vertices of the file in f64.
+//! Bounds of meshes away from the origin, compared with the vertices of the file in f64.
 
 use serde_json::json;
 use wgray::DVec3;
@@ -7,7 +7,7 @@ use wgray::scene::Scene;
 use crate::gltf::build::{Builder, Packing, QUAD};
 use crate::random::Random;
 
-/// The box around points that were computed independently.
+/// Returns the bounding box of points that were computed independently.
 fn around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
         (low.min(p), high.max(p))
@@ -18,7 +18,7 @@ fn assert_bounds(scene: &Scene, truth: (DVec3, DVec3), what: &str) {
     let (low, high) = scene.bounds().expect("bounds");
     let size = (truth.1 - truth.0).max_element();
     for (found, expected) in [(low, truth.0), (high, truth.1)] {
-        // Positions have 24 bits.
+        // Stored positions have 24 significant bits.
         let error = (found - expected).abs().max_element();
         assert!(error <= 1e-6 * size, "{what}: {found} must be {expected}");
     }
@@ -28,7 +28,7 @@ const HEAD: &str = "image = { width = 4, height = 4 }\n\
                     camera = { position = [0, -5, 0], look_at = [0, 0, 0], fov = 40 }\n\
                     materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }\n";
 
-/// The file of a cloud of triangles around a point, and its vertices.
+/// Returns an OBJ file with random triangles around a point, and their vertices.
 fn cloud(random: &Random, center: DVec3, size: f64) -> (String, Vec<DVec3>) {
     let coordinate = || size * random.between(-1.0, 1.0);
     let points: Vec<DVec3> = (0..30)
@@ -45,7 +45,7 @@ fn cloud(random: &Random, center: DVec3, size: f64) -> (String, Vec<DVec3>) {
 }
 
 #[test]
-fn meshes_away_from_the_origin_have_their_bounds() {
+fn meshes_away_from_the_origin_have_exact_bounds() {
     let random = Random::new(81);
     let folder = tempfile::tempdir().unwrap();
     for (i, (center, size)) in [
@@ -62,7 +62,7 @@ fn meshes_away_from_the_origin_have_their_bounds() {
         let path = folder.path().join("scene.toml");
         let file = format!("file = '{i}.obj'\n");
         let placed = "material = 'm'\nscale = [2, 1, -3]\nrotate = [0, 0, 90]\ntranslate = [5, 6, 7]\n";
-        // x' = -y, y' = x of what is scaled.
+        // The scaled coordinates are rotated by 90 degrees around z: x' = -y, y' = x.
         let placement = |p: &DVec3| DVec3::new(-p.y + 5.0, 2.0 * p.x + 6.0, -3.0 * p.z + 7.0);
 
         let shape = format!("{HEAD}[[shapes]]\ntype = 'mesh'\n{file}{placed}");
@@ -84,7 +84,7 @@ fn meshes_away_from_the_origin_have_their_bounds() {
 }
 
 #[test]
-fn gltf_files_have_their_bounds() {
+fn gltf_files_have_exact_bounds() {
     let folder = tempfile::tempdir().unwrap();
     let mut file = Builder::new();
     let moved = QUAD.map(|[x, y, z]| [x + 20.0, y - 7.0, z + 3.0]);
@@ -93,7 +93,7 @@ fn gltf_files_have_their_bounds() {
     file.root_node(json!({ "mesh": mesh, "translation": [1, 2, 3], "scale": [2, 2, 2] }));
     let path = file.write(folder.path(), "away", Packing::Binary);
     let scene = Scene::load(&path).unwrap();
-    // glTF's (x, y, z) is (x, -z, y) here.
+    // glTF's (x, y, z) is (x, -z, y) in scene coordinates.
     let placed = |[x, y, z]: [f64; 3]| DVec3::new(2.0 * x + 1.0, -(2.0 * z + 3.0), 2.0 * y + 2.0);
     assert_bounds(&scene, around(moved.into_iter().map(placed)), "glTF");
 }

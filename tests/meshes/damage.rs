@@ -1,4 +1,4 @@
-//! Damaged mesh files: what can be used is, with a warning that names the first damage and its stand-in.
+//! Damaged mesh files: the valid parts are used, with a warning that names the first damage and its replacement.
 
 use super::{corners, load};
 
@@ -6,7 +6,7 @@ const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 const FIRST: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]];
 
 #[test]
-fn damaged_lines_of_obj_files_have_stand_ins() {
+fn damaged_lines_of_obj_files_are_replaced() {
     for (lines, note) in [
         (
             "v nan 0 0\nf 1 2 3\n",
@@ -65,7 +65,7 @@ fn damaged_lines_of_obj_files_have_stand_ins() {
 }
 
 #[test]
-fn facets_of_an_stl_file_without_its_end_are_kept() {
+fn facets_of_a_truncated_stl_file_are_kept() {
     let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n";
     let mesh = load("a.stl", format!("solid a\n{facet}"), None).unwrap();
     assert_eq!(corners(&mesh), [FIRST]);
@@ -74,7 +74,7 @@ fn facets_of_an_stl_file_without_its_end_are_kept() {
 }
 
 #[test]
-fn nothing_but_damage_is_an_error() {
+fn files_without_a_valid_face_are_errors() {
     for (text, message) in [
         ("v 0 0 nan\nf 1 1 1\n", "a.obj:1: z: NaN must be from -1e9 to 1e9"),
         (
@@ -99,7 +99,7 @@ fn ply(vertices: &str, faces: &str) -> String {
 const POINTS: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
 
 #[test]
-fn damaged_rows_of_ply_files_have_stand_ins() {
+fn damaged_rows_of_ply_files_are_removed() {
     for (vertices, faces, note) in [
         (
             "0 0 0\n1 0 0\n1 1 0\n0 nan 0\n",
@@ -148,7 +148,7 @@ fn ply_lines_may_have_more_values_than_declared() {
             "line 10: the line has more values than the header declares; the other values were ignored (3 more like this)"
         ]
     );
-    // Rows over several lines, and several rows on a line.
+    // A row may span several lines, and a line may contain several rows.
     for points in [POINTS.replace("1 1 0", "1 1\n\n0"), POINTS.replace("\n1", " 1")] {
         let text = ply(POINTS, "3 0 1 2\n").replace(POINTS, &points);
         let mesh = load("a.ply", text, None).unwrap();
@@ -200,7 +200,7 @@ fn obj_files_may_have_colors() {
     let text = "v 0 0 0 1 0 0.5\nv 1 0 0 0 1 0 1\nv 1 1 0 0.5\nf 1 2 3\n";
     let mesh = load("a.obj", text, None).unwrap();
     let colors: Vec<[f32; 4]> = mesh.colors.iter().map(|color| color.to_array()).collect();
-    // 0.5 as sRGB, by a table; a vertex without a color is white.
+    // 0.5 decoded from sRGB by a table is 0.214; a vertex without a color is white.
     assert_eq!(colors[0][..2], [1.0, 0.0]);
     assert!((colors[0][2] - 0.214_041).abs() < 1e-6);
     assert_eq!(colors[1..], [[0.0, 1.0, 0.0, 1.0], [1.0; 4]]);

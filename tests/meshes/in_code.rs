@@ -1,4 +1,4 @@
-//! Meshes that are made in code: edited clones, and rules that they break.
+//! Meshes built in code: edited clones, and violations of the rules.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use wgray::mesh::{Group, Mesh};
 use wgray::scene::{Assets, MeshDescription, PerspectiveDescription, PhongDescription, Scene};
 use wgray::{Aov, Channel, DVec3, Description, Device, Options};
 
-/// A square in the plane z = 0, seen by [`scene`]'s camera.
+/// Returns a square in the plane z = 0, visible to the camera of [`scene`].
 fn square() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.positions = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
@@ -35,7 +35,7 @@ fn scene(mesh: Arc<Mesh>) -> Result<Scene, String> {
         .map_err(|problem| problem.to_string())
 }
 
-/// The distance of what is in the middle of the image.
+/// Returns the depth at the center of the image.
 fn depth(mesh: &Arc<Mesh>) -> f32 {
     let options = Options {
         device: Device::Cpu,
@@ -50,7 +50,7 @@ fn depth(mesh: &Arc<Mesh>) -> f32 {
 }
 
 #[test]
-fn an_edited_clone_is_rendered_as_it_is() {
+fn an_edited_clone_is_rendered_with_its_edits() {
     let first = Arc::new(square());
     assert!((depth(&first) - 5.0).abs() < 0.1);
     let lower = |mesh: &mut Mesh| mesh.positions.iter_mut().for_each(|p| p.z -= 2.0);
@@ -72,7 +72,7 @@ fn an_edited_clone_is_rendered_as_it_is() {
 }
 
 #[test]
-fn the_tree_of_a_mesh_is_kept() {
+fn the_bvh_of_a_mesh_is_cached() {
     let mesh = Arc::new(square());
     let pack = || wgray_render::pack::pack(&scene(Arc::clone(&mesh)).unwrap());
     let [a, b] = [pack(), pack()];
@@ -165,17 +165,17 @@ fn broken_rules_are_errors() {
 }
 
 #[test]
-fn odd_meshes_that_break_no_rule_are_rendered() {
+fn unusual_but_valid_meshes_are_rendered() {
     let depth = |edit: fn(&mut Mesh)| {
         let mut mesh = square();
         edit(&mut mesh);
         depth(&Arc::new(mesh))
     };
     let expected = depth(|_| {});
-    // Triangles without an area, and the same ones many times.
+    // Triangles of zero area, and duplicate triangles.
     assert_eq!(depth(|m| m.triangles.extend([[0, 0, 0], [0, 1, 1]])), expected);
     assert_eq!(depth(|m| m.triangles = m.triangles.repeat(5000)), expected);
     assert_eq!(depth(|m| m.group_of = vec![0, 0]), expected);
-    // A vertex of no triangle.
+    // An unused vertex.
     assert_eq!(depth(|m| m.positions.push(glam::Vec3::splat(-0.5))), expected);
 }

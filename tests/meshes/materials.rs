@@ -1,4 +1,4 @@
-//! Materials of MTL files under `path`, with the extensions for physically based rendering.
+//! Materials of MTL files under the integrator `path`, including the extensions for physically based rendering.
 
 use std::fs;
 use std::path::Path;
@@ -19,7 +19,7 @@ fn write(folder: &Path, mtl: &str) {
     clear.save(folder.join("clear.png")).unwrap();
 }
 
-/// The material of a mesh with this MTL file, and the notes.
+/// Returns the material of a mesh with this MTL file, and the notes.
 fn material(mtl: &str) -> (Material, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), mtl);
@@ -70,7 +70,7 @@ fn defaults_are_a_rough_surface_without_highlights() {
         );
         assert_eq!(material.emission, Color::BLACK);
     }
-    // A sharper highlight is a smoother surface.
+    // A higher exponent, with a sharper highlight, is a smoother surface.
     let roughness = |exponent: f64| match principled(&material(&format!("Ks 1\nNs {exponent}\n")).0).roughness {
         Value::Plain(roughness) => roughness,
         other => panic!("{other:?}"),
@@ -78,14 +78,14 @@ fn defaults_are_a_rough_surface_without_highlights() {
     assert_eq!(roughness(0.0), 1.0);
     assert!((roughness(30.0) - 0.5).abs() < 1e-12);
     assert!(roughness(1000.0) < 0.25);
-    // Transparency is the rest of opacity.
+    // `Tr` is 1 - opacity.
     assert_eq!(principled(&material("Tr 0.25\n").0).alpha, Value::Plain(0.75));
-    // MeshLab writes this for an opaque material.
+    // MeshLab writes `Tr 1` for an opaque material.
     assert_eq!(principled(&material("Tr 1.000000\n").0).alpha, Value::Plain(1.0));
 }
 
 #[test]
-fn maps_stand_in_for_values() {
+fn maps_replace_values() {
     let (material, notes) = material(
         "map_Kd color.png\nmap_Ke color.png\nmap_Pr gray.png\nmap_Pm color.png\nmap_d clear.png\nnorm color.png\n",
     );
@@ -97,7 +97,8 @@ fn maps_stand_in_for_values() {
     assert!(matches!(principled.metallic, Value::Texture(_, Channel::R)));
     assert!(matches!(principled.alpha, Value::Texture(_, Channel::A)));
     assert_eq!(principled.alpha_mode, AlphaMode::Blend);
-    // The texels of normals and of metals are linear: they are one texture, and the colors another one.
+    // The texels of the normal map and of `metallic` are linear and share a texture; colors are sRGB and need another
+    // one.
     let Value::Texture(metallic, _) = principled.metallic else {
         unreachable!("it is a texture")
     };
@@ -106,7 +107,7 @@ fn maps_stand_in_for_values() {
 }
 
 #[test]
-fn maps_of_bumps_are_normals_or_noted() {
+fn bump_maps_are_normal_maps_or_noted() {
     let (colored, notes) = material("map_Bump color.png\n");
     assert!(colored.normal_map.is_some() && notes.is_empty(), "{notes:?}");
     let (gray, notes) = material("bump gray.png\n");
@@ -120,7 +121,7 @@ fn maps_of_bumps_are_normals_or_noted() {
 }
 
 #[test]
-fn strict_refuses_missing_maps() {
+fn strict_rejects_missing_maps() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), "map_Kd none.png\n");
     let overrides = Overrides {
@@ -134,7 +135,7 @@ fn strict_refuses_missing_maps() {
         path.display()
     );
     assert!(message.starts_with(&start) && !message.contains("ignored"), "{message}");
-    // Images that exist and cannot be used.
+    // Images that exist but cannot be used.
     fs::create_dir(folder.path().join("folder.png")).unwrap();
     for (map, rule) in [("folder.png", "must be a file"), ("../none.png", "cannot be read")] {
         write(folder.path(), &format!("map_Kd {map}\n"));
@@ -145,7 +146,7 @@ fn strict_refuses_missing_maps() {
 }
 
 #[test]
-fn strict_refuses_missing_materials() {
+fn strict_rejects_missing_materials() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.obj"), OBJ).unwrap();
     let path = folder.path().join("a.obj");

@@ -1,4 +1,4 @@
-//! Mesh files that are rendered without a scene, and files that cannot be.
+//! Mesh files that are rendered without a scene, and files that cannot be rendered.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn load(path: &Path) -> Result<(Scene, Description), String> {
     Scene::load_described(path, &Overrides::default()).map_err(|error| error.to_string())
 }
 
-/// The share of pixels that show something else than the background, by alpha.
+/// Returns the mean alpha: the fraction of the image that the model covers.
 fn coverage(scene: &Scene) -> f64 {
     let options = Options {
         device: Device::Cpu,
@@ -51,7 +51,7 @@ fn mesh_files_of_all_formats_are_framed() {
 }
 
 #[test]
-fn a_mesh_stands_upright() {
+fn a_mesh_is_upright_by_default() {
     let folder = tempfile::tempdir().unwrap();
     let tall = "v 0 0 0\nv 0.1 0 0\nv 0 9 1\nf 1 2 3\n";
     let path = folder.path().join("tall.OBJ");
@@ -66,7 +66,7 @@ fn a_mesh_stands_upright() {
 }
 
 #[test]
-fn the_upright_may_be_another_axis() {
+fn any_axis_may_be_up() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
     fs::write(&path, "v 0 0 0\nv 1 2 0\nv 0 0 5\nf 1 2 3\n").unwrap();
@@ -85,7 +85,7 @@ fn the_upright_may_be_another_axis() {
 }
 
 #[test]
-fn colors_of_vertices_are_shown() {
+fn vertex_colors_are_shown() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
     for (text, expected) in [
@@ -124,14 +124,14 @@ fn the_description_of_a_mesh_is_the_same_scene() {
     assert_eq!((&again.materials, &again.camera), (&scene.materials, &scene.camera));
     assert_eq!(again.render, scene.render);
     assert_eq!(scene.material_names, ["red", "default"]);
-    // Files that the mesh names are part of the scene.
+    // Files that the mesh refers to are files of the scene, too.
     let has = |name: &str| scene.files.iter().any(|file| file.ends_with(name));
     assert!(has("a.obj") && has("a.mtl"), "{:?}", scene.files);
     assert!(matches!(scene.shapes[0].geometry, Geometry::Mesh { .. }));
 }
 
 #[test]
-fn what_cannot_be_a_scene_is_named() {
+fn unsupported_files_are_rejected_with_a_hint() {
     let folder = tempfile::tempdir().unwrap();
     for (name, message) in [
         ("a.fbx", ".fbx is not supported; export glTF (.glb), OBJ, PLY or STL"),
@@ -168,7 +168,7 @@ fn what_cannot_be_a_scene_is_named() {
 }
 
 #[test]
-fn models_of_all_sizes_are_framed_or_refused_by_their_size() {
+fn models_are_framed_or_rejected_by_their_size() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
     for (size, is_framed) in [("1e-12", false), ("1e-6", true), ("1e7", true), ("9e8", false)] {
@@ -207,7 +207,7 @@ fn files_with_names_in_another_case_are_found_or_suggested() {
     let (scene, _) = load(&folder.path().join("a.obj")).unwrap();
     assert_eq!(scene.notes, Vec::<String>::new());
     assert_eq!(scene.material_names, ["red"]);
-    // The same in a folder whose name differs too, beside a folder of the wanted name.
+    // The same with a folder whose name differs in case, next to a folder of the exact name.
     fs::create_dir_all(folder.path().join("Sub/M.mtl")).unwrap();
     write("Sub/m.mtl", "newmtl red\nKd 1 0 0\n");
     write(
@@ -219,12 +219,12 @@ fn files_with_names_in_another_case_are_found_or_suggested() {
     let text = "image = { width = 4, height = 4 }\ncamera = { position = [0, -5, 0], look_at = [0, 0, 0], fov = 40 }\n\
                 [render]\nintegrator = 'path'\n[environment]\nfile = 'red.MTL'\n";
     write("s.toml", text);
-    let told = load(&folder.path().join("s.toml")).unwrap_err();
-    assert!(told.ends_with("; did you mean \"RED.mtl\"?"), "{told}");
+    let message = load(&folder.path().join("s.toml")).unwrap_err();
+    assert!(message.ends_with("; did you mean \"RED.mtl\"?"), "{message}");
 }
 
 #[test]
-fn strict_refuses_damage() {
+fn strict_rejects_damage() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
     fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n").unwrap();
@@ -259,7 +259,7 @@ fn strict_refuses_damage() {
 }
 
 #[test]
-fn options_of_gltf_files_are_refused() {
+fn options_of_gltf_files_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.stl");
     fs::write(&path, "solid").unwrap();

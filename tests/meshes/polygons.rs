@@ -1,4 +1,4 @@
-//! Polygons become triangles that cover exactly them, compared with point-in-polygon tests.
+//! Triangulation of polygons: the triangles cover exactly the polygon, compared with point-in-polygon tests.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use wgray::mesh::Mesh;
 use super::{corners, load};
 use crate::random::Random;
 
-/// An OBJ file of one polygon.
+/// Returns an OBJ file with one polygon.
 fn polygon(points: &[DVec3]) -> String {
     let vertices = points.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
     let face = (1..=points.len()).map(|i| format!(" {i}"));
@@ -19,7 +19,7 @@ fn flat(points: &[[f64; 2]]) -> Vec<DVec3> {
     points.iter().map(|[x, y]| DVec3::new(*x, *y, 0.0)).collect()
 }
 
-/// The area vectors of the triangles.
+/// Returns the area vectors of the triangles.
 fn areas(mesh: &Mesh) -> Vec<DVec3> {
     let area = |[a, b, c]: [[f64; 3]; 3]| {
         let [a, b, c] = [a, b, c].map(DVec3::from);
@@ -35,7 +35,7 @@ fn is_inside(points: &[DVec3], [x, y]: [f64; 2]) -> bool {
     crossings.count() % 2 == 1
 }
 
-/// Checks that the triangles cover a simple polygon once, and nothing else; all have its orientation.
+/// Checks that the triangles cover a simple polygon exactly once, with its orientation.
 fn assert_covers(mesh: &Mesh, points: &[DVec3], what: &str) {
     let random = Random::new(5);
     let triangles: Vec<Vec<DVec3>> = (corners(mesh).iter())
@@ -48,7 +48,7 @@ fn assert_covers(mesh: &Mesh, points: &[DVec3], what: &str) {
         let count = triangles.iter().filter(|triangle| is_inside(triangle, at)).count();
         wrong += usize::from(count != usize::from(is_inside(points, at)));
     }
-    // Positions are rounded to 32 bits.
+    // Positions are rounded to f32, which may misclassify a point at an edge.
     assert!(wrong <= 1, "{what}: {wrong} points");
     let whole: DVec3 = areas(mesh).into_iter().sum();
     assert!(
@@ -92,7 +92,7 @@ fn ply_polygons_are_covered() {
     assert_covers(&load("a.ply", text, None).unwrap(), &flat(&L), "PLY");
 }
 
-/// A star-shaped polygon: simple, with as many corners and as ragged as one likes.
+/// Returns a star-shaped polygon with `count` corners at random radii from `least` to 1; it is simple.
 fn star(random: &Random, count: usize, least: f64) -> Vec<DVec3> {
     let corner = |i: usize| {
         let (sin, cos) = (TAU * i as f64 / count as f64).sin_cos();
@@ -109,7 +109,7 @@ fn random_polygons_are_covered() {
         let mesh = load("a.obj", polygon(&points), None).unwrap();
         assert_covers(&mesh, &points, &format!("{round}"));
         assert!(mesh.notes.is_empty(), "{round}: {:?}", mesh.notes);
-        // In another plane the area is the same.
+        // The area is the same in another plane.
         let [u, v] = [DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.48, 0.8, 0.36)];
         let turned: Vec<DVec3> = points.iter().map(|p| u * p.x + v * p.y).collect();
         let other = load("a.obj", polygon(&turned), None).unwrap();
@@ -131,7 +131,7 @@ fn ten_thousand_corners_are_covered() {
 }
 
 #[test]
-fn convex_polygons_stay_fans() {
+fn convex_polygons_are_fans() {
     let regular = |count: usize| {
         let turn = |i: usize| TAU * i as f64 / count as f64;
         (0..count)
@@ -147,7 +147,7 @@ fn convex_polygons_stay_fans() {
 }
 
 #[test]
-fn odd_polygons_are_noted() {
+fn degenerate_polygons_are_noted() {
     let notes = |points: &[DVec3]| match load("a.obj", polygon(points), None) {
         Ok(mesh) => mesh.notes.iter().map(ToString::to_string).collect(),
         Err(message) => vec![message],
@@ -171,7 +171,7 @@ fn odd_polygons_are_noted() {
         |height: f64| [[0.0, 0.0, height], [1.0, 0.0, 0.0], [1.0, 1.0, height], [0.0, 1.0, 0.0]].map(DVec3::from);
     assert_eq!(notes(&saddle(0.5)), ["1 polygon is not planar; split into triangles"]);
     assert!(notes(&saddle(0.01)).is_empty());
-    // Points that coincide, on a line, and no area at all.
+    // Duplicate and collinear points, and polygons of zero area.
     let doubled = flat(&[
         [0.0, 0.0],
         [2.0, 0.0],
@@ -205,7 +205,7 @@ fn random_corners_are_meshes_or_errors() {
     for round in 0..400 {
         let count = 3 + round % 90;
         let scale = [1.0, 1e-6, 1e8, 1e-30][round % 4];
-        // Few different values: many coincide or are on a line.
+        // Few distinct values, so that many points coincide or are collinear.
         let coordinate = || match round % 3 {
             0 => f64::from(random.below(4)) * scale,
             _ => random.between(-1.0, 1.0) * scale,

@@ -125,12 +125,12 @@ fn all_formats_have_the_same_triangles() {
 }
 
 #[test]
-fn obj_corners_may_have_all_forms() {
+fn obj_corners_may_have_any_form() {
     let text = "# a square\r\nv 0 0 0 1.0 0.5 0.5\r\nv 1 0 0 1\nv 1 1 0\n\tv 0 1 0 # the last one\nvt 0 0\nvt 1 0 0\nvt 1\n\
                 vn 0 0 2\nf 1 2 \\\n 3\nf -4/1 -2/3/1 \\\r\n  4//1\ncurv 0 1 \\\n 2 3\ns off\nl 1 2\n";
     let mesh = load("a.obj", text, None).unwrap();
     assert_eq!(corners(&mesh), TWO_TRIANGLES);
-    // Corners without texture coordinates have vertices of their own.
+    // A corner without texture coordinates does not share its vertex with one that has them.
     assert_eq!(mesh.positions.len(), 6);
     let uvs: Vec<[f32; 2]> = mesh.uvs.iter().map(|uv| uv.to_array()).collect();
     assert_eq!(uvs[3..], [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]);
@@ -139,7 +139,7 @@ fn obj_corners_may_have_all_forms() {
 }
 
 #[test]
-fn obj_vertices_are_shared_where_all_is_equal() {
+fn equal_obj_corners_share_a_vertex() {
     let text =
         format!("{SQUARE}vt 0 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/2/1 4/1/1\nf 4/1/1 3/2/1 1/1/1\n");
     let mesh = load("a.obj", &text, None).unwrap();
@@ -154,7 +154,7 @@ fn obj_vertices_are_shared_where_all_is_equal() {
 }
 
 #[test]
-fn lines_may_end_as_on_old_macs() {
+fn lines_may_end_with_carriage_returns() {
     let text = format!("mtllib none\\.mtl # a\n{SQUARE}g a b\nf 1 2 \\\n3\nf 1 3 4\n");
     let expected = load("a.obj", &text, None).unwrap();
     let mesh = load("a.obj", text.replace('\n', "\r"), None).unwrap();
@@ -294,7 +294,7 @@ fn materials_come_from_the_folder_of_the_mesh() {
 }
 
 #[test]
-fn materials_may_be_named_by_paths_of_other_machines() {
+fn material_files_may_have_paths_of_other_machines() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("in")).unwrap();
     std::fs::write(folder.path().join("a b.mtl"), "newmtl a\n").unwrap();
@@ -403,7 +403,7 @@ fn stl_solids_are_groups() {
 }
 
 #[test]
-fn binary_stl_is_told_by_its_size() {
+fn binary_stl_is_recognized_by_its_size() {
     let (_, bytes) = in_all_formats().pop().unwrap();
     assert!(bytes.starts_with(b"solid"));
     let mut longer = bytes.clone();
@@ -439,7 +439,7 @@ fn smooth_normals_are_weighted_by_angles() {
 }
 
 #[test]
-fn normals_that_cancel_are_those_of_the_triangles() {
+fn normals_that_cancel_are_replaced_by_those_of_the_triangles() {
     let text = format!("{SQUARE}vt 0.5 0.5\nf 1/1 2/1 3/1\nf 3/1 2/1 1/1\n");
     let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
     assert_eq!(mesh.positions.len(), 6);
@@ -470,7 +470,7 @@ fn normals_of_a_file_without_any_are_an_error() {
 }
 
 #[test]
-fn a_mesh_far_away_keeps_its_digits() {
+fn a_mesh_far_from_the_origin_keeps_its_precision() {
     let text = "v 500000.001 -3 4\nv 500000.002 -3 4\nv 500000.002 -3 4.0009765625\nv -9e8 0 0\nf 1 2 3\n";
     let mesh = load("a.obj", text, None).unwrap();
     for (corner, x) in corners(&mesh)[0].iter().zip([500_000.001, 500_000.002, 500_000.002]) {
@@ -484,7 +484,7 @@ fn a_mesh_far_away_keeps_its_digits() {
 }
 
 #[test]
-fn surfaces_that_are_odd_are_noted() {
+fn inconsistent_surfaces_are_noted() {
     let text = format!("{SQUARE}v 0 0 1\nf 1 2 3\nf 1 4 3\nf 1 5 3\n");
     let mesh = load("a.obj", text, None).unwrap();
     assert_eq!(
@@ -492,6 +492,6 @@ fn surfaces_that_are_odd_are_noted() {
         ["1 edge is shared by more than two triangles (non-manifold mesh); rendered unchanged"]
     );
     let mesh = load("a.obj", format!("{SQUARE}f 1 2 3\nf 1 4 3\n"), None).unwrap();
-    let told = "1 edge has inconsistent winding order (its triangles face opposite sides); rendered unchanged";
-    assert_eq!(mesh.notes, [told]);
+    let note = "1 edge has inconsistent winding order (its triangles face opposite sides); rendered unchanged";
+    assert_eq!(mesh.notes, [note]);
 }

@@ -64,7 +64,7 @@ struct Found {
     wrong_light: usize,
     hits: usize,
     shadows: usize,
-    /// Neither certainly in shadow nor certainly lit.
+    /// Pixels that are neither certainly in shadow nor certainly lit.
     open: usize,
 }
 
@@ -120,7 +120,7 @@ fn inner(form: &Form) -> f64 {
 }
 
 #[test]
-fn a_sphere_of_triangles_is_nearly_a_sphere() {
+fn a_fine_triangle_mesh_approximates_a_sphere() {
     let fine = Form::icosphere(6);
     assert_eq!(fine.triangles.len(), 81_920);
     let fine_inner = inner(&fine);
@@ -135,7 +135,7 @@ fn a_sphere_of_triangles_is_nearly_a_sphere() {
         (0, 0, 0),
         "{result:?}"
     );
-    // The control: a coarse mesh fails these bounds without normals, and satisfies its own with normals.
+    // Control: a coarse mesh fails these bounds without normals, and satisfies its own with normals.
     let coarse = Form::icosphere(2);
     let wrong = found(&coarse, fine_inner, "flat");
     assert!(
@@ -150,9 +150,9 @@ fn a_sphere_of_triangles_is_nearly_a_sphere() {
     );
 }
 
-/// No light passes a triangle from behind, at any angle.
+/// Checks that no light passes a triangle from behind, at any angle.
 #[test]
-fn no_light_comes_into_a_closed_mesh() {
+fn no_light_enters_a_closed_mesh() {
     for detail in [1, 2, 4] {
         let form = Form::icosphere(detail);
         for camera in ["[0.2, -0.5, 1.6]", "[-0.3, 0.1, 0.8]", "[0, 0.6, 1.2]"] {

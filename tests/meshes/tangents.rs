@@ -222,13 +222,13 @@ fn largest_step(packed: &Packed) -> f32 {
 }
 
 #[test]
-fn a_picture_shows_no_triangles() {
+fn an_image_shows_no_triangles() {
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0.2, 1, -0.7]\ncolor = [1, 1, 1]";
     // The camera faces the seam.
     let shape = format!("rotate = [0, 0, -80]\n{light}");
     let mut packed = leaning(&Sheet::sphere(16, 8).obj(), "", &shape);
     let found = largest_step(&packed);
-    // The control: tangents per triangle.
+    // Control: tangents per triangle.
     packed.bvh.instances[0].tangents = NO_INDEX;
     let by_triangle = largest_step(&packed);
     println!("steps of {found}, {by_triangle} without tangents");
@@ -236,7 +236,7 @@ fn a_picture_shows_no_triangles() {
 }
 
 #[test]
-fn mirrored_texture_coordinates_are_not_averaged_with_others() {
+fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
     // A bent sheet whose u increases from the middle in both directions.
     let mut sheet = Sheet::of(8, 4, |u, v| {
         let (sin, cos) = (u - 0.5).sin_cos();

@@ -461,7 +461,7 @@ fn soups() -> Packed {
 }
 
 #[test]
-fn trees_leave_out_no_hit_and_no_shadow() {
+fn bvhs_miss_no_hit_and_no_shadow() {
     for (name, scene, rays) in [
         ("soups", soups(), 6000),
         ("knots", scenes::packed(&scenes::scene("twisted-tube.toml")), 600),
@@ -491,7 +491,7 @@ fn differing_between(a: &Packed, b: &Packed, rays: u32) -> [u32; 2] {
 }
 
 #[test]
-fn any_other_tree_gives_the_same_bits() {
+fn any_other_bvh_gives_the_same_bits() {
     let random = Random::new(2);
     for (name, scene) in [
         ("soups", soups()),
@@ -520,7 +520,7 @@ fn a_tree_whose_boxes_are_too_small_is_found() {
 }
 
 #[test]
-fn trees_of_random_scenes_leave_out_nothing() {
+fn bvhs_of_random_scenes_miss_nothing() {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::description();
     let mut with_tree = 0;

@@ -105,7 +105,7 @@ fn colors_of_vertices_are_interpolated() {
                 }
                 assert!((found[2] - 0.25 * factor).abs() < 1e-5, "{way:?}: {found:?}");
             }
-            // White without colors.
+            // Without vertex colors the emission is white.
             for found in means(&render(&plain, way)) {
                 assert!(found.iter().all(|x| (x - factor).abs() < 1e-5), "{way:?}: {found:?}");
             }
@@ -114,7 +114,7 @@ fn colors_of_vertices_are_interpolated() {
 }
 
 #[test]
-fn colors_beyond_one_are_bounded_where_they_make_light() {
+fn reflectances_of_colors_above_one_are_clamped() {
     let folder = tempfile::tempdir().unwrap();
     let bright = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(4.0, 0.5, 1e6, 1.0); mesh.positions.len()];
     let material = |keys: &str| {
@@ -190,7 +190,7 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
 }
 
 #[test]
-fn what_shines_by_its_vertices_lights_so() {
+fn emission_from_vertex_colors_lights_a_floor() {
     // A floor lit by constant emission, or by equal emission from vertex colors; with equal samples.
     let folder = tempfile::tempdir().unwrap();
     let text = |keys: &str| {
@@ -245,7 +245,7 @@ fn with_sets(mesh: &mut Mesh) {
 }
 
 #[test]
-fn textures_lie_by_their_set_of_coordinates() {
+fn textures_use_their_set_of_coordinates() {
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("t.exr"), 8, 8, |x, y| {
         [
@@ -315,7 +315,7 @@ fn textures_lie_by_their_set_of_coordinates() {
 }
 
 #[test]
-fn a_set_that_a_mesh_has_not_is_one_point() {
+fn a_missing_set_of_coordinates_is_a_single_point() {
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("t.exr"), 4, 4, |x, y| [x as f32, y as f32, 1.0]);
     let text = format!(
@@ -336,7 +336,7 @@ fn a_set_that_a_mesh_has_not_is_one_point() {
 }
 
 #[test]
-fn factors_are_multiplied_onto_what_images_give() {
+fn factors_are_multiplied_by_the_texels() {
     let folder = tempfile::tempdir().unwrap();
     write_png(&folder.path().join("t.png"), 2, 2, |_, _| [255, 51, 102]);
     image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 255, 255, 51]))
@@ -383,7 +383,7 @@ fn factors_are_multiplied_onto_what_images_give() {
 }
 
 #[test]
-fn factors_and_sets_that_cannot_be_are_told() {
+fn invalid_factors_and_sets_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 255, 255, 51]))
         .save(folder.path().join("a.png"))
@@ -455,7 +455,7 @@ fn factors_and_sets_that_cannot_be_are_told() {
 }
 
 #[test]
-fn the_camera_goes_through_backs_alone() {
+fn only_camera_rays_skip_back_faces() {
     let folder = tempfile::tempdir().unwrap();
     // A wall that occludes a floor from an area light behind the camera, whichever side faces it.
     let text = |height: f64, side: &str, transform: &str| {
@@ -591,7 +591,7 @@ fn colors_of_ply_files_are_read() {
 }
 
 #[test]
-fn directions_of_facets_are_those_of_an_image() {
+fn anisotropy_directions_come_from_an_image() {
     let folder = tempfile::tempdir().unwrap();
     let text = |keys: &str| {
         format!(
@@ -643,7 +643,7 @@ fn directions_of_facets_are_those_of_an_image() {
 }
 
 #[test]
-fn images_that_give_no_directions_are_told() {
+fn images_without_directions_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     write_png(&folder.path().join("t.png"), 2, 2, |_, _| [255, 51, 102]);
     let message = |texture: &str| {

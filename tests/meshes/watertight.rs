@@ -179,7 +179,7 @@ fn convex() -> [(&'static str, Form); 4] {
 }
 
 #[test]
-fn no_ray_passes_a_closed_mesh() {
+fn no_ray_passes_through_a_closed_mesh() {
     let mut total = 0;
     for (name, form) in convex() {
         let obj = form.obj(None, None);
@@ -218,7 +218,7 @@ fn a_hole_in_a_mesh_is_found() {
     }
 }
 
-/// The test of standalone triangles is not watertight.
+/// Negative control: the intersection test of standalone triangles is not watertight.
 #[test]
 fn standalone_triangles_are_not_watertight() {
     let form = Form::icosphere(2);
@@ -238,7 +238,7 @@ fn standalone_triangles_are_not_watertight() {
 
 /// Not convex: rays at an edge whose triangles face them must hit there or before, rays from inside anywhere.
 #[test]
-fn no_ray_passes_the_knot() {
+fn no_ray_passes_through_the_knot() {
     let knot = std::fs::read_to_string(sources::path("scenes/meshes/knot.obj")).expect("the knot");
     for place in &PLACES[..4] {
         let packed = placed(&knot, place);
@@ -251,7 +251,7 @@ fn no_ray_passes_the_knot() {
         );
         assert_eq!((outside.1, inside.1), (0, 0), "{place:?}");
     }
-    // The control: every 50th triangle is removed.
+    // Control: every 50th triangle is removed.
     let mut gone = 0;
     let few = knot.lines().filter(|line| {
         gone += u32::from(line.starts_with("f "));

@@ -1,4 +1,4 @@
-// Controls of the page that must not write by accident, and that say why they are disabled.
+// Controls of the page: they never write by accident, and disabled ones show the reason.
 
 import assert from "node:assert/strict";
 import fs from "node:fs";

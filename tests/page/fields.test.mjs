@@ -279,11 +279,11 @@ test("an error disappears with its value, and an emptied box shows its value aga
   const radius = box(page, "shapes[0].radius", 1);
   await radius.fill("-1");
   await page.keyboard.press("Enter");
-  const told = page.locator('[data-path="shapes[0].radius"] .bad');
-  await told.filter({ hasText: "must be finite and greater than 0" }).waitFor();
+  const error = page.locator('[data-path="shapes[0].radius"] .bad');
+  await error.filter({ hasText: "must be finite and greater than 0" }).waitFor();
   studio.edit("scene.toml", "# a small scene", "# another");
   await says(radius, "0.5");
-  await told.waitFor({ state: "hidden" });
+  await error.waitFor({ state: "hidden" });
   for (const control of [radius, page.locator("#exposure-number")]) {
     const value = await control.inputValue();
     await control.focus();
@@ -350,14 +350,14 @@ test("a count of cells steps from square to square", async () => {
   await page.keyboard.press("PageUp");
   await count(169); // ten squares up
   // A typed number is sent as it is; the error stays until a valid one is typed.
-  const told = page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" });
+  const error = page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" });
   await field.fill("5");
   await page.keyboard.press("Enter");
-  await told.waitFor();
+  await error.waitFor();
   await page.locator("#notice.bad", { hasText: "square" }).waitFor();
   await field.fill("9");
   await page.keyboard.press("Enter");
-  await told.waitFor({ state: "hidden" });
+  await error.waitFor({ state: "hidden" });
   await page.locator("#notice").waitFor({ state: "hidden" });
   await count(9);
   await page.locator("#most-samples").fill("1.5");
@@ -405,7 +405,8 @@ test("the focus of a control that is disabled or removed stays near, and returns
   await page.getByRole("button", { name: "Delete view 1" }).focus();
   await page.keyboard.press("Enter");
   assert.ok(await isFocused(page.locator("#bookmarks")));
-  // Without a connection all controls are disabled. Afterwards the same control has the focus, unless the user has moved it.
+  // Without a connection all controls are disabled. Afterwards the same control has the focus, unless the user has
+  // moved the focus.
   for (const [moves, wanted] of [[[], "#pause"], [["Tab"], "#save-png"]]) {
     await page.locator("#pause").focus();
     await studio.stop();

@@ -1,4 +1,5 @@
-// The image of the page: frames are acknowledged, a wipe is dragged, invalid pixels are found, the camera never sticks.
+// The image of the page: frames are acknowledged, the wipe can be dragged, invalid pixels are located, and the camera
+// always responds.
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";

@@ -101,12 +101,12 @@ test("an invalid value is reported at its control, and the file stays", async ()
   await choose(page, "shapes[0]");
   await box(page, "shapes[0].radius", 1).fill("-1");
   await page.keyboard.press("Enter");
-  const told = page.locator('[data-path="shapes[0].radius"] .bad');
-  await told.filter({ hasText: "must be finite and greater than 0" }).waitFor();
+  const error = page.locator('[data-path="shapes[0].radius"] .bad');
+  await error.filter({ hasText: "must be finite and greater than 0" }).waitFor();
   assert.equal(studio.read("scene.toml"), SCENE);
   await box(page, "shapes[0].radius", 1).fill("0.25");
   await page.keyboard.press("Enter");
-  await told.waitFor({ state: "hidden" });
+  await error.waitFor({ state: "hidden" });
   await holds("radius = 0.25");
 });
 

@@ -173,11 +173,11 @@ test("a pixel's linear value is read under the pointer", async () => {
   await image.hover({ position: { x: Number(left) + 60.5, y: Number(top) + 45.5 } });
   await page.locator("#values", { hasText: "pixel 60 45" }).waitFor();
   const linear = /linear RGB ([\d.e+-]+) +([\d.e+-]+) +([\d.e+-]+)/.exec(await text(page, "#values"));
-  const told = /shown (\d+) (\d+) (\d+)/.exec(await text(page, "#values"));
+  const match = /shown (\d+) (\d+) (\d+)/.exec(await text(page, "#values"));
   const encoded = linear.slice(1).map((v) => Math.round(255 * Math.min(1, Number(v)) ** (1 / 2.2)));
   const at = 3 * (45 * width + 60);
   assert.deepEqual(encoded, bytes.split(",").slice(at, at + 3).map(Number));
-  assert.deepEqual(told.slice(1).map(Number), encoded);
+  assert.deepEqual(match.slice(1).map(Number), encoded);
 });
 
 test("all views differ, and the GPU agrees with the CPU", async () => {

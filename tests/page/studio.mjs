@@ -209,8 +209,8 @@ export async function finished(page, after = 0) {
   return handle.jsonValue();
 }
 
-// Waits until all commands of the page, and at least `commands` commands of all viewers, are executed and shown; returns the
-// number of executed commands.
+// Waits until all commands of the page, and at least `commands` commands of all viewers, are executed and shown;
+// returns the number of executed commands.
 export async function settled(page, commands = 0) {
   await page.waitForFunction((commands) => window.isSettled(commands), commands);
   return page.evaluate(() => Number(document.getElementById("panels").dataset.heard));

@@ -104,7 +104,7 @@ fn touching_and_grazing_lights_give_finite_values() {
 }
 
 #[test]
-fn long_paths_end() {
+fn long_paths_terminate() {
     // A closed mirror without absorption: each path reaches the maximum depth.
     let text = |color: &str| {
         format!(

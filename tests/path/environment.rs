@@ -231,7 +231,7 @@ const EMITTERS: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5],
     [[shapes]]\ntype = 'sphere'\nmaterial = 'source'\ncenter = [-0.5, 0, 0.3]\nradius = 0.2\n";
 
 #[test]
-fn light_and_bsdf_sampling_of_the_map_agree() {
+fn light_and_bsdf_sampling_of_the_map_have_equal_means() {
     if adapter::device().is_none() {
         return;
     }
@@ -272,7 +272,7 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
 }
 
 #[test]
-fn light_of_the_map_and_of_lights_adds_up() {
+fn the_light_of_map_and_lights_adds_up() {
     let image = sunny();
     let lights = "[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n\
                  [[lights]]\ntype = 'directional'\ndirection = [1, 2, -3]\ncolor = [1, 1, 0.5]\n\

@@ -62,7 +62,7 @@ fn images_of_every_kind_are_read() {
 }
 
 #[test]
-fn what_is_wrong_is_told_with_its_place() {
+fn errors_are_reported_with_their_location() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     write_exr(&path("good.exr"), 4, 2, |_, _| [0.5; 3]);
@@ -81,7 +81,7 @@ fn what_is_wrong_is_told_with_its_place() {
     )
     .unwrap();
     let rule = "the values of each must be finite, from 0 to 1e6";
-    for (environment, told) in [
+    for (environment, message) in [
         ("", "4: environment: must have exactly one of \"color\", \"file\" and \"name\"".to_owned()),
         (
             "color = [1, 1, 1]\nfile = 'good.exr'",
@@ -143,9 +143,9 @@ fn what_is_wrong_is_told_with_its_place() {
             "6: environment.sun_azimuth: 400 must be from -360 to 360".to_owned(),
         ),
     ] {
-        assert_eq!(load(folder.path(), environment).unwrap_err(), told, "{environment}");
+        assert_eq!(load(folder.path(), environment).unwrap_err(), message, "{environment}");
     }
-    let told = |environment: &str| load(folder.path(), environment).unwrap_err();
+    let error = |environment: &str| load(folder.path(), environment).unwrap_err();
     for (environment, start) in [
         (
             "file = 'none.exr'",
@@ -154,7 +154,7 @@ fn what_is_wrong_is_told_with_its_place() {
         ("file = 'zero.hdr'", "5: environment.file: \"zero.hdr\" "),
         ("file = '../up.exr'", "5: environment.file: \"../up.exr\" "),
     ] {
-        assert!(told(environment).starts_with(start), "{}", told(environment));
+        assert!(error(environment).starts_with(start), "{}", error(environment));
     }
     for good in [
         "file = 'good.exr'\nscale = 1e6\nrotate = -360\nvisible = false",
@@ -169,7 +169,7 @@ fn what_is_wrong_is_told_with_its_place() {
 }
 
 #[test]
-fn named_surroundings_are_made_quickly() {
+fn generated_environments_are_fast() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["studio", "sky"] {
         let start = std::time::Instant::now();

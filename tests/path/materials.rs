@@ -216,7 +216,7 @@ fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
 }
 
 #[test]
-fn a_white_surface_in_white_light_is_white_or_darker() {
+fn white_furnaces_stay_white_or_get_darker_for_every_bsdf() {
     for lobes in all() {
         for wo in viewers() {
             let reflected = lobes.albedo(wo);
@@ -245,7 +245,7 @@ fn a_white_surface_in_white_light_is_white_or_darker() {
 }
 
 #[test]
-fn light_has_the_same_way_back() {
+fn reflection_is_reciprocal() {
     // Turquin's factor depends only on wo and is not reciprocal.
     for lobes in all().into_iter().filter(|lobes| !(lobes.whole && lobes.has_facets())) {
         for wo in viewers() {
@@ -266,7 +266,7 @@ fn light_has_the_same_way_back() {
 
 /// Refracted radiance scales with the squared index: Veach's thesis, equation 5.14.
 #[test]
-fn refracted_light_has_the_same_way_back() {
+fn refraction_is_reciprocal_up_to_the_squared_index() {
     for lobes in all().iter().filter(|lobes| lobes.material.kind == ROUGH_GLASS) {
         let n = lobes.material.ior;
         let other = Material {
@@ -293,7 +293,7 @@ fn refracted_light_has_the_same_way_back() {
 }
 
 #[test]
-fn densities_integrate_to_one() {
+fn pdfs_integrate_to_one() {
     for lobes in all() {
         for wo in viewers() {
             let total = integral(wo, |wi| f64::from(lobes.pdf(wo, wi)));
@@ -392,7 +392,7 @@ fn directions_are_as_frequent_as_their_density_says() {
 }
 
 #[test]
-fn a_sample_is_worth_what_it_reflects() {
+fn mean_sample_weights_equal_the_albedo() {
     // The mean of eval / pdf is the albedo by quadrature.
     for lobes in all() {
         for wo in viewers() {

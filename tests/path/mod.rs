@@ -1,5 +1,4 @@
-//! The integrator `path`: materials by their own laws, scenes whose light mathematics knows, and that every way to sample
-//! light finds the same.
+//! The integrator `path`: BSDF tests, scenes with closed-form radiance, and equal means of all sampling strategies.
 
 mod alpha;
 mod ends;
@@ -19,7 +18,7 @@ use wgray_render::records::Packed;
 
 use crate::scenes;
 
-/// A scene of the path tracer from the rest of its text: 16 x 16 pixels, so many samples of each.
+/// Returns a path-traced scene of 16 x 16 pixels with `samples` samples each; `rest` is the remaining text.
 pub fn scene(samples: u32, depth: u32, rest: &str) -> Packed {
     scenes::parse(&format!(
         "image = {{ width = 16, height = 16 }}\n{rest}\n\
@@ -27,7 +26,7 @@ pub fn scene(samples: u32, depth: u32, rest: &str) -> Packed {
     ))
 }
 
-/// The mean of a film's pixels, by channel.
+/// Returns the mean of the pixels of a film, per channel.
 pub fn mean(film: &wgray_render::film::Film) -> [f64; 3] {
     let count = film.sums.len() as f64;
     let sum = film.means().fold([0.0; 3], |sum: [f64; 3], mean| {

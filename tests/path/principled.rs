@@ -161,7 +161,7 @@ fn white_furnaces_stay_white_or_get_darker() {
 }
 
 #[test]
-fn densities_integrate_to_what_is_sampled() {
+fn pdfs_integrate_to_the_fraction_of_valid_samples() {
     for (name, material) in grid() {
         for wo in [direction(0.95, 0.4), direction(0.3, 2.5)] {
             let m = mixture(&material, wo);
@@ -181,7 +181,7 @@ fn densities_integrate_to_what_is_sampled() {
 }
 
 #[test]
-fn samples_are_worth_what_is_reflected() {
+fn mean_sample_weights_equal_the_principled_albedo() {
     for (name, material) in grid() {
         for wo in viewers() {
             let m = mixture(&material, wo);
@@ -269,7 +269,7 @@ fn directions_are_as_frequent_as_their_density_says() {
 }
 
 #[test]
-fn a_layer_by_itself_is_the_material_it_should_be() {
+fn each_layer_equals_its_standalone_bsdf() {
     for wo in viewers() {
         for wi in [direction(0.9, 1.0), direction(0.4, 3.0), direction(0.05, 5.0)] {
             // Without metal and specular reflection: bit-identical to `diffuse`.
@@ -325,7 +325,7 @@ fn metal_f64(f0: DVec3, alpha: f64, wo: DVec3, wi: DVec3) -> DVec3 {
 }
 
 #[test]
-fn flat_lobes_are_deltas_and_nothing_is_ever_no_number() {
+fn smooth_lobes_are_deltas_and_all_values_are_finite() {
     let smooth = Material {
         roughness: 0.0,
         transmission: 1.0,
@@ -417,7 +417,7 @@ fn picture_of(keys: &str, textures: &str) -> wgray_render::records::Packed {
 }
 
 #[test]
-fn numbers_come_from_the_channels_of_a_texture() {
+fn values_come_from_the_channels_of_a_texture() {
     let texture = |kind: &str| match kind {
         "constant" => "[textures.t]\ntype = 'constant'\ncolor = [0.75, 0.5, 0.25]",
         _ => "[textures.t]\ntype = 'checker'\neven = [0.75, 0.5, 0.25]\nodd = [0.75, 0.5, 0.25]",
@@ -447,8 +447,8 @@ fn numbers_come_from_the_channels_of_a_texture() {
 }
 
 #[test]
-fn what_breaks_a_rule_is_told() {
-    let told = |keys: &str| {
+fn invalid_parameters_are_reported() {
+    let validate = |keys: &str| {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }}\n\
              render = {{ integrator = 'path' }}\ntextures.t = {{ type = 'checker', even = [1, 1, 1], odd = [0, 0, 0] }}\n\
@@ -500,7 +500,7 @@ fn what_breaks_a_rule_is_told() {
         ),
         ("coat = 1", "materials.m.coat: unknown key"),
     ] {
-        let found = told(keys).expect_err(keys);
+        let found = validate(keys).expect_err(keys);
         assert!(found.contains(message), "{keys}: {found}");
     }
     for keys in [
@@ -509,6 +509,6 @@ fn what_breaks_a_rule_is_told() {
         "attenuation_color = [0, 1, 1e-30]\nattenuation_distance = 1e-6\nthickness = 0.1",
         "specular_color = [1e6, 0, 0]\nior = 100\nanisotropy = 1\nanisotropy_rotation = -360",
     ] {
-        assert_eq!(told(keys), Ok(()), "{keys}");
+        assert_eq!(validate(keys), Ok(()), "{keys}");
     }
 }

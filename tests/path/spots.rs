@@ -36,7 +36,7 @@ fn expected(at: [f64; 2], height: f64, cone: f64, inner: f64, is_path: bool) -> 
 }
 
 #[test]
-fn a_spot_lights_a_floor_as_the_formula_says() {
+fn a_spot_lights_a_floor_as_documented() {
     for (integrator, cone, inner) in [
         ("path", 40.0, 10.0),
         ("path", 60.0, 0.0),

@@ -293,7 +293,6 @@ fn weighted_moments_of_a_constant_are_zero() {
         moments.truncate().abs().max_element() < 1e-12 && moments.w == 7.0,
         "{moments}"
     );
-    // The control.
     let other = moments_with(moments, sum, Vec4::new(0.3, 0.2, 0.6, 1.0));
     assert!(other.z > 1e-3);
 }

@@ -101,7 +101,7 @@ fn tables_have_the_moments_of_their_filters() {
                     (found - expected).abs() < 3e-3 * radius.powi(power),
                     "{kind:?} of radius {radius}, moment {power}: {found}, not {expected}"
                 );
-                // The control.
+                // Control: the moments of another filter differ.
                 for other in KINDS.into_iter().filter(|other| *other != kind) {
                     let expected = moment(other, power) / moment(other, 0) * radius.powi(power);
                     assert!(
@@ -138,7 +138,7 @@ fn positions_and_weights_have_the_moments_of_their_filters() {
 }
 
 #[test]
-fn the_pixel_as_a_filter_costs_nothing_and_a_table_of_it_is_the_same() {
+fn the_box_filter_needs_no_table_and_its_table_gives_the_same_image() {
     let plain = filtered_scene(PixelFilterKind::Box, 0.5);
     assert_eq!(
         (plain.specialization.filter_bins, plain.sampling.filter_table.len()),
@@ -155,7 +155,7 @@ fn the_pixel_as_a_filter_costs_nothing_and_a_table_of_it_is_the_same() {
 }
 
 #[test]
-fn a_constant_picture_stays_so_under_every_filter() {
+fn a_constant_image_is_constant_under_every_filter() {
     for kind in KINDS {
         let mut packed = filtered_scene(kind, 1.5);
         packed.primitives.clear();
@@ -173,7 +173,7 @@ fn a_constant_picture_stays_so_under_every_filter() {
 }
 
 #[test]
-fn pictures_by_every_filter_are_the_same_on_both_paths() {
+fn images_of_every_filter_are_the_same_on_cpu_and_gpu() {
     let mut films = Vec::new();
     for kind in KINDS {
         let packed = filtered_scene(kind, 1.25);
@@ -183,7 +183,7 @@ fn pictures_by_every_filter_are_the_same_on_both_paths() {
         }
         films.push(expected);
     }
-    // The control.
+    // Control: the images of different filters differ.
     for (i, film) in films.iter().enumerate() {
         assert!(films[..i].iter().all(|other| differing(film, other) > 100));
     }

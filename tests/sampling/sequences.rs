@@ -61,7 +61,7 @@ fn whole(x: f32) -> u32 {
 }
 
 #[test]
-fn sequences_are_the_published_ones() {
+fn sequences_match_published_values() {
     for i in 0..32 {
         let j = gray(i);
         let point = [j.reverse_bits() >> 27, sobol_reversed(j).reverse_bits() >> 27];
@@ -77,7 +77,7 @@ fn sequences_are_the_published_ones() {
 }
 
 #[test]
-fn the_second_coordinate_of_sobols_points_is_the_product_with_pascals_matrix() {
+fn the_second_sobol_coordinate_is_the_product_with_pascals_matrix() {
     // Direction numbers of the polynomial x + 1: v_1 = 1/2, v_k = v_(k-1) XOR v_(k-1) / 2.
     for i in (0..1 << 16).map(|i: u32| i.wrapping_mul(0x9e37_79b9)) {
         let mut direction = 1u32 << 31;
@@ -113,7 +113,7 @@ fn scrambled_sobol_points_are_nets() {
             }
         }
     }
-    // The controls: other patterns, an unaligned run, a moved point.
+    // Controls: other patterns, an unaligned run, a moved point.
     for key in keys(5) {
         for pattern in [RANDOM, HALTON] {
             let points: Vec<Vec2> = (0..64).map(|i| sample_square(pattern, 64, i, 0, key)).collect();
@@ -128,7 +128,7 @@ fn scrambled_sobol_points_are_nets() {
 }
 
 #[test]
-fn samples_of_lights_go_on_where_those_of_the_sample_before_ended() {
+fn light_samples_continue_the_sequence_of_the_previous_pixel_sample() {
     for key in keys(5) {
         for pattern in [SOBOL, HALTON] {
             let one: Vec<Vec2> = (0..64).map(|i| sample_square(pattern, 64, i, 0, key)).collect();
@@ -141,7 +141,7 @@ fn samples_of_lights_go_on_where_those_of_the_sample_before_ended() {
 }
 
 #[test]
-fn shuffling_takes_aligned_runs_to_aligned_runs() {
+fn shuffling_maps_aligned_runs_to_aligned_runs() {
     for key in keys(20) {
         for m in 0..12u32 {
             let mut run: Vec<u32> = (3 << m..4 << m).map(|i| shuffled_index(i, key.x)).collect();
@@ -305,7 +305,7 @@ fn samples_of_pixels_and_lights_are_independent() {
             assert!(found < 6.0, "pattern {pattern}, pairs {what}: {found}");
         }
     }
-    // The control: equal order with different scrambles.
+    // Control: equal order with different scrambles.
     let one_order = |purpose| {
         let key = sample_key(UVec2::ZERO, 1, purpose);
         move |i: u32| i.reverse_bits().wrapping_add(key.x) as f32 / 4_294_967_296.0 * 0.999_999

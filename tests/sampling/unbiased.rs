@@ -148,7 +148,7 @@ fn estimate(values: &[f64]) -> (f64, f64) {
 const SETTINGS: [(u32, f64); 2] = [(16, 0.02), (4, 0.01)];
 
 #[test]
-fn small_rounds_have_the_same_first_look() {
+fn small_rounds_have_the_same_pilot_pass() {
     for error in [0.02, 0.01] {
         let [a, b] = [4, 16].map(|round| {
             let error = Some(error);
@@ -184,7 +184,7 @@ fn dots_and_lines_keep_their_brightness() {
             );
         }
     }
-    // The control: stopping after 16 black samples.
+    // Control: stopping after 16 black samples.
     let (few, many) = (dots(2, uniform(16)), dots(2, uniform(256)));
     let own = (0..24).map(|seed| {
         let (few, many) = (seeded(few.clone(), seed), seeded(many.clone(), seed));
@@ -217,7 +217,7 @@ fn error_of_uniform(make: &dyn Fn(Sampling) -> Packed, truth: &[f64], seeds: u32
 }
 
 #[test]
-fn pictures_are_no_worse_than_with_the_same_number_of_samples_everywhere() {
+fn errors_are_at_most_those_of_uniform_sampling() {
     let seeds = 4;
     type Make = Box<dyn Fn(Sampling) -> Packed>;
     let cases: [(&str, Make); 5] = [

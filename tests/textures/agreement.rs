@@ -151,7 +151,7 @@ fn every_shape(filter: &str, wrap: &str) -> String {
 }
 
 #[test]
-fn pictures_are_the_same_on_the_device_and_on_the_cpu() {
+fn images_are_the_same_on_gpu_and_cpu() {
     if adapter::device().is_none() {
         return;
     }
@@ -173,7 +173,7 @@ fn pictures_are_the_same_on_the_device_and_on_the_cpu() {
     }
 }
 
-/// Control: no ray differentials.
+/// Negative control: without ray differentials the image changes.
 #[test]
 fn a_wrong_footprint_is_noticed() {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
@@ -191,7 +191,7 @@ fn a_wrong_footprint_is_noticed() {
 }
 
 #[test]
-fn texels_in_several_buffers_give_the_same_picture() {
+fn texels_in_several_buffers_give_the_same_image() {
     let Some(device) = adapter::device() else { return };
     let folder = tempfile::tempdir().unwrap();
     let scenes = scenes(folder.path());

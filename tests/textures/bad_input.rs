@@ -148,7 +148,7 @@ fn forge_size(from: &Path, to: &Path, width: u32, height: u32) {
 }
 
 #[test]
-fn all_images_together_must_fit() {
+fn the_total_size_of_images_is_limited() {
     let folder = tempfile::tempdir().unwrap();
     image::RgbImage::new(512, 512)
         .save(folder.path().join("a.png"))
@@ -175,7 +175,7 @@ fn all_images_together_must_fit() {
         "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the textures before it 1.0 MiB; \
          the limit is 1024.0 MiB"
     );
-    // Decoded, as the size is within the limit.
+    // The image is decoded, as its size is within the limit, and is found to be truncated.
     assert!(error(&texture("b", "fits.png", "ewa")).contains("is damaged or truncated"));
 }
 
@@ -448,9 +448,9 @@ fn the_command_line_ends_with_exit_code_3() {
     assert_eq!(good.status.code(), Some(0), "{good:?}");
 }
 
-/// For every documented key with a texture channel: only images have alpha, that of their file.
+/// Checks every documented key that accepts a texture channel: only images have an alpha channel, from their file.
 #[test]
-fn alpha_is_that_of_an_image() {
+fn only_images_have_an_alpha_channel() {
     let folder = tempfile::tempdir().unwrap();
     image::GrayAlphaImage::from_fn(4, 4, |x, _| image::LumaA([60 * x as u8, 255 - x as u8]))
         .save(folder.path().join("a.png"))

@@ -41,7 +41,7 @@ normal_map = { texture = 'bumps' }
 ";
 
 #[test]
-fn the_factor_alone_stands_in_for_an_image_that_cannot_be_read() {
+fn an_unreadable_image_is_replaced_by_its_factor() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     write_png(&path("good.png"), 4, 4, |_, _| [90; 3]);
@@ -82,7 +82,7 @@ fn the_factor_alone_stands_in_for_an_image_that_cannot_be_read() {
 }
 
 #[test]
-fn bad_texels_are_clamped_and_counted() {
+fn invalid_texels_are_clamped_and_counted() {
     let folder = tempfile::tempdir().unwrap();
     let values = [f32::NAN, -0.5, f32::INFINITY, 2e6, 0.25, 1e6];
     write_exr(&folder.path().join("a.exr"), 6, 3, |x, _| {
@@ -116,7 +116,7 @@ fn bad_texels_are_clamped_and_counted() {
 }
 
 #[test]
-fn an_environment_has_no_stand_in() {
+fn an_unreadable_environment_map_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let error = load(folder.path(), "[environment]\nfile = 'none.hdr'\n", false).unwrap_err();
     assert!(

@@ -195,28 +195,28 @@ fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
 }
 
 #[test]
-fn differentials_on_a_plane_are_those_of_neighbouring_rays() {
+fn differentials_on_a_plane_match_adjacent_rays() {
     for camera in [PERSPECTIVE, ORTHOGRAPHIC] {
         check(&over_plane(camera, ""), None, 0);
     }
 }
 
 #[test]
-fn differentials_by_a_mirror_are_those_of_neighbouring_rays() {
+fn differentials_after_a_mirror_match_adjacent_rays() {
     for camera in [PERSPECTIVE, ORTHOGRAPHIC] {
         check(&over_plane(camera, &ellipsoid("mirror")), Some(false), 1);
     }
 }
 
 #[test]
-fn differentials_through_glass_are_those_of_neighbouring_rays() {
+fn differentials_through_glass_match_adjacent_rays() {
     for camera in [PERSPECTIVE, ORTHOGRAPHIC] {
         check(&over_plane(camera, &ellipsoid("glass")), Some(true), 2);
     }
 }
 
 #[test]
-fn texture_coordinates_on_an_ellipsoid_change_as_on_neighbouring_rays() {
+fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
     let scene = over_plane(PERSPECTIVE, &ellipsoid("floor"));
     let exact = Exact {
         scene: &scene,
@@ -335,9 +335,9 @@ fn on_triangle(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DV
     let (e, f) = (q - p, r - p);
     let across = e.cross(f);
     let position = o + d * ((p - o).dot(across) / d.dot(across));
-    let way = position - p;
-    let b = way.cross(f).dot(across) / across.length_squared();
-    let c = e.cross(way).dot(across) / across.length_squared();
+    let offset = position - p;
+    let b = offset.cross(f).dot(across) / across.length_squared();
+    let c = e.cross(offset).dot(across) / across.length_squared();
     let weights = [1.0 - b - c, b, c];
     let to_world = matrix.inverse().transpose();
     let [mut uv, mut normal] = [DVec3::ZERO; 2];
@@ -360,7 +360,7 @@ fn on_triangle(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DV
 }
 
 #[test]
-fn points_of_a_mesh_change_as_on_neighbouring_rays() {
+fn differentials_on_a_mesh_match_adjacent_rays() {
     let sheet = Sheet::torus(12, 8);
     let turned = DMat3::from_cols(
         DVec3::new(0.9, 0.3, 0.2),

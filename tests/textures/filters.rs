@@ -86,7 +86,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
 }
 
 #[test]
-fn weights_kept_for_the_next_texture_are_those_of_the_reference() {
+fn cached_weights_equal_those_of_the_reference() {
     let bits = |color: Vec3| color.to_array().map(f32::to_bits);
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -123,7 +123,7 @@ fn weights_kept_for_the_next_texture_are_those_of_the_reference() {
 }
 
 #[test]
-fn values_of_the_srgb_curve_are_those_of_the_standard() {
+fn srgb_decoding_matches_the_standard() {
     for byte in 0..=255 {
         let x = f64::from(byte) / 255.0;
         let exact = if x <= 0.04045 {
@@ -140,7 +140,7 @@ fn values_of_the_srgb_curve_are_those_of_the_standard() {
 }
 
 #[test]
-fn an_image_without_filter_is_its_texels() {
+fn nearest_filtering_returns_the_texels() {
     let folder = tempfile::tempdir().unwrap();
     let texel = |x: u32, y: u32| [x as f32, y as f32, 10.0 * y as f32 + x as f32];
     write_exr(&folder.path().join("t.exr"), 5, 3, texel);
@@ -158,7 +158,7 @@ fn an_image_without_filter_is_its_texels() {
 }
 
 #[test]
-fn coordinates_go_on_beyond_the_image_as_they_should() {
+fn coordinates_wrap_as_specified_beyond_the_image() {
     let found = |wrap: u32| (-7..8).map(|i| wrapped_index(i, 3, wrap)).collect::<Vec<_>>();
     assert_eq!(found(REPEAT), [2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1]);
     assert_eq!(found(CLAMP), [0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 2, 2]);
@@ -236,7 +236,7 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
 }
 
 #[test]
-fn wide_footprints_see_the_whole_image() {
+fn wide_footprints_average_the_whole_image() {
     let folder = tempfile::tempdir().unwrap();
     for (width, height) in [(32, 32), (13, 7), (1, 9)] {
         let texels = noise(folder.path(), width, height);
@@ -261,7 +261,7 @@ fn wide_footprints_see_the_whole_image() {
 
 /// EWA keeps detail across long footprints, which trilinear filtering blurs.
 #[test]
-fn ewa_keeps_what_lies_across_a_long_footprint() {
+fn ewa_keeps_detail_across_a_long_footprint() {
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("stripes.exr"), 64, 64, |x, _| {
         [if x % 16 < 8 { 1.0 } else { 0.0 }; 3]
@@ -433,7 +433,7 @@ fn ewa_is_bounded_for_flat_images() {
 
 /// 8-bit texels are exact, and levels keep the mean: a white texel in the dark is never lost.
 #[test]
-fn levels_of_8_bit_images_keep_what_is_dark() {
+fn mip_levels_of_8_bit_images_keep_the_mean() {
     let folder = tempfile::tempdir().unwrap();
     let value = |x: u32, y: u32| if (x, y) == (77, 130) { [255; 3] } else { [2, 0, 1] };
     write_png(&folder.path().join("dark.png"), 256, 256, value);
@@ -474,7 +474,7 @@ fn levels_of_8_bit_images_keep_what_is_dark() {
 }
 
 #[test]
-fn a_footprints_ellipse_has_its_conjugate_axes() {
+fn the_ellipse_of_a_footprint_has_its_conjugate_diameters() {
     let numbers = Random::new(3);
     let mut clamped = 0;
     for _ in 0..1000 {
@@ -502,7 +502,7 @@ fn a_footprints_ellipse_has_its_conjugate_axes() {
 
 /// Beyond a clamped edge only its color is visible, at any distance and footprint size.
 #[test]
-fn beyond_a_clamped_edge_nothing_else_is_seen() {
+fn beyond_a_clamped_edge_only_its_color_is_visible() {
     let folder = tempfile::tempdir().unwrap();
     let border = |i: u32| !(4..60).contains(&i);
     let framed = |x, y| if border(x) || border(y) { [0; 3] } else { [255; 3] };

@@ -1,5 +1,5 @@
-//! The images of `scenes/textures/`, which are made here: a test compares the files with what they should be, and
-//! writes them if the variable `WGRAY_WRITE_TEXTURES` is 1.
+//! Generator of the images in `scenes/textures/`. A test compares the files with the generator, and writes them if the
+//! environment variable `WGRAY_WRITE_TEXTURES` is 1.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::write_png;
 
 const SIDE: u32 = 512;
 
-/// Tiles of 64 texels with dark joints, ruled finely, some of them coloured.
+/// Returns a texel of a grid of tiles: 64 texels wide, with dark joints and fine lines, some colored.
 fn grid(x: u32, y: u32) -> [u8; 3] {
     if x % 64 < 4 || y % 64 < 4 {
         return [30, 30, 40];
@@ -24,7 +24,7 @@ fn grid(x: u32, y: u32) -> [u8; 3] {
 
 const BUMP_SIDE: u32 = 64;
 
-/// The normals of a low dome in the middle of a plane.
+/// Returns a texel of a normal map: a low dome in the middle of a plane.
 fn bump(x: u32, y: u32) -> [u8; 3] {
     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(BUMP_SIDE) * 2.0 - 1.0;
     let (u, v) = (at(x), -at(y));
@@ -34,7 +34,7 @@ fn bump(x: u32, y: u32) -> [u8; 3] {
 }
 
 #[test]
-fn the_scenes_textures_are_what_the_generator_makes() {
+fn the_texture_files_match_the_generator() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/textures");
     let write = std::env::var_os("WGRAY_WRITE_TEXTURES").is_some_and(|value| value == "1");
     let mut names = Vec::new();
@@ -52,12 +52,12 @@ fn the_scenes_textures_are_what_the_generator_makes() {
         }
         names.push(name.to_string());
     }
-    let there = std::fs::read_dir(&folder).unwrap();
-    let mut there: Vec<_> = there
+    let found = std::fs::read_dir(&folder).unwrap();
+    let mut found: Vec<_> = found
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
-    there.sort();
+    found.sort();
     names.sort();
-    assert_eq!(there, names);
-    assert_ne!(grid(0, 0), grid(8, 8)); // a generator of one colour would prove nothing
+    assert_eq!(found, names);
+    assert_ne!(grid(0, 0), grid(8, 8)); // control: the generator is not constant
 }

@@ -1,5 +1,5 @@
-// Makes the files of tests/textures/ktx2: KTX 2 files by the Basis Universal encoder of npm's ktx2-encoder, and for each a PNG
-// file that the Basis Universal transcoder of npm's three decodes from it.
+// Writes the files of tests/textures/ktx2: KTX 2 files of the Basis Universal encoder (npm's ktx2-encoder), and for
+// each file a PNG with the texels decoded by the Basis Universal transcoder (npm's three).
 //
 //     npm install ktx2-encoder@0.6.0 three@0.187.0
 //     node tests/textures/ktx2.mjs tests/textures/ktx2
@@ -14,7 +14,7 @@ const folder = process.argv[2];
 const modules = path.join(process.cwd(), "node_modules");
 const { encodeToKTX2 } = await import(pathToFileURL(path.join(modules, "ktx2-encoder/dist/node/index.js")));
 const libraries = path.join(modules, "three/examples/jsm/libs/basis");
-// The transcoder is a CommonJS script in a folder of modules.
+// The transcoder is a CommonJS script in a folder of ES modules.
 const script = fs.readFileSync(path.join(libraries, "basis_transcoder.js"), "utf8");
 const start = new Function("require", "__filename", "__dirname", `${script}; return BASIS;`);
 const transcoder = await start(createRequire(import.meta.url), libraries, libraries)({
@@ -40,7 +40,7 @@ function png(width, height, rgba) {
 	return Buffer.concat([Buffer.from("\x89PNG\r\n\x1a\n", "latin1"), ...parts]);
 }
 
-// Smooth colors with some noise, so that all parts of the encodings are used; alpha grows to the right.
+// Returns smooth colors with some noise, so that all parts of the encodings are used; alpha increases to the right.
 function picture(width, height, hasAlpha) {
 	let state = 1;
 	const noise = () => ((state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32) * 40;
@@ -53,7 +53,7 @@ function picture(width, height, hasAlpha) {
 	return { width, height, data };
 }
 
-// Four colors that a block of one color represents exactly.
+// Returns four quarters with colors that a block of one color represents exactly.
 function quarters() {
 	const colors = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
 	const data = new Uint8Array(16 * 16 * 4);

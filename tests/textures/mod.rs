@@ -1,5 +1,5 @@
-//! Textures, their filters, ray differentials, mirrors and glass: against closed forms, finite differences and f64, and
-//! on the GPU against the CPU.
+//! Textures, filters, ray differentials, mirrors and glass, compared with closed forms, finite differences and f64
+//! references, and between GPU and CPU.
 
 mod agreement;
 mod bad_input;
@@ -21,7 +21,7 @@ use wgray_render::records::Packed;
 
 use crate::pictures::reference;
 
-/// A scene from its text; images are beside `folder`.
+/// Parses and packs a scene. Paths of images are relative to `folder`.
 pub fn scene(text: &str, folder: &Path) -> Packed {
     let description = Description::parse(text, "test.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
     pack(
@@ -31,19 +31,19 @@ pub fn scene(text: &str, folder: &Path) -> Packed {
     )
 }
 
-/// The mean radiance of every pixel, row by row.
+/// Returns the mean radiance of every pixel, row by row.
 pub fn cpu_picture(scene: &Packed) -> Vec<[f32; 3]> {
     reference(scene).means().collect()
 }
 
-/// Writes an image of 8 bits.
+/// Writes an 8-bit RGB image.
 pub fn write_png(path: &Path, width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 3]) {
     image::RgbImage::from_fn(width, height, |x, y| image::Rgb(texel(x, y)))
         .save(path)
         .unwrap();
 }
 
-/// Writes an image of floats.
+/// Writes an image of 32-bit floats.
 pub fn write_exr(path: &Path, width: u32, height: u32, texel: impl Fn(u32, u32) -> [f32; 3]) {
     image::Rgb32FImage::from_fn(width, height, |x, y| image::Rgb(texel(x, y)))
         .save(path)

@@ -1,4 +1,4 @@
-//! Normal maps: where their normals point.
+//! Normal maps: directions of the mapped normals.
 
 use glam::Vec3;
 use wgray_render::cpu::differential::HitDifferential;
@@ -13,7 +13,7 @@ use wgray_render::records::Packed;
 use super::{scene, write_exr};
 use crate::random::Random;
 
-/// Shapes with a map whose normal is (x, y, z) / |(x, y, z)| everywhere.
+/// Returns a scene of shapes with a constant normal map, (x, y, z) / |(x, y, z)|.
 fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
     let folder = tempfile::tempdir().unwrap();
     let texel = normal * 0.5 + 0.5;
@@ -51,7 +51,7 @@ fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
     scene(&text, folder.path())
 }
 
-/// The normal that a ray sees on the primitive.
+/// Returns the mapped normal of a primitive for a ray from `origin` to `target`.
 fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 {
     let ray = Ray {
         origin,
@@ -62,10 +62,10 @@ fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 
         primitive: primitive as u32,
         ..no_hit()
     };
-    let spot = fetch_hit_primitive(scene, hit);
-    let surface = surface_of(scene, &spot, hit, ray);
-    let plain = material_of(scene, &spot);
-    evaluate_material(scene, &spot, hit, plain, surface, HitDifferential::default(), 1).normal
+    let prim = fetch_hit_primitive(scene, hit);
+    let surface = surface_of(scene, &prim, hit, ray);
+    let plain = material_of(scene, &prim);
+    evaluate_material(scene, &prim, hit, plain, surface, HitDifferential::default(), 1).normal
 }
 
 fn near(a: Vec3, b: Vec3) -> bool {
@@ -73,19 +73,19 @@ fn near(a: Vec3, b: Vec3) -> bool {
 }
 
 #[test]
-fn maps_lean_along_the_tangent_and_the_bitangent() {
+fn red_and_green_tilt_along_the_tangent_and_the_bitangent() {
     let n = Vec3::new(0.6, 0.0, 0.8);
     let map = shapes(n, "", 1.0);
     let (above, below) = (Vec3::new(0.3, 0.2, 3.0), Vec3::new(0.3, 0.2, -3.0));
     assert!(near(normal(&map, 0, above, Vec3::ZERO), n));
-    // From behind it is the same surface, seen from its other side.
+    // From behind, the mapped normal is flipped.
     assert!(near(normal(&map, 0, below, Vec3::ZERO), -n));
-    // The plane's tangent is y.
+    // The tangent of the plane is +y.
     assert!(near(
         normal(&map, 2, above, Vec3::new(0.0, 0.0, -5.0)),
         Vec3::new(0.0, 0.6, 0.8)
     ));
-    // On the sphere u goes east and v north.
+    // On the sphere, u increases to the east and v to the north.
     let equator = Vec3::new(9.0, -1.0, 0.0);
     assert!(near(
         normal(&map, 1, Vec3::new(9.0, -5.0, 0.0), equator),
@@ -100,23 +100,23 @@ fn maps_lean_along_the_tangent_and_the_bitangent() {
 }
 
 #[test]
-fn maps_turn_with_their_texture() {
+fn texture_rotations_rotate_the_normals() {
     let n = Vec3::new(0.6, 0.0, 0.8);
     let above = Vec3::new(0.3, 0.2, 3.0);
-    // Turned by 90 degrees, the texture's u runs against the surface's v, whatever the scale.
+    // After a rotation by 90 degrees, u of the texture is along -v of the surface, regardless of the scale.
     let turned = normal(
         &shapes(n, "rotate = 90\nscale = [3, 0.5]", 1.0),
         2,
         above,
         Vec3::new(0.0, 0.0, -5.0),
     );
-    assert!(near(turned, Vec3::new(0.6, 0.0, 0.8)), "{turned}"); // the plane's bitangent is -x
+    assert!(near(turned, Vec3::new(0.6, 0.0, 0.8)), "{turned}"); // the bitangent of the plane is -x
     let mirrored = normal(&shapes(n, "scale = [-1, 1]", 1.0), 0, above, Vec3::ZERO);
     assert!(near(mirrored, Vec3::new(-0.6, 0.0, 0.8)), "{mirrored}");
 }
 
 #[test]
-fn strength_is_a_factor_of_the_slope() {
+fn strength_scales_the_slope() {
     let above = Vec3::new(0.3, 0.2, 3.0);
     let flat = normal(&shapes(Vec3::new(0.6, 0.0, 0.8), "", 0.0), 0, above, Vec3::ZERO);
     assert!(near(flat, Vec3::Z));
@@ -143,7 +143,7 @@ fn a_flat_map_changes_nothing() {
 }
 
 #[test]
-fn mirrors_use_no_normal_that_would_lead_into_them() {
+fn mirrors_reject_normals_that_reflect_into_the_surface() {
     let map = shapes(Vec3::new(0.9, 0.0, 0.3).normalize(), "", 1.0);
     let q = &map.primitives[0];
     let grazing = Ray {
@@ -157,8 +157,8 @@ fn mirrors_use_no_normal_that_would_lead_into_them() {
     assert_eq!(usable_normal(surface, away), surface.normal);
 }
 
-/// A flat surface does not hide its own points, so its own side must: a normal that is turned towards a light behind the
-/// surface sees none of it.
+/// Checks that the geometric normal limits the lighting: a shading normal that is tilted towards a light behind the
+/// surface receives no light. Shadow rays cannot detect this, as a flat surface does not occlude its own points.
 #[test]
 fn a_bent_normal_sees_no_light_from_behind() {
     let map = shapes(Vec3::new(0.9, 0.0, 0.3).normalize(), "", 1.0);

@@ -168,7 +168,7 @@ fn slanted_checkers_have_their_contrast() {
 
 /// Degenerate, infinite and NaN footprints give 0 to 1.
 #[test]
-fn footprints_without_an_area_have_a_share() {
+fn footprints_without_an_area_give_values_from_0_to_1() {
     let numbers = Random::new(12);
     let lengths = [
         0.0,
@@ -211,7 +211,7 @@ fn footprints_without_an_area_have_a_share() {
 }
 
 #[test]
-fn upright_footprints_have_the_exact_mean() {
+fn axis_aligned_footprints_have_the_exact_mean() {
     let numbers = Random::new(2);
     let mut unfiltered = 0.0f64;
     for i in 0..150 {
@@ -235,7 +235,7 @@ fn upright_footprints_have_the_exact_mean() {
 }
 
 #[test]
-fn without_a_footprint_the_pattern_is_its_points() {
+fn without_a_footprint_the_pattern_is_point_sampled() {
     let numbers = Random::new(6);
     for i in 0..1000 {
         let kind = [CHECKER, LINES][i % 2];
@@ -258,7 +258,7 @@ fn without_a_footprint_the_pattern_is_its_points() {
 }
 
 #[test]
-fn footprints_without_bound_see_the_whole_pattern() {
+fn unbounded_footprints_average_the_whole_pattern() {
     for size in [1e4, 1e20, 1e38, f32::INFINITY, f32::NAN] {
         let (dx, dy) = (Vec2::new(size, size), Vec2::new(0.0, size));
         for uv in [Vec2::new(0.3, 0.4), Vec2::splat(1e30), Vec2::splat(f32::NAN)] {
@@ -270,7 +270,7 @@ fn footprints_without_bound_see_the_whole_pattern() {
 }
 
 #[test]
-fn textures_are_scaled_then_turned_then_moved() {
+fn textures_are_scaled_then_rotated_then_translated() {
     let keys = "type = 'checker'\neven = [1, 0, 0]\nodd = [0, 1, 0]\nscale = [2, 1]\nrotate = 90\noffset = [0.5, 3]";
     let scene = textured(Path::new("."), keys);
     let mut odd = 0;

@@ -15,7 +15,7 @@ fn reflectance(degrees: f64, ior: f64) -> f64 {
 }
 
 #[test]
-fn reflectances_are_those_of_fresnel() {
+fn reflectances_match_the_fresnel_equations() {
     assert!((reflectance(0.0, 1.5) - 0.04).abs() < 1e-6);
     assert!((reflectance(0.0, 1.0 / 1.5) - 0.04).abs() < 1e-6);
     // Brewster's angle: only one polarization, half of the light, reflects ((n^2 - 1) / (n^2 + 1))^2.
@@ -92,7 +92,7 @@ fn farthest(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f32> {
 }
 
 #[test]
-fn a_glass_ball_before_a_uniform_background_keeps_its_energy() {
+fn a_glass_ball_in_a_uniform_environment_conserves_energy() {
     for ior in [1.1, 1.5, 2.4, 0.7] {
         for background in [1.0f32, 0.3] {
             let colors = format!("[{background}, {background}, {background}]");
@@ -130,7 +130,7 @@ fn clear_glass_of_index_1_is_invisible() {
 }
 
 #[test]
-fn mirrors_see_lights_in_their_colour() {
+fn mirrors_show_lights_in_their_color() {
     let light = "
         [[lights]]
         type = 'rectangle'
@@ -156,7 +156,7 @@ fn mirrors_see_lights_in_their_colour() {
 }
 
 #[test]
-fn a_path_cut_off_sees_the_background() {
+fn a_truncated_path_returns_the_background() {
     for depth in [1, 2, 5, 64] {
         let text = format!(
             "image = {{ width = 4, height = 4 }}

@@ -1,6 +1,7 @@
-//! The library as a WebAssembly module without files and threads: renders a scene from bytes on the CPU path.
+//! The library as a WebAssembly module without files and threads: renders a scene from bytes on the CPU.
 //!
-//! `render.test.mjs` calls it in Node, and compares the pixels with `pixels.f32`; the test below compares those of this machine with the same file.
+//! `render.test.mjs` calls the module in Node and compares the pixels with `pixels.f32`. The test below compares the
+//! pixels of a native build with the same file.
 
 use std::mem::ManuallyDrop;
 
@@ -17,13 +18,14 @@ fn pixels(scene: &str) -> Result<Vec<f32>, Error> {
     Ok(picture.pixels().colors.into_iter().flatten().collect())
 }
 
-/// Returns the address of `len` bytes, for the text of a scene.
+/// Allocates `len` bytes for the text of a scene and returns their address.
 #[unsafe(no_mangle)]
 pub extern "C" fn allocate(len: usize) -> *mut u8 {
     ManuallyDrop::new(vec![0; len]).as_mut_ptr()
 }
 
-/// Renders the scene whose text was written to the result of [`allocate`]. Returns the address of the pixels, preceded by their number.
+/// Renders the scene whose text was written to the result of [`allocate`]. Returns the address of the number of values,
+/// which precedes the values.
 ///
 /// # Safety
 ///
@@ -34,7 +36,7 @@ pub extern "C" fn allocate(len: usize) -> *mut u8 {
 /// If the text is not a valid scene.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn render(text: *mut u8, len: usize) -> *const u32 {
-    // SAFETY: the caller passes what `allocate` returned.
+    // SAFETY: the caller passes the result of `allocate(len)`.
     let text = unsafe { Vec::from_raw_parts(text, len, len) };
     let pixels = pixels(str::from_utf8(&text).expect("UTF-8")).expect("a valid scene");
     let mut result = vec![pixels.len() as u32];
@@ -46,9 +48,9 @@ pub unsafe extern "C" fn render(text: *mut u8, len: usize) -> *const u32 {
 mod tests {
     use super::*;
 
-    /// `WGRAY_TEST_RECORD=1` writes the file.
+    /// Compares the pixels with `pixels.f32`, or writes the file if `WGRAY_TEST_RECORD` is set.
     #[test]
-    fn this_machine_renders_the_pixels_that_node_is_compared_with() {
+    fn a_native_build_renders_the_recorded_pixels() {
         let bytes: Vec<u8> = pixels(include_str!("scene.toml"))
             .unwrap()
             .into_iter()

@@ -1,4 +1,5 @@
-// Renders 8 x 8 pixels from bytes in Node, on the CPU path compiled to WebAssembly. scripts/test-wasm runs it.
+// Renders 8 x 8 pixels from bytes in Node, on the CPU backend compiled to WebAssembly. `scripts/test-wasm` runs this
+// file.
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
@@ -7,8 +8,9 @@ import { test } from "node:test";
 const here = (name) => readFileSync(new URL(name, import.meta.url));
 const module = new WebAssembly.Module(readFileSync(process.env.WGRAY_WASM));
 
-// The only imports are those of the clock (crate web-time, by wasm-bindgen), which a page gets from the program `wasm-bindgen`. Here they are
-// written by hand: a JavaScript object is a handle, those from 128 to `statics_end` are never dropped, and all are `performance`.
+// The module only imports the clock (crate web-time through wasm-bindgen). On web pages the tool `wasm-bindgen`
+// generates these imports; here they are written by hand. A JavaScript object is a handle; handles from 128 to
+// `statics_end` are never dropped, and all of them stand for `performance`.
 const intrinsics = [
     [/_now_/, () => performance.now()],
     [/static_accessor|performance/, () => 1024],

@@ -16,7 +16,7 @@ pub enum BadPixel {
 }
 
 impl BadPixel {
-    /// Returns the kind of invalid values, the worst of several.
+    /// Returns the worst kind of invalid value among `values`; `None` if all are valid.
     pub fn of(values: &[f32]) -> Option<BadPixel> {
         let faults = [
             (BadPixel::Nan, values.iter().any(|v| v.is_nan())),
@@ -26,7 +26,7 @@ impl BadPixel {
         faults.into_iter().find(|(_, found)| *found).map(|(fault, _)| fault)
     }
 
-    /// Returns the color of the mark, which stands out from light.
+    /// Returns the color that marks such a pixel.
     pub fn color(self) -> [u8; 3] {
         match self {
             BadPixel::Nan => [255, 0, 255],
@@ -58,7 +58,7 @@ impl BadPixels {
         let width = width as usize;
         let height = faults.len().div_ceil(width.max(1));
         let mut counted = BadPixels::default();
-        let mut told = [false; PARTS * PARTS];
+        let mut listed = [false; PARTS * PARTS];
         for (i, fault) in faults.iter().enumerate() {
             match fault {
                 None => continue,
@@ -67,7 +67,7 @@ impl BadPixels {
                 Some(BadPixel::Negative) => counted.negative += 1,
             }
             let (x, y) = (i % width, i / width);
-            let part = &mut told[y * PARTS / height * PARTS + x * PARTS / width];
+            let part = &mut listed[y * PARTS / height * PARTS + x * PARTS / width];
             if !std::mem::replace(part, true) {
                 counted.places.push([x as u32, y as u32]);
             }
@@ -76,7 +76,7 @@ impl BadPixels {
     }
 }
 
-/// Returns the kind of each invalid pixel. With filters that have negative lobes, `negative` values are valid.
+/// Returns the kind of each invalid pixel. `negative` accepts negative values, which filters with negative lobes cause.
 pub fn faults<T: Sync, const N: usize>(
     pixels: &[T],
     negative: bool,

@@ -17,7 +17,7 @@ use wgray_render::records::Packed;
 
 /// A request to compile a kernel.
 pub struct Request {
-    /// Returned with the result, which identifies late ones.
+    /// Number of the request, repeated in the result to recognize outdated results.
     pub id: u64,
     /// The device; `None` opens a new one.
     pub device: Option<Device>,
@@ -25,11 +25,11 @@ pub struct Request {
     pub packed: Packed,
     /// The shaders.
     pub shaders: Arc<Shaders>,
-    /// Known good shaders, for use if those have errors.
+    /// The last good shaders, used if `shaders` have errors.
     pub fallback: Option<Arc<Shaders>>,
     /// The constants that the kernel is compiled for.
     pub constants: Constants,
-    /// When the change was noticed that the kernel shows.
+    /// Time at which the change that caused the request was noticed.
     pub noticed: Instant,
 }
 
@@ -44,7 +44,7 @@ pub struct BuildResult {
     pub constants: Constants,
     /// The time of the request.
     pub noticed: Instant,
-    /// The scene on a device; `None` if the request's shaders have errors, and there is no fallback.
+    /// The scene on a device; `None` if the request's shaders have errors and no fallback exists.
     pub result: Option<Result<Ready, RenderError>>,
     /// The errors in the request's shaders.
     pub refused: Option<ShaderErrors>,
@@ -113,7 +113,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
         noticed,
     } = request;
     let start = Instant::now();
-    // Every kernel, including those of other views.
+    // Checks all kernels, including those of other views.
     let refused = times.of("check shaders", || {
         check_kernels(&packed, &shaders, Forms::Buffers).err()
     });
@@ -121,7 +121,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
     let result = usable.map(|shaders| {
         guarded(|| {
             let device = device.map_or_else(|| choose(choice), Ok)?;
-            // In buffers, so that a change of the scene needs no compiler.
+            // The scene is in buffers, not baked, so that a changed scene needs no compilation.
             let options = Options {
                 baked: false,
                 ..Options::best(&device)

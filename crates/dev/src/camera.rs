@@ -205,8 +205,8 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
 /// Nearest and farthest distance to the look-at point that a dolly reaches, relative to that of the file's camera.
 const DOLLY_RANGE: [f64; 2] = [0.01, 1000.0];
 
-/// Dollies like [`moved`], but within bounds. At the near bound the look-at point moves along, so that the camera never gets stuck
-/// in front of it; at the far bound the camera stops.
+/// Dollies like [`moved`], but within bounds. At the near bound the look-at point moves along, so that the camera never
+/// gets stuck in front of it; at the far bound the camera stops.
 pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) -> CameraDescription {
     let size = |camera: &CameraDescription| match camera {
         CameraDescription::Orthographic(c) => c.height,
@@ -368,7 +368,7 @@ mod tests {
         camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45")
     }
 
-    /// Cameras with a lens, described in both ways, and a panorama.
+    /// Returns a camera with an aperture, one with an f-number, and a panorama.
     fn others() -> [CameraDescription; 3] {
         let view = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\n";
         [
@@ -399,7 +399,7 @@ mod tests {
 
     #[test]
     fn the_scene_follows_the_hand() {
-        // Dragged to the right, the camera goes to the left; dragged down, it rises.
+        // A drag to the right moves the camera to the left; a drag down moves it up.
         let right = view(&moved(&perspective(), Move::Orbit(0.1, 0.0))).position;
         assert!(right.x < -0.3, "{right}");
         let above = view(&moved(&perspective(), Move::Orbit(0.0, 0.1))).position;
@@ -462,7 +462,7 @@ mod tests {
                 assert_eq!(new.position, old.position);
                 assert!((new.position.distance(new.look_at) - far).abs() < 1e-4 * far);
             }
-            // To the right is to the right, upwards is upwards.
+            // Positive angles turn the view to the right and upwards.
             let right = (old.look_at - old.position).cross(old.up).normalize();
             let new = view(&moved(&file, Move::Turn(0.2, 0.1)));
             assert!((new.look_at - old.look_at).dot(right) > 0.1 * far);

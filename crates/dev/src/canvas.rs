@@ -41,7 +41,7 @@ pub struct Canvas {
     camera: Camera,
     /// The scale of the finished film: more than 1 if the image is too large.
     finest: u32,
-    /// True if the CPU renders the same.
+    /// True if the CPU also renders the image, for [`View::Compare`].
     compare: bool,
     stage: Stage,
     steps: Steps,
@@ -74,14 +74,14 @@ impl Default for Limits {
     }
 }
 
-/// The resolution that the film has.
+/// The resolution of the current film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stage {
     /// The scale of the film: each of its pixels covers this many pixels of the image along each side.
     scale: u32,
     width: u32,
     height: u32,
-    /// True if anything of it is rendered.
+    /// True once a dispatch of this stage has ended.
     begun: bool,
 }
 
@@ -163,7 +163,7 @@ impl Canvas {
         let film = self.hits_of(view).is_none();
         let nothing_there = self.stage.scale == self.finest && self.steps.samples() == 0;
         let other_film = self.compare != view.is_by_both();
-        self.shown = film && self.stage.scale == self.finest && !nothing_there; // the film has it already
+        self.shown = film && self.stage.scale == self.finest && !nothing_there; // the film already contains this view
         if film && (other_film || nothing_there) {
             self.restart(self.camera, view)
         } else if !film && self.stage.scale > self.finest {
@@ -224,7 +224,7 @@ impl Canvas {
         let (old, fewer) = (self.limits, limits.samples < self.steps.samples());
         self.limits = limits;
         if limits.scale != old.scale || (fewer && self.stage.scale == self.finest) {
-            self.restart(self.camera, view) // samples that a pixel has are not taken from it
+            self.restart(self.camera, view) // samples cannot be removed from a film
         } else {
             self.steps.stop_at(limits.samples);
             Ok(())
@@ -235,7 +235,7 @@ impl Canvas {
         [self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale)]
     }
 
-    /// Returns whether nothing of the image has been worth showing yet.
+    /// Returns true until a part of the image that is worth showing is rendered.
     pub fn is_new(&self) -> bool {
         !self.shown
     }
@@ -319,7 +319,7 @@ impl Canvas {
         }
         let film;
         let under = self.under.as_ref();
-        // Until the next stage has any result the previous, smaller one is sent.
+        // Until the current stage has a result, the previous, coarser film is sent.
         let (gpu, cpu, under) = match under.filter(|_| !self.stage.begun) {
             Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
             None => {
@@ -390,7 +390,7 @@ fn finest(width: u32, height: u32, largest_film: u64, least: u32) -> u32 {
     (least..).find(fits).unwrap_or(1) // an image of one pixel fits
 }
 
-/// The same work by both backends.
+/// A backend that submits each dispatch to the GPU and the CPU, to compare their films.
 struct Both<'a> {
     gpu: &'a mut Gpu,
     cpu: Cpu<'a>,

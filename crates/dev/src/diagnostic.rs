@@ -91,7 +91,7 @@ impl Diagnostic {
 
     /// Returns the diagnostic of an error in a shader file of a folder, or in a built-in one.
     pub fn shader(error: &ShaderError, shaders: &Shaders, folder: Option<&Path>) -> Diagnostic {
-        let mut told = Diagnostic {
+        let mut found = Diagnostic {
             place: Some(error.place.clone()),
             excerpt: error.excerpt.clone(),
             ..Diagnostic::plain("shader", error.message.clone())
@@ -100,20 +100,20 @@ impl Diagnostic {
         let (column, line, file) = (parts.next(), parts.next(), parts.next());
         let number = |part: Option<&str>| part.and_then(|part| part.parse().ok());
         let (Some(file), Some(line), Some(column)) = (file, number(line), number(column)) else {
-            return told;
+            return found;
         };
         let text = shaders.text(file);
         if text.is_empty() {
-            return told; // generated code
+            return found; // generated code
         }
-        told.excerpt = told.excerpt.map(|excerpt| around(text, line, &excerpt));
-        (told.line, told.column) = (Some(line), Some(column));
+        found.excerpt = found.excerpt.map(|excerpt| around(text, line, &excerpt));
+        (found.line, found.column) = (Some(line), Some(column));
         if let Some(folder) = folder {
             let path = folder.join(file);
-            told.place = Some(format!("{}:{line}:{column}", path.display()));
-            told.file = whole_path(&path);
+            found.place = Some(format!("{}:{line}:{column}", path.display()));
+            found.file = whole_path(&path);
         }
-        told
+        found
     }
 
     /// Returns the line of the excerpt with the location, and the mark below it: a terminal has little room.
@@ -153,7 +153,8 @@ fn mark_of(layout: &Layout, text: &str, line: usize, problem: &Problem) -> Optio
     (before.matches('\n').count() + 1 == line).then_some((before[start..].chars().count() + 1, marked))
 }
 
-/// Returns a line of a text, counted from 1, with its number and a mark at a column and of a length, or under the whole line.
+/// Returns a line of a text, counted from 1, with its number and a mark at a column and of a length, or under the whole
+/// line.
 fn excerpt_of(text: &str, line: usize, mark: Option<(usize, usize)>) -> Option<String> {
     let content = text.lines().nth(line.checked_sub(1)?)?;
     let indent = content.chars().take_while(|c| c.is_whitespace()).count();

@@ -50,7 +50,7 @@ pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
                     Channel::ShadingNormal(_, part) => {
                         FlatSamples::F32(hits.iter().map(|hit| hit.shading_normal[*part]).collect())
                     }
-                    Channel::Mean(..) | Channel::Count(_) | Channel::Variance(..) => return None, // none of a first hit
+                    Channel::Mean(..) | Channel::Count(_) | Channel::Variance(..) => return None, // not of first hits
                 };
                 Some(AnyChannel::new(channel.name(), samples))
             })
@@ -136,7 +136,7 @@ mod tests {
                 .collect();
             let mut wanted = [[1.0, 4.0], [2.0, 5.0], [-3.0, 6.0]];
             if names[0].ends_with('B') {
-                wanted.reverse(); // by the alphabet
+                wanted.reverse(); // alphabetical order
             }
             let wanted: Vec<_> = names.into_iter().map(String::from).zip(wanted.map(Vec::from)).collect();
             assert_eq!(found, wanted);

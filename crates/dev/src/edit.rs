@@ -30,11 +30,11 @@ pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Resu
     let edits = edits(&piece.text, &piece.path, value).map_err(|why| format!("{path}: {why}"))?;
     let mut whole: Vec<Edit> = Vec::with_capacity(edits.len());
     for (range, new) in edits {
-        // The replaced part lies in one piece of the text: its end may be the start of another one.
+        // Only the start is mapped: the range lies in one piece, but its end may belong to the next piece.
         let start = piece.place(range.start);
         whole.push((start..start + range.len(), new));
     }
-    // From the end: what comes before a change stays where it is.
+    // Applied from the end, so that the offsets of earlier edits stay valid.
     whole.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
     let mut text = pieces.whole().to_owned();
     for (range, new) in whole {
@@ -283,7 +283,7 @@ pub fn line_start(text: &str, at: usize) -> usize {
     }
 }
 
-/// Returns the end of that line, without its line break.
+/// Returns the end of the line that contains a byte, without its line break.
 pub fn line_end(text: &str, at: usize) -> usize {
     let end = text[at..].find('\n').map_or(text.len(), |newline| at + newline);
     if text[at..end].ends_with('\r') { end - 1 } else { end }

@@ -99,7 +99,7 @@ fn value(aov: Aov, film: &Film, i: usize) -> [f32; 3] {
     match aov {
         Aov::Variance => match film.moments.get(i).filter(|moments| moments.w >= 2.0) {
             Some(moments) => variance_of_mean(film.sums[i], *moments).to_array(),
-            None => [0.0; 3], // nothing is known of it
+            None => [0.0; 3], // unknown
         },
         Aov::ShadingNormal => film.layer(Layer::Normal, i),
         aov => aov.light().map_or([0.0; 3], |layer| film.layer(layer, i)),
@@ -143,14 +143,14 @@ mod tests {
         }
         let normal = FilmLayer::of(Aov::ShadingNormal, &film(), None, &all);
         assert_eq!(normal.covered, [0.5; 2]);
-        // 1.25 / 2 + 0.5 / 2, 0.25, and what is below.
+        // x: 1.25 / 2 + 0.5 / 2 = 0.875; y: 0.25; z: negative, clamped to 0.
         assert_eq!(normal.bytes(&DisplaySettings::default())[..3], [223, 64, 0]);
         let variance = FilmLayer::of(Aov::Variance, &film(), None, &all);
         assert_eq!(variance.values.colors, [[0.25, 1.0, 0.0], [0.0; 3]]);
-        let told = variance.pixel(0, &DisplaySettings::default()).unwrap();
-        assert_eq!(told[2], ("standard error", "0.5  1  0".to_string()));
+        let values = variance.pixel(0, &DisplaySettings::default()).unwrap();
+        assert_eq!(values[2], ("standard error", "0.5  1  0".to_string()));
         assert_eq!(variance.pixel(2, &DisplaySettings::default()), None);
-        // A film that lacks them has none.
+        // A film without these layers yields zeros.
         let plain = Film::new(Region::whole(1, 2));
         for aov in [Aov::Variance, Aov::Direct] {
             assert_eq!(

@@ -251,7 +251,7 @@ pub enum Event {
     Measured(Apart),
     /// A viewer arrived.
     Viewers,
-    /// The driver loses the device.
+    /// Destroys the device, as if the driver had lost it.
     #[cfg(test)]
     Lose,
     /// The session ends.

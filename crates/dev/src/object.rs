@@ -408,7 +408,7 @@ fn place_of(loaded: &Loaded, number: usize) -> (String, Option<String>) {
                 None => return format!("shapes[{shape}]"),
             }
         }
-        "render".to_owned() // every one is of a file
+        "render".to_owned() // unreachable: every imported part is from a file
     };
     let imported = |file: usize| loaded.scene.imported.get(file);
     let plain = all.shapes.len() - gltf.len();

@@ -35,8 +35,8 @@ pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Resu
     Ok(())
 }
 
-/// Waits while another program changed a file so recently that more may follow: that would go into the replaced file,
-/// and be lost.
+/// Waits until a file has not changed for a short time. A program that is still writing it would write the rest to the
+/// replaced file, where it would be lost.
 ///
 /// # Errors
 ///
@@ -59,7 +59,7 @@ pub fn wait_settled(path: &Path) -> Result<(), String> {
     }
 }
 
-/// Writes a temporary file next to another one, with its permissions, to take its place.
+/// Writes a temporary file next to `path`, with the permissions of the file that it will replace.
 fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = path
         .parent()
@@ -71,7 +71,7 @@ fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFi
     #[cfg(unix)]
     if permissions.is_none() {
         use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666)); // less the user's mask
+        builder.permissions(fs::Permissions::from_mode(0o666)); // before the umask
     }
     let mut file = builder.tempfile_in(folder)?;
     file.write_all(content)?;
@@ -213,7 +213,7 @@ mod tests {
                     sleep(Duration::from_millis(1));
                 }
             });
-            // On a busy machine the file may rest once.
+            // On a busy machine a single wait may find the file unchanged for long enough.
             let error = (0..10).find_map(|_| wait_settled(&file).err());
             is_done.store(true, Relaxed);
             error.unwrap()

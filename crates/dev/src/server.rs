@@ -105,8 +105,8 @@ struct Unread {
     has_head: Arc<AtomicBool>,
 }
 
-/// Answers requests, each on its own connection and in bounded time. The WebSocket of a viewer is served by another task. If
-/// all connections are in use, a new one takes the place of the one that has waited longest for a request.
+/// Answers requests, each on its own connection and in bounded time. The WebSocket of a viewer is served by another
+/// task. If all connections are in use, a new one takes the place of the one that has waited longest for a request.
 async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::Result<()> {
     let requests = Arc::new(Semaphore::new(MAX_REQUESTS));
     let mut unread: VecDeque<Unread> = VecDeque::new();

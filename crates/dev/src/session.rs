@@ -122,7 +122,7 @@ impl Session {
         let (events, inbox) = sync_channel(WAITING);
         let started = Instant::now();
         let first = Event::Files(Box::new(snapshot.clone()), started, 0);
-        let _ = events.send(first); // the inbox is here
+        let _ = events.send(first); // the inbox still exists
         let writes = Arc::default();
         let watch = Watch::start(sources.clone(), snapshot, Arc::clone(&writes), {
             let events = events.clone();
@@ -140,7 +140,7 @@ impl Session {
         let (scene_sender, seen) = watch::channel(None);
         let looking = Arc::new(AtomicUsize::new(0));
         let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
-        let told = SessionChannels {
+        let channels = SessionChannels {
             report,
             state: state_sender,
             frames: frame_sender,
@@ -149,7 +149,7 @@ impl Session {
             seen: scene_sender,
             events: events.clone(),
         };
-        let painter = Painter::new(sources, device, builder, (out, wanted_by), writes, told);
+        let painter = Painter::new(sources, device, builder, (out, wanted_by), writes, channels);
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;
@@ -284,7 +284,7 @@ mod tests {
             fs::write(file, text).unwrap();
         }
         fs::write(path("scene.toml"), SCENE).unwrap();
-        let (told, reports) = std::sync::mpsc::channel();
+        let (sender, reports) = std::sync::mpsc::channel();
         let session = Session::start(Settings {
             sources: Sources {
                 scene: path("scene.toml"),
@@ -295,7 +295,7 @@ mod tests {
             out: None,
             only_for_viewers: false,
             editor: None,
-            report: Box::new(move |report| drop(told.send(report))),
+            report: Box::new(move |report| drop(sender.send(report))),
         })
         .unwrap();
         let (first, wanted) = finished(&session, 0);

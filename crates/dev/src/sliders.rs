@@ -22,7 +22,7 @@ pub struct SliderState {
 /// The values of a session, by file and name.
 #[derive(Default)]
 pub struct Sliders {
-    /// The values, each with the file's value at that time: a value that is edited in the file replaces that of the slider.
+    /// Moved values, each with the value in the file at that time: a later edit of the file takes precedence.
     moved: BTreeMap<(String, String), (Value, Value)>,
 }
 

@@ -113,10 +113,10 @@ impl Times {
     pub fn told(&self) -> Vec<Time> {
         let now = Instant::now();
         let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut told: Vec<Time> = all.iter().map(|kept| kept.told(now)).collect();
+        let mut timings: Vec<Time> = all.iter().map(|kept| kept.told(now)).collect();
         let place = |time: &Time| (!time.kernel, PARTS.iter().position(|name| *name == time.name));
-        told.sort_by_key(place);
-        told
+        timings.sort_by_key(place);
+        timings
     }
 }
 
@@ -170,14 +170,14 @@ mod tests {
                 samples: 64 * i,
             });
         }
-        let told = times.told();
-        let names: Vec<_> = told.iter().map(|time| time.name).collect();
+        let timings = times.told();
+        let names: Vec<_> = timings.iter().map(|time| time.name).collect();
         assert_eq!(names, ["render", "read files", "upload"]);
-        let render = &told[0];
+        let render = &timings[0];
         assert_eq!((render.count, render.samples, render.kernel), (100, 6400, true));
         assert_eq!((render.last, render.median), (0.1, 0.084));
         assert!(render.share > 0.5, "they ended just now: {}", render.share);
-        assert!(render.by_device && !told[1].by_device);
+        assert!(render.by_device && !timings[1].by_device);
     }
 
     #[test]

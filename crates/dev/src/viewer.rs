@@ -19,8 +19,8 @@ use super::times::Time;
 use wgray_image::sanitize::escape_control;
 use wgray_scene::cut;
 
-/// Maximum number of frames that are sent but not acknowledged: the page draws one while the next one arrives. More would
-/// queue up on a slow connection, and delay everything behind them.
+/// Maximum number of frames that are sent but not acknowledged: the page draws one while the next one arrives. More
+/// would queue up on a slow connection, and delay everything behind them.
 const MAX_FRAMES_IN_FLIGHT: usize = 2;
 /// Minimum time between two states while that many frames are in flight: states must not fill a slow connection either.
 const STATE_INTERVAL: Duration = Duration::from_millis(100);
@@ -245,7 +245,8 @@ async fn answer(question: Question, shared: &Shared) -> Reply<'static> {
     }
 }
 
-/// Looks something up in the scene on another thread, because the scene may be large. Returns `nothing` without a scene.
+/// Looks something up in the scene on another thread, because the scene may be large. Returns `nothing` without a
+/// scene.
 async fn of_scene<T: Send + 'static>(
     shared: &Shared,
     nothing: impl Fn() -> T,
@@ -261,7 +262,8 @@ fn text(reply: &Reply) -> Option<Message> {
     Some(Message::Text(serde_json::to_string(reply).ok()?.into()))
 }
 
-/// Returns a frame as a message: the length of the header as four bytes, little-endian, the header as JSON, and the images.
+/// Returns a frame as a message: the length of the header as four bytes, little-endian, the header as JSON, and the
+/// images.
 fn bytes(frame: &Frame) -> Option<Vec<u8>> {
     let header = serde_json::to_vec(&frame.header).ok()?;
     let mut bytes = u32::try_from(header.len()).ok()?.to_le_bytes().to_vec();

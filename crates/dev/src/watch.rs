@@ -25,8 +25,8 @@ const DOUBT: Duration = Duration::from_millis(100);
 /// Maximum delay of an error while files keep changing.
 const DOUBTS: Duration = Duration::from_secs(1);
 
-/// Models, meshes and textures that are incomplete or large are read once they have not changed for this time: a program
-/// may be writing them, and reading them too early would delay reading the complete files.
+/// Models, meshes and textures that are incomplete or large are read once they have not changed for this time: a
+/// program may be writing them, and reading them too early would delay reading the complete files.
 const GROWTH_QUIET: Duration = Duration::from_millis(300);
 /// They are read after this time at the latest.
 const GROWTH_PATIENCE: Duration = Duration::from_secs(10);
@@ -74,8 +74,8 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Watches the files of `sources`, and reports [`Event::Reading`] and [`Event::Files`] until `report` returns false.
-    /// `first` is the known state.
+    /// Watches the files of `sources`, and reports [`Event::Reading`] and [`Event::Files`] until `report` returns
+    /// false. `first` is the known state.
     pub fn start(
         sources: Sources,
         first: Snapshot,
@@ -194,7 +194,8 @@ fn run(
     }
 }
 
-/// Waits until files have not changed for some time. Returns whether names may have changed, or `None` if the watch ends.
+/// Waits until files have not changed for some time. Returns whether names may have changed, or `None` if the watch
+/// ends.
 fn wait_settled(
     wakes: &Receiver<Wake>,
     mut known: Vec<FileStamp>,

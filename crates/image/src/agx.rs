@@ -124,8 +124,8 @@ fn hue(color: DVec3) -> f64 {
 
 /// Interpolates two hues along the shorter arc.
 fn mixed(from: f64, to: f64, share: f64) -> f64 {
-    let way = (to - from + 0.5).rem_euclid(1.0) - 0.5;
-    from + share * way
+    let arc = (to - from + 0.5).rem_euclid(1.0) - 0.5;
+    from + share * arc
 }
 
 /// Returns the color with the same value and saturation, and this hue.

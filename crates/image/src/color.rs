@@ -1,4 +1,5 @@
-//! The transfer function of sRGB (IEC 61966-2-1:1999, sections 5.2 and 5.3). `cpu/texel.rs` has that of the kernels, in 32 bits.
+//! The transfer function of sRGB (IEC 61966-2-1:1999, sections 5.2 and 5.3). `cpu/texel.rs` has that of the kernels, in
+//! 32 bits.
 
 /// Returns the linear value of an encoded one, both from 0 to 1.
 pub fn srgb_to_linear(x: f64) -> f64 {

@@ -1,5 +1,5 @@
-//! Images without a renderer: regions, colour and view transforms, atomic files, comparison; and the handling of memory and paths that every
-//! layer of wgray shares.
+//! Images without a renderer: regions, colour and view transforms, atomic files, comparison; and the handling of memory
+//! and paths that every layer of wgray shares.
 
 mod agx;
 pub mod blocking_path;

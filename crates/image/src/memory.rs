@@ -1,5 +1,5 @@
-//! Allocations that may fail. A program can end in an orderly way when memory runs out, as `wgray` does, if its global allocator
-//! knows which failures the caller handles: [`is_fallible`].
+//! Allocations that may fail. A program can end in an orderly way when memory runs out, as `wgray` does, if its global
+//! allocator knows which failures the caller handles: [`is_fallible`].
 
 use std::cell::Cell;
 

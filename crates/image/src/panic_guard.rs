@@ -105,9 +105,9 @@ mod tests {
         assert_eq!(catch_panic(|| 7), Ok(7));
         assert_eq!(catch_panic(|| panic!("text")), Err::<(), _>("text".to_string()));
         let causes = "Error in Device::poll: Validation Error\n\nCaused by:\n  Parent device is lost\n";
-        let told = catch_panic(|| panic!("{causes}"));
+        let caught = catch_panic(|| panic!("{causes}"));
         let line = "Error in Device::poll: Validation Error: Caused by:: Parent device is lost";
-        assert_eq!(told, Err::<(), _>(line.to_string()));
+        assert_eq!(caught, Err::<(), _>(line.to_string()));
         assert_eq!(
             catch_panic(|| std::panic::panic_any(7)),
             Err::<(), _>("it panicked".to_string())

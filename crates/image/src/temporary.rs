@@ -10,7 +10,7 @@ type Name = std::path::PathBuf;
 
 static NAMES: Mutex<Vec<Name>> = Mutex::new(Vec::new());
 
-/// Number of names from which on those of files that no longer exist are dropped.
+/// Number of registered names from which names of deleted files are dropped.
 const PRUNE_FROM: usize = 64;
 
 /// Adds the path of a temporary file.
@@ -20,7 +20,8 @@ pub(super) fn register(path: &Path) {
     if names.len() >= PRUNE_FROM {
         names.retain(exists);
     }
-    // An allocation that ends the program under the lock would keep `remove_temporary_files` from it.
+    // `fallible`, because an allocation failure that ended the program here would hold the lock that
+    // `remove_temporary_files` needs.
     if crate::memory::fallible(|| names.try_reserve(1)).is_ok() {
         names.push(name);
     }

@@ -16,7 +16,7 @@ use wgray_image::Region;
 /// - Initially no film exists. [`begin`](Backend::begin) creates an empty one. [`resume`](Backend::resume) continues
 ///   one that was read earlier, possibly from another backend. Both replace the current film.
 /// - A film covers a region of the image. It may have no pixels.
-/// - A film has the scene's [film_layout](crate::film::Form): moments and pilot statistics under adaptive sampling, and layers
+/// - A film has the scene's [layout](FilmLayout): moments and pilot statistics under adaptive sampling, and layers
 ///   if they were requested ([`Packed::with_layers`]). Layers do not change the bits of the other lists.
 /// - [`film`](Backend::film) copies the film. It can be called whenever nothing is pending, and changes nothing.
 ///
@@ -44,7 +44,7 @@ use wgray_image::Region;
 /// - [`RenderError::NoFilm`]: `submit` or `film` without a film;
 /// - [`RenderError::Pending`]: any method except `poll` and `wait` while a dispatch is pending;
 /// - [`RenderError::Outside`]: a tile outside the film, or a film or first hits outside the image;
-/// - [`RenderError::FilmMismatch`]: `resume` with a film of another form than the scene's;
+/// - [`RenderError::FilmMismatch`]: `resume` with a film of another layout than the scene's;
 /// - [`RenderError::PilotIncomplete`]: further samples before all pixels of the film have their pilot samples.
 ///
 /// All other errors come from the device. After one of them nothing is pending and no film exists; `begin` and `resume`
@@ -115,7 +115,7 @@ impl Rules {
         }
     }
 
-    /// The form of a film.
+    /// Returns the layout of a film.
     #[cfg(feature = "gpu")]
     pub fn film_layout(&self) -> FilmLayout {
         self.film_layout
@@ -199,14 +199,14 @@ impl Rules {
         inside("tile", tile, "film", film.region)?;
         if self.film_layout.adaptive {
             let first = samples.end.min(self.pilot_samples).saturating_sub(samples.start);
-            let there = film.first_samples + tile.pixels() * u64::from(first);
-            if samples.end > self.pilot_samples && there < film.region.pixels() * u64::from(self.pilot_samples) {
+            let done = film.first_samples + tile.pixels() * u64::from(first);
+            if samples.end > self.pilot_samples && done < film.region.pixels() * u64::from(self.pilot_samples) {
                 return Err(RenderError::PilotIncomplete {
                     samples: samples.clone(),
                     first: self.pilot_samples,
                 });
             }
-            film.first_samples = there;
+            film.first_samples = done;
         }
         Ok(true)
     }

@@ -49,7 +49,8 @@ pub enum RenderError {
         /// The message of the driver.
         message: String,
     },
-    /// The device was lost, for example because its driver was reset, with all of its memory. Another one may be opened.
+    /// The device was lost, for example because its driver was reset, with all of its memory. Another one may be
+    /// opened.
     #[error("{device}: the device was lost: {message}")]
     Lost {
         /// The adapter's name.
@@ -103,7 +104,8 @@ pub enum RenderError {
     /// A film that cannot be resumed for this scene.
     #[error("the film does not fit the scene: {0}")]
     FilmMismatch(String),
-    /// Adaptive samples before the first samples of all pixels, which decide how many are needed.
+    /// Further samples under adaptive sampling before all pixels have their pilot samples, which determine how many are
+    /// needed.
     #[error(
         "samples {} to {} come too early: some pixels of the film do not have their first {first} yet",
         samples.start, samples.end
@@ -111,7 +113,7 @@ pub enum RenderError {
     PilotIncomplete {
         /// The samples.
         samples: Range<u32>,
-        /// Number of first samples of every pixel.
+        /// Number of pilot samples per pixel.
         first: u32,
     },
     /// The image, with this size in bytes, does not fit into memory.

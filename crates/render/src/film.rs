@@ -97,7 +97,7 @@ impl Film {
         }
     }
 
-    /// Returns the form; a film without pixels has the default one.
+    /// Returns the layout; a film without pixels has the default one.
     pub fn film_layout(&self) -> FilmLayout {
         FilmLayout {
             adaptive: !self.moments.is_empty(),

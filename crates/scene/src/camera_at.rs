@@ -6,7 +6,7 @@ use crate::problem::{At as _, Problem};
 use crate::scene::{Camera, Scene};
 
 impl CameraPath {
-    /// The camera at a frame. The key of a problem is below `camera`.
+    /// Returns the validated camera at a frame. Keys of problems are relative to `camera`.
     pub(crate) fn at(&self, frame: f64) -> Result<Camera, Problem> {
         let camera = self.description(frame).validate_frame();
         camera.map_err(|problem| Problem::new(format!("at frame {frame}, {problem}")).at("path"))
@@ -14,11 +14,13 @@ impl CameraPath {
 }
 
 impl Scene {
-    /// The camera at a frame: [`Scene::camera`] if it does not move. Frames may be fractions, and lie outside of the path.
+    /// Returns the camera at a frame; [`Scene::camera`] if it is not animated. Frames may be fractional, and outside of
+    /// the path.
     ///
     /// # Errors
     ///
-    /// A camera that has no view there, such as one whose way leads through what it looks at, and a frame that is not finite.
+    /// A camera without a valid view at this frame, for example because its path leads through its target point, and a
+    /// frame that is not finite.
     pub fn camera_at(&self, frame: f64) -> Result<Camera, SceneError> {
         let Some(path) = &self.camera_path else {
             return Ok(self.camera);

@@ -1,4 +1,4 @@
-//! Images of half the size: for the levels of pyramids, and where images are too large to be kept.
+//! Downsampling by two in linear light, for mip levels and for images that exceed the memory limit.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{Encoding, Image, Texels};
 use wgray_image::color::{linear_to_srgb, srgb_to_linear};
 
-/// A level in linear light.
+/// A mip level in linear light.
 pub struct Level {
     /// Columns.
     pub width: usize,
@@ -23,7 +23,7 @@ pub fn decoded(encoding: Encoding) -> Vec<f64> {
     (0..256).map(decode).collect()
 }
 
-/// Returns the texels of an image in linear light, in its own order.
+/// Returns a function from the index of a texel to its linear color.
 pub fn linear(image: &Image) -> impl Fn(usize) -> DVec3 + Sync {
     let texel: Box<dyn Fn(usize) -> DVec3 + Sync> = match &image.texels {
         Texels::Bytes(encoding, bytes) => {
@@ -36,14 +36,14 @@ pub fn linear(image: &Image) -> impl Fn(usize) -> DVec3 + Sync {
 }
 
 impl Level {
-    /// Returns the next level.
+    /// Returns the next coarser level.
     pub fn half(&self) -> Level {
         half(self.width, self.rows.len(), |x, y| self.rows[y][x])
     }
 }
 
-/// Returns an image at half its size in linear light, with its rows in the order of `row`, which maps a row of the result's source
-/// to a row of the image.
+/// Returns an image at half its size in linear light. `row` maps the order of rows in the result to the order in the
+/// image.
 pub fn half_of(image: &Image, row: impl Fn(usize) -> usize + Sync) -> Level {
     let (width, height) = (image.width as usize, image.height as usize);
     match &image.texels {
@@ -60,12 +60,12 @@ pub fn half_of(image: &Image, row: impl Fn(usize) -> usize + Sync) -> Level {
     }
 }
 
-/// Returns the level after one: each texel the mean over the part of that level that it covers.
+/// Returns the next coarser level. Each of its texels is the area-weighted mean of the texels that it covers.
 fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Sync) -> Level {
     let (new_width, new_height) = ((width / 2).max(1), (height / 2).max(1));
     let lines = (0..new_height).into_par_iter().with_min_len(16);
     let rows = if width.is_multiple_of(2) && height.is_multiple_of(2) {
-        // The general case with its weights, in the order of its sum.
+        // Even sizes: the sum of the general case below, in the same order, with constant weights.
         let color = |i: usize, j: usize| {
             let texel = |x: usize, y: usize| texel(2 * i + x, 2 * j + y) * 0.25;
             DVec3::ZERO + texel(0, 0) + texel(1, 0) + texel(0, 1) + texel(1, 1)
@@ -89,8 +89,8 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
     Level { width: new_width, rows }
 }
 
-/// Returns, for each of `to` texels in a line, the texels among `from` that it covers, with their weights; `to` is half of `from`, rounded
-/// down.
+/// Returns the texels among `from` that each of `to` texels of a row or column covers, with their weights. `to` is half
+/// of `from`, rounded down, but at least 1.
 fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     let size = from as f64 / to as f64;
     let cover = |i: usize| {

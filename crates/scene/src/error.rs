@@ -100,7 +100,8 @@ impl SceneError {
         }
     }
 
-    /// Returns the errors of several values one by one, or this error, and a message about those that are not among them.
+    /// Returns the errors of several values one by one, or this error, and a message about those that are not among
+    /// them.
     pub fn each(&self) -> (&[SceneError], Option<String>) {
         match self {
             SceneError::Several { errors, more: 0 } => (errors, None),

@@ -1,4 +1,4 @@
-//! From a description to a scene: glTF files are expanded, then everything is validated.
+//! Validation of descriptions: glTF files are expanded first.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,20 +9,20 @@ use crate::validate::integrator_note;
 use crate::{Assets, Description, Note, Scene, ShapeDescription};
 
 impl Description {
-    /// Checks every value and makes a scene of them. Image files that they name are in the current folder.
+    /// Validates all values and returns the scene. File names are relative to the current folder.
     ///
     /// # Errors
     ///
-    /// A value that breaks a rule. [`Scene::parse`](super::Scene::parse) reports all of them.
+    /// The first invalid value. [`Scene::parse`](super::Scene::parse) reports all of them.
     pub fn validate(&self) -> Result<Scene, Problem> {
         self.validate_with(&Assets::beside(Path::new(".")))
     }
 
-    /// Checks every value, the files that they name among them, and makes a scene of them.
+    /// Validates all values and files, and returns the scene.
     ///
     /// # Errors
     ///
-    /// A value that breaks a rule.
+    /// The first invalid value.
     pub fn validate_with(&self, assets: &Assets) -> Result<Scene, Problem> {
         let scene = self.validate_and_list(assets, &mut BTreeSet::new());
         scene.map_err(|problems| problems.first)

@@ -10,17 +10,19 @@ use super::PerspectiveDescription;
 const FOV: f64 = 35.0;
 /// Largest aspect whose horizontal field of view grows with the width: beyond it perspective would stretch the sides.
 const WIDEST: f64 = 2.0;
-/// Share of the image, from the centre to an edge, that the scene fills: margins of 5 % of the image remain.
+/// Fraction of the image, from the center to an edge, that the scene fills: margins of 5 % of the image remain.
 const INSIDE: f64 = 0.9;
-/// Smallest distance from the camera to the nearest point, relative to the scene's extent: a long object is not seen from inside its end.
+/// Smallest distance from the camera to the nearest point, relative to the scene's extent: a long object is not seen
+/// from inside its end.
 const NEAREST: f64 = 0.1;
-/// Smallest and largest diagonal of the bounds of a framed scene: distances and coordinates then stay within their limits.
+/// Smallest and largest diagonal of the bounds of a framed scene: distances and coordinates then stay within their
+/// limits.
 const EXTENTS: (f64, f64) = (1e-8, 4e8);
 /// Elevation in degrees from which on the vertical axis cannot be up in the image.
 const STEEPEST: f64 = 89.9;
 
-/// The side that a scene is seen from. Its front is towards -y and its top towards +z, as those of an upright glTF file are. Options
-/// use the names of [`View::name`].
+/// The side that a scene is seen from. Its front is towards -y and its top towards +z, as those of an upright glTF file
+/// are. Options use the names of [`View::name`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum View {
@@ -134,15 +136,15 @@ impl FromStr for Orbit {
 /// The framing of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// The side that it is seen from.
+    /// The view of the scene.
     pub view: View,
-    /// A direction in place of that side.
+    /// A direction that replaces the one of `view`.
     pub orbit: Option<Orbit>,
-    /// The vertical field of view in degrees; without, 35, or less where the image is wider than twice its height.
+    /// The vertical field of view in degrees. If absent, 35, or less if the image is more than twice as wide as high.
     pub fov: Option<f64>,
     /// Width of the image over its height.
     pub aspect: f64,
-    /// True to keep it in the image while the camera turns about its middle.
+    /// True to keep the whole scene in the image while the camera orbits its center.
     pub turns: bool,
 }
 
@@ -163,7 +165,7 @@ impl Framing {
     }
 }
 
-/// Returns the rule that a model breaks whose extent the automatic camera cannot frame.
+/// Checks that the extent of a model is within the limits of the automatic camera. The error is the violated rule.
 pub fn check_extent(points: impl Iterator<Item = DVec3>) -> Result<(), String> {
     let (low, top) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, top), p| {
         (low.min(p), top.max(p))
@@ -178,8 +180,8 @@ pub fn check_extent(points: impl Iterator<Item = DVec3>) -> Result<(), String> {
     }
 }
 
-/// Returns the nearest camera that sees all points with equal margins on opposite sides. It looks at their middle. Without a point it
-/// frames the origin.
+/// Returns the nearest camera that sees all points with equal margins on opposite sides, and looks at their center.
+/// Without points it frames the origin.
 pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> PerspectiveDescription {
     let (towards, up) = framing.direction();
     let forward = -towards.normalize();
@@ -226,19 +228,19 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
     }
 }
 
-/// Maximum number of steps of [`Extent::offset`], far above what any model takes.
+/// Maximum number of Newton steps of [`Extent::offset`], far above the number that any model needs.
 const MAX_STEPS: usize = 64;
 
-/// The extent of points about the middle of their bounds.
+/// The extent of points relative to the center of their bounding box.
 struct Extent<'a, I> {
     points: &'a I,
     middle: DVec3,
-    /// The axis that the points turn about, if they do: each stands for its circle.
+    /// Axis of rotation, if the points rotate. Each of them then stands for its whole circle.
     axis: Option<DVec3>,
 }
 
 impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
-    /// Returns how far the points reach in direction `n`, and the derivative of that as `n` moves by `step`.
+    /// Returns the support function of the points, the maximum of `p . n`, and its derivative along `step`.
     fn reach(&self, n: DVec3, step: DVec3) -> (f64, f64) {
         let of = |point: DVec3| {
             let p = point - self.middle;
@@ -262,11 +264,11 @@ impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
         self.points.clone().map(of).fold((f64::NEG_INFINITY, 0.0), further)
     }
 
-    /// Returns how far to move a camera, `back` from the middle, along `side` so that both margins of that axis are equal.
+    /// Returns the offset along `side` of a camera at distance `back` that makes both margins along `side` equal.
     ///
-    /// Let w be the tangent of half the angle that the points then fill: they reach to the camera's planes of that angle, so
-    /// that `reach(side - w forward) + reach(-side - w forward) = 2 w back`. The difference of the two sides is convex in w and
-    /// decreasing, hence Newton's method from w = 0 converges to its root from below.
+    /// Let w be the tangent of half the angle that the points then fill. They touch both planes of that angle, so that
+    /// `reach(side - w forward) + reach(-side - w forward) = 2 w back`. The left side minus the right is convex and
+    /// decreasing in w, hence Newton's method from w = 0 converges to its root from below.
     fn offset(&self, side: DVec3, forward: DVec3, back: f64) -> f64 {
         let (mut w, mut offset) = (0.0, 0.0);
         for _ in 0..MAX_STEPS {

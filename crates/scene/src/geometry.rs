@@ -1,4 +1,4 @@
-//! The form and place of shapes, their extents and bounding boxes.
+//! Geometry of shapes, and their bounding boxes.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ pub type Bounds = (DVec3, DVec3);
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Parallelogram {
-    /// The middle.
+    /// Center.
     pub center: DVec3,
     /// Half the first edge: half the width along the tangent.
     pub u: DVec3,
@@ -26,48 +26,48 @@ pub struct Parallelogram {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Shape {
-    /// Its form and place.
+    /// Geometry.
     pub geometry: Geometry,
     /// Index into [`Scene::materials`](crate::Scene::materials).
     pub material: usize,
 }
 
-/// The form and place of a shape.
+/// The geometry of a shape, in world space.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// A rectangle; its normal is u x v.
     Rectangle(Parallelogram),
-    /// A disk: of the points of a parallelogram those with x² + y² <= 1; its normal is u x v.
+    /// A disk: the points of the parallelogram with x² + y² <= 1; its normal is u x v.
     Disk(Parallelogram),
-    /// An ellipsoid (a sphere among them): the points `center + x a + y b + z c` with x² + y² + z² = 1.
+    /// An ellipsoid or a sphere: the points `center + x a + y b + z c` with x² + y² + z² = 1.
     Ellipsoid {
-        /// The middle.
+        /// Center.
         center: DVec3,
-        /// The half axes, linearly independent.
+        /// Semi-axes, linearly independent.
         axes: [DVec3; 3],
     },
     /// A capped cylinder: the surface of the points `center + x a + y b + z c` with x² + y² <= 1 and |z| <= 1.
     Cylinder {
-        /// The middle.
+        /// Center.
         center: DVec3,
-        /// Two radii and half the axis, perpendicular to each other.
+        /// Two radii and half of the axis, perpendicular to each other.
         axes: [DVec3; 3],
     },
-    /// Triangles that share one shape number (a triangle, the faces of a tetrahedron), each with its vertices
-    /// counter-clockwise as seen from outside: normal (v1 - v0) x (v2 - v1).
+    /// Triangles with a common shape index: one, or the four faces of a tetrahedron. Vertices are counter-clockwise as
+    /// seen from outside: the normal is (v1 - v0) x (v2 - v1).
     Triangles(Vec<[DVec3; 3]>),
-    /// A mesh of triangles.
+    /// A triangle mesh.
     Mesh {
-        /// Its triangles.
+        /// The mesh.
         mesh: Arc<Mesh>,
-        /// The map from the mesh file's coordinates to the scene's; invertible.
+        /// Object-to-world transform; invertible.
         to_world: DAffine3,
-        /// For each group of the mesh an index into [`Scene::materials`](crate::Scene::materials).
+        /// Index into [`Scene::materials`](crate::Scene::materials) for each group of the mesh.
         materials: Vec<usize>,
     },
     /// An infinite plane.
     Plane {
-        /// A point of it, the origin of its texture coordinates.
+        /// A point of the plane, the origin of the texture coordinates.
         point: DVec3,
         /// Unit tangent: the direction of u.
         tangent: DVec3,
@@ -77,14 +77,15 @@ pub enum Geometry {
 }
 
 impl Parallelogram {
-    /// Returns its corners.
+    /// Returns the corners.
     pub fn corners(&self) -> [DVec3; 4] {
         [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)].map(|(a, b)| self.center + self.u * a + self.v * b)
     }
 }
 
 impl Geometry {
-    /// Returns the value of `type` in a scene file: a sphere and a triangle have names of their own.
+    /// Returns the value of `type` in a scene file, which distinguishes spheres from ellipsoids and triangles from
+    /// tetrahedra.
     pub fn name(&self) -> &'static str {
         match self {
             Geometry::Rectangle(_) => "rectangle",
@@ -99,7 +100,7 @@ impl Geometry {
         }
     }
 
-    /// Moves it by an offset.
+    /// Translates the geometry.
     pub fn translate(&mut self, offset: DVec3) {
         match self {
             Geometry::Rectangle(shape) | Geometry::Disk(shape) => shape.center += offset,
@@ -133,8 +134,8 @@ impl Geometry {
         }
     }
 
-    /// Calls a function with points between whose projections onto a unit vector those of all its points lie: with one point of a
-    /// plane, and with the corners of a mesh's bounding box.
+    /// Calls `point` with points whose projections onto a unit vector bound those of the geometry. A plane has one such
+    /// point; for a mesh they are the corners of its bounding box.
     pub fn each_extreme(&self, direction: DVec3, mut point: impl FnMut(DVec3)) {
         let mut between = |center: DVec3, half: f64| {
             point(center + direction * half);
@@ -161,12 +162,12 @@ impl Geometry {
     }
 }
 
-/// Returns true if half axes are those of a sphere that is not rotated.
+/// Returns true if the semi-axes are those of a sphere that is not rotated.
 fn is_sphere(axes: &[DVec3; 3]) -> bool {
     *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }
 
-/// Returns the bounding box of two boxes.
+/// Returns the union of two bounding boxes.
 pub(crate) fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Bounds {
     (low.min(other_low), high.max(other_high))
 }
@@ -175,7 +176,7 @@ fn around(center: DVec3, reach: DVec3) -> Option<Bounds> {
     Some((center - reach, center + reach))
 }
 
-/// The extent of a disk or an ellipsoid along each axis is the norm of its half axes' components there.
+/// Returns the half extents of a disk or an ellipsoid: per coordinate axis, the norm of its semi-axes' components.
 fn root_of_squares(axes: &[DVec3]) -> DVec3 {
     axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt)
 }

@@ -95,7 +95,8 @@ impl Assets {
         }
     }
 
-    /// Returns an image in memory. `encoding`, if given, must be that of the image; `fits` checks the header first. The error is the value with the violated rule.
+    /// Returns an image in memory. `encoding`, if given, must be that of the image; `fits` checks the header first. The
+    /// error is the value with the violated rule.
     fn image_in_memory(
         &self,
         name: &str,

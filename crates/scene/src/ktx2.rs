@@ -1,6 +1,6 @@
-//! KTX 2 files with Basis Universal texels, which glTF files reference by `KHR_texture_basisu` (Khronos Group, "KTX File
-//! Format Specification", version 2.0.4). Every length is checked here, because the decoders allocate what a header
-//! declares.
+//! KTX 2 files with Basis Universal texels, which glTF files reference by `KHR_texture_basisu` (Khronos Group, "KTX
+//! File Format Specification", version 2.0.4). Every length is checked here, because the decoders allocate what a
+//! header declares.
 
 use std::io::Read as _;
 use std::ops::Range;
@@ -146,7 +146,8 @@ impl<'a> Ktx2<'a> {
         })
     }
 
-    /// Decodes the largest level, to 8 bits per channel. The error is what is wrong, to be printed after the file's name.
+    /// Decodes the largest level, to 8 bits per channel. The error is what is wrong, to be printed after the file's
+    /// name.
     pub fn decode(&self) -> Result<DynamicImage, String> {
         let inflated;
         let bytes = match self.supercompression {

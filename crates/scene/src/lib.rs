@@ -1,7 +1,8 @@
-//! Scene files, mesh files and glTF files as validated scenes.
+//! Scene files, mesh files and glTF files, loaded as validated scenes.
 //!
-//! Text is parsed into a [`Description`], the contents of the file field for field; [`Description::validate`] makes a [`Scene`] of it, with every
-//! name resolved and every value in range. Nothing behind a `Scene` checks again.
+//! Text is parsed into a [`Description`], which has the contents of the file field by field. [`Description::validate`]
+//! returns a [`Scene`], in which every name is resolved and every value is in range. Code that uses a `Scene` does not
+//! validate again.
 
 mod camera_at;
 mod camera_path;

@@ -1,22 +1,23 @@
-//! Metals by their names: complex indices of refraction, as measured in films and crystals.
+//! Measured complex indices of refraction of metals, by name.
 
 use glam::DVec3;
 
-/// The index of refraction of a metal for red, green and blue light.
+/// The complex index of refraction of a metal for red, green and blue light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetalIndex {
-    /// The real parts.
+    /// Real parts.
     pub eta: DVec3,
-    /// The imaginary parts, by which light is absorbed.
+    /// Imaginary parts: extinction coefficients.
     pub k: DVec3,
 }
 
-/// A name, n and k for linear red, green and blue of sRGB.
+/// A name, and eta and k for linear sRGB red, green and blue.
 type Entry = (&'static str, [f64; 3], [f64; 3]);
 
-/// The spectra in the tables of luxpop.com and of E. D. Palik, "Handbook of Optical Constants of Solids", 1985, weighted by the curves
-/// that give red, green and blue (CIE 1931, sRGB's primaries), such that a constant keeps its value. So gold reflects 0.97, 0.80
-/// and 0.32 of what falls on it straight: `benches/peers/metals.py` prints this table.
+/// The spectra in the tables of luxpop.com and of E. D. Palik, "Handbook of Optical Constants of Solids", 1985,
+/// weighted by the color matching functions (CIE 1931, primaries of sRGB) and normalized so that a constant spectrum
+/// keeps its value. For example, gold reflects (0.97, 0.80, 0.32) at normal incidence. `benches/peers/metals.py` prints
+/// this table.
 const METALS: &[Entry] = &[
     ("aluminium", [1.6575, 0.8804, 0.5212], [9.2238, 6.2695, 4.837]),
     ("beryllium", [4.185, 3.185, 2.7841], [3.8355, 3.0101, 2.869]),
@@ -35,7 +36,7 @@ const METALS: &[Entry] = &[
 ];
 
 impl MetalIndex {
-    /// The metal of this name.
+    /// Returns the metal of this name.
     pub fn named(name: &str) -> Option<MetalIndex> {
         let (_, eta, k) = METALS.iter().find(|(known, ..)| *known == name)?;
         Some(MetalIndex {
@@ -44,7 +45,7 @@ impl MetalIndex {
         })
     }
 
-    /// All names.
+    /// Returns all names.
     pub fn names() -> impl Iterator<Item = &'static str> {
         METALS.iter().map(|(name, ..)| *name)
     }

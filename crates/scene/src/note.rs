@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-/// A warning about a scene or one of its files, as in `rock.ply:8: face 3: must have 3 vertices or more; it has 2; the face was removed`.
+/// A warning about a scene or one of its files, as in `rock.ply:8: face 3: must have 3 vertices or more; it has 2; the
+/// face was removed`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub struct Note {

@@ -19,7 +19,8 @@ const GROUND: &str = "ground";
 const GRAY: [f64; 3] = [0.5; 3];
 /// The radius of the ground, relative to the diagonal of the model's bounds: the shadows of low lights stay on it.
 const RADIUS: f64 = 5.0;
-/// The gap between the model and the ground, relative to that diagonal. A face at the bottom would otherwise coincide with it.
+/// The gap between the model and the ground, relative to that diagonal. Without it, a face at the bottom would coincide
+/// with the ground.
 const GAP: f64 = 1e-4;
 
 /// Options for a model file that is rendered without a scene.
@@ -107,7 +108,7 @@ impl Scene {
         self.shapes.iter().position(|shape| is_ground(shape.material))
     }
 
-    /// Takes the ground of another moment of the same model: it stands still while the model moves.
+    /// Copies the ground from another frame of the same model, so that it stands still while the model moves.
     pub fn keep_ground(&mut self, before: &Scene) {
         if let (Some(now), Some(then)) = (self.ground(), before.ground()) {
             self.shapes[now].geometry = before.shapes[then].geometry.clone();
@@ -124,8 +125,8 @@ pub struct UpAxis {
 }
 
 impl UpAxis {
-    /// Returns the rotation that turns this axis upwards, where `to_scene` takes the file's directions to the scene's. None
-    /// if it points up already. A model that stands on its head is turned about the axis from its front to its back.
+    /// Returns the rotation that maps this axis to +z, where `to_scene` maps directions of the file to those of the
+    /// scene; `None` if it is +z already. If it is -z, the model is rotated about the axis from its front to its back.
     pub(super) fn rotation(self, to_scene: impl Fn(DVec3) -> DVec3) -> Option<(Rotation, DMat3)> {
         let sign = if self.is_negative { -1.0 } else { 1.0 };
         let up = to_scene(DVec3::AXES[self.axis] * sign);

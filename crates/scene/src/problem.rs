@@ -29,7 +29,8 @@ pub struct Problem {
     pub key: KeyPath,
     /// The value and the rule.
     pub message: String,
-    /// True if it is damage to a file that the scene names, for which a stand-in exists ([`Assets::strict`](super::Assets::strict)).
+    /// True if it is damage to a file that the scene names, for which a stand-in exists
+    /// ([`Assets::strict`](super::Assets::strict)).
     pub(crate) is_damage: bool,
     /// True if the key is unknown.
     pub is_unknown_key: bool,
@@ -82,8 +83,8 @@ impl Problem {
     }
 }
 
-/// Maximum number of problems that are reported. Of each section that many are kept, because the order of the sections in the
-/// file is unknown until all are checked.
+/// Maximum number of problems that are reported. Of each section that many are kept, because the order of the sections
+/// in the file is unknown until all are checked.
 pub(crate) const MAX_PROBLEMS: usize = 20;
 
 /// The problems of a description: at least one.

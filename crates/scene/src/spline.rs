@@ -90,15 +90,15 @@ mod tests {
 
     #[test]
     fn keys_are_met_and_held() {
-        for way in WAYS {
+        for kind in WAYS {
             for (time, wanted) in KEYS {
-                assert_eq!(value(&KEYS, time, way), Some(wanted));
+                assert_eq!(value(&KEYS, time, kind), Some(wanted));
             }
             for (time, wanted) in [(-2.5, 3.0), (-1e300, 3.0), (10.26, -6.5), (1e300, -6.5)] {
-                assert_eq!(value(&KEYS, time, way), Some(wanted));
+                assert_eq!(value(&KEYS, time, kind), Some(wanted));
             }
-            assert_eq!(value(&KEYS[2..3], 7.0, way), Some(2.5));
-            assert_eq!(value::<f64>(&[], 7.0, way), None);
+            assert_eq!(value(&KEYS[2..3], 7.0, kind), Some(2.5));
+            assert_eq!(value::<f64>(&[], 7.0, kind), None);
         }
     }
 
@@ -109,8 +109,8 @@ mod tests {
             assert_ne!(value(&KEYS, time, Interpolation::Smooth), Some(wanted));
         }
         let points = [(0.0, DVec3::new(0.0, 2.0, -4.0)), (8.0, DVec3::new(4.0, 2.0, 4.0))];
-        for way in WAYS {
-            assert_eq!(value(&points, 2.0, way), Some(DVec3::new(1.0, 2.0, -2.0)));
+        for kind in WAYS {
+            assert_eq!(value(&points, 2.0, kind), Some(DVec3::new(1.0, 2.0, -2.0)));
         }
     }
 
@@ -124,8 +124,8 @@ mod tests {
         let mut straightened = 0.0_f64;
         for i in 0..=90 {
             let t = f64::from(i) / 10.0;
-            for way in WAYS {
-                let found = value(&uneven, t, way).unwrap();
+            for kind in WAYS {
+                let found = value(&uneven, t, kind).unwrap();
                 assert!(found.abs_diff_eq(line(t), 1e-12), "{t}: {found}");
             }
             if t <= 6.0 {
@@ -158,8 +158,8 @@ mod tests {
     }
 
     /// Returns the speeds just before and just after each key.
-    fn speeds(way: Interpolation) -> Vec<(f64, f64)> {
-        let at = |time| value(&KEYS, time, way).unwrap();
+    fn speeds(kind: Interpolation) -> Vec<(f64, f64)> {
+        let at = |time| value(&KEYS, time, kind).unwrap();
         let step = 1e-6;
         let inner = &KEYS[1..5];
         let pairs = inner
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn the_speed_of_a_smooth_way_does_not_jump() {
-        let jumps = |way| speeds(way).into_iter().map(|(a, b)| (a - b).abs());
+        let jumps = |kind| speeds(kind).into_iter().map(|(a, b)| (a - b).abs());
         assert!(jumps(Interpolation::Smooth).all(|jump| jump < 1e-3));
         assert!(jumps(Interpolation::Linear).all(|jump| jump > 1.0));
     }
@@ -193,9 +193,9 @@ mod tests {
     #[test]
     fn extreme_keys_give_finite_values() {
         let keys = [(-1e9, -1e9), (-1e9 + 1e-6, 1e9), (0.0, -1e9), (1e-6, 1e9), (1e9, -1e9)];
-        for way in WAYS {
+        for kind in WAYS {
             for time in [-1e9 + 5e-7, -0.5e9, 5e-7, 1.0, 1e8, 0.999e9] {
-                assert!(value(&keys, time, way).unwrap().is_finite(), "{time}");
+                assert!(value(&keys, time, kind).unwrap().is_finite(), "{time}");
             }
         }
     }

@@ -5,10 +5,11 @@ use std::cell::Cell;
 use super::key_path::cut;
 use super::key_path::list;
 
-/// Maximum length of a name that is compared, in bytes. Comparing takes time proportional to the product of both lengths.
+/// Maximum length of a name that is compared, in bytes. Comparing takes time proportional to the product of both
+/// lengths.
 const MAX_LEN: usize = 64;
 
-/// Minimum length of the start of a name that stands for the name, in bytes.
+/// Minimum length in bytes of a prefix that is accepted as an abbreviation of a name.
 const MIN_START_LEN: usize = 3;
 
 /// Returns the name that is most similar to a misspelled one, if any is similar enough.
@@ -35,16 +36,17 @@ pub(super) fn hint<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) ->
     closest(wrong, names).map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
 }
 
-/// Maximum number of unknown names for which similar ones are searched: a scene may have 100,000 shapes with unknown materials,
-/// and as many materials.
+/// Maximum number of unknown names for which similar ones are searched: a scene may have 100,000 shapes with unknown
+/// materials, and as many materials.
 const MAX_SEARCHES: usize = 40;
 
-/// Makes messages about unknown names, whose cost is limited.
+/// Messages about unknown names, of which only a limited number searches for similar names.
 #[derive(Debug, Default)]
 pub(super) struct Suggestions(Cell<usize>);
 
 impl Suggestions {
-    /// Returns the message that a scene has nothing of a kind by this name. The first messages say what it has instead.
+    /// Returns the message about an unknown name of a kind. The first [`MAX_SEARCHES`] messages list the available
+    /// names.
     pub fn unknown<'a>(&self, kind: &str, wrong: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
         let searches = self.0.get();
         self.0.set(searches.saturating_add(1));

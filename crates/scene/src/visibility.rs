@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::{Bounds, Camera, Color, Geometry, Light, Projection, Reflection, Scene, Shape};
 
 impl Scene {
-    /// Returns warnings if the scene certainly has no light, or no geometry in view of its camera. A scene without warnings may
-    /// still render black: occlusion and the reach of lights are not considered.
+    /// Returns warnings if the scene certainly has no light, or no geometry in view of its camera. A scene without
+    /// warnings may still render black: occlusion and the reach of lights are not considered.
     pub fn visibility_warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if !self.has_geometry_in_view() && !self.shows_environment_only() {
@@ -62,7 +62,7 @@ impl Scene {
         is_lit || self.has_emission()
     }
 
-    /// Returns whether the scene is an environment map alone, as a scene without shapes may be meant.
+    /// Returns true if the scene consists of an environment map only: the missing shapes may be intended.
     fn shows_environment_only(&self) -> bool {
         let environment = self.environment.as_ref();
         self.shapes.is_empty() && environment.is_some_and(|environment| environment.image.is_some())

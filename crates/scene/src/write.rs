@@ -59,9 +59,9 @@ impl Description {
         for shape in &self.shapes {
             let is_gltf = matches!(shape, ShapeDescription::Gltf(_));
             let text = element("shapes", shape, if is_gltf { &defaults } else { &none })?;
-            let told = "# Meshes with their materials, and lights. A table `materials` replaces materials of the file by those of\n\
+            let comment = "# Meshes with their materials, and lights. A table `materials` replaces materials of the file by those of\n\
                         # this scene, by name.\n";
-            sections.push(format!("{}{text}", if is_gltf { told } else { "" }));
+            sections.push(format!("{}{text}", if is_gltf { comment } else { "" }));
         }
         for instance in &self.instances {
             sections.push(element("instances", instance, &none)?);

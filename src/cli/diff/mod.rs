@@ -27,7 +27,8 @@ docs/golden-pictures.md defines the metrics.";
 
 /// Exit code if the images differ.
 const DIFFER: u8 = 5;
-/// Maximum number of pixels for which FLIP is computed by default. It takes a microsecond per pixel, several for linear images.
+/// Maximum number of pixels for which FLIP is computed by default. It takes a microsecond per pixel, several for linear
+/// images.
 const MAX_FLIP_PIXELS: u64 = 1 << 24;
 
 #[derive(Debug, clap::Args)]
@@ -44,8 +45,8 @@ pub struct Args {
 
     /// Fail only if a metric is worse than X; may be repeated
     ///
-    /// Larger values are worse, except for psnr and ssim. Without this option any difference fails. NaN, infinite values and
-    /// missing channels always fail.
+    /// Larger values are worse, except for psnr and ssim. Without this option any difference fails. NaN, infinite
+    /// values and missing channels always fail.
     #[arg(long, value_name = "METRIC=X", value_parser = Limit::parse)]
     fail: Vec<Limit>,
 

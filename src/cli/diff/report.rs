@@ -248,8 +248,8 @@ impl Report {
         self.layers.iter().any(LayerReport::is_different)
     }
 
-    /// Collects the reasons for failing. Different sizes, positions and channels and non-finite values always fail; otherwise
-    /// values beyond a limit do, or any difference if there are no limits.
+    /// Collects the reasons for failing. Different sizes, positions and channels and non-finite values always fail;
+    /// otherwise values beyond a limit do, or any difference if there are no limits.
     pub fn judge(&mut self, limits: &[Limit], threshold: f64) {
         let mut fails = Vec::new();
         let (a, b) = (self.size_a, self.size_b);

@@ -179,7 +179,8 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
     Ok(())
 }
 
-/// Renders one image, or a part of one. Signals are deferred from the first image on, and end the command after cleanup.
+/// Renders one image, or a part of one. Signals are deferred from the first image on, and end the command after
+/// cleanup.
 fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant) -> anyhow::Result<()> {
     let before = signals.deferred().cloned();
     let mut checkpoint = plan.open_checkpoint(before.as_ref())?;

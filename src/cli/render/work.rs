@@ -199,8 +199,8 @@ fn put(
     })
 }
 
-/// Writes the last whole pass into the files of the images, except those with more samples. Returns `None` if no file is
-/// written; an output that cannot be written is a warning, because the complete image may succeed.
+/// Writes the last whole pass into the files of the images, except those with more samples. Returns `None` if no file
+/// is written; an output that cannot be written is a warning, because the complete image may succeed.
 fn save_pass(
     plan: &Plan,
     renderer: &mut Renderer,

@@ -1,4 +1,4 @@
-//! The files that random scenes name: meshes and images.
+//! Files of random scenes: meshes and images.
 
 use std::fs;
 use std::path::Path;
@@ -10,10 +10,11 @@ use crate::meshes::forms::Form;
 use crate::random::Random;
 use crate::textures::write_exr;
 
-/// Images around scenes, beside their meshes: their sizes.
+/// Environment maps of random scenes, next to the meshes: name, width and height.
 pub const AROUND: &[(&str, u32, u32)] = &[("dot.exr", 1, 1), ("odd.exr", 5, 3), ("wide.exr", 64, 32)];
 
-/// Mesh files, and whether they have texture coordinates and normals. They are beside the scenes that failing tests write.
+/// Mesh files: name, whether they have texture coordinates, and whether they have normals. They are next to the scenes
+/// that failing tests write.
 pub const MESHES: &[(&str, bool, bool)] = &[
     ("soup.obj", true, false),
     ("slivers.obj", false, false),
@@ -23,7 +24,7 @@ pub const MESHES: &[(&str, bool, bool)] = &[
     ("painted.ply", true, true),
 ];
 
-/// The folder that random scenes and their meshes are in.
+/// Creates the folder of random scenes and their meshes at the first call, and returns it.
 pub fn folder() -> &'static Path {
     static FOLDER: OnceLock<&Path> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -43,7 +44,7 @@ pub fn folder() -> &'static Path {
                 "painted.ply" => painted(&form, &normals, &uvs, &random),
                 _ => form.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs)),
             };
-            // Whoever reads it sees one whole file.
+            // A rename is atomic, so that concurrent readers see a complete file.
             let draft = folder.join(format!("{name}.{}", std::process::id()));
             fs::write(&draft, text).expect("a place for a mesh");
             fs::rename(&draft, folder.join(name)).expect("a place for a mesh");
@@ -58,7 +59,7 @@ pub fn folder() -> &'static Path {
     })
 }
 
-/// A PLY file whose vertices have colours, some of them without any of one part, or beyond 1.
+/// Returns a PLY file with vertex colors, whose components are partly 0 or above 1.
 fn painted(form: &Form, normals: &[DVec3], uvs: &[[f64; 2]], random: &Random) -> String {
     let names = [
         "x", "y", "z", "nx", "ny", "nz", "u", "v", "red", "green", "blue", "alpha",
@@ -83,7 +84,7 @@ fn painted(form: &Form, normals: &[DVec3], uvs: &[[f64; 2]], random: &Random) ->
     text
 }
 
-/// A sphere with dents and horns.
+/// Returns a sphere with randomly displaced vertices.
 fn bumpy(random: &Random) -> Form {
     let mut form = Form::icosphere(2);
     form.points.iter_mut().for_each(|p| *p *= random.between(0.4, 1.3));

@@ -212,5 +212,5 @@ pub fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
             *own = emission;
             material
         })
-        .boxed() // an unboxed one has its value tree on the stack
+        .boxed() // an unboxed strategy would put its value tree on the stack
 }

@@ -1,9 +1,9 @@
-//! Scenes elsewhere and of another size.
+//! Scaling and translation of random scenes.
 
 use glam::DVec3;
 use wgray::scene::*;
 
-/// Scales and moves all that a scene has.
+/// Scales and translates all objects of a scene.
 pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
     let point = |p: &mut DVec3| *p = *p * scale + offset;
     match &mut d.camera {
@@ -66,7 +66,7 @@ pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
     }
 }
 
-/// Scales and moves a mesh.
+/// Scales and translates a mesh.
 fn placed(
     translate: &mut Option<DVec3>,
     factors: &mut Option<Scale>,

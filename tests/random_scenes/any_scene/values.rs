@@ -1,10 +1,10 @@
-//! Points, directions, lengths and colours.
+//! Proptest strategies: points, directions, lengths and colors.
 
 use glam::DVec3;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// Often one of a few numbers, so that things touch, coincide and lie in one plane.
+/// Generates coordinates, often from a few values, so that objects touch, coincide or are coplanar.
 pub fn coordinate() -> impl Strategy<Value = f64> {
     prop_oneof![
         3 => select(&[0.0, 0.5, -0.5, 1.0, -1.0][..]),
@@ -22,7 +22,7 @@ pub fn direction() -> impl Strategy<Value = DVec3> {
     prop_oneof![2 => axes, 1 => point().prop_filter("a direction", |v| v.length() > 0.1)]
 }
 
-/// Perpendicular directions with equal lengths, of any orientation.
+/// Generates two directions that are not parallel.
 pub fn frame() -> impl Strategy<Value = [DVec3; 2]> {
     [direction(), direction()].prop_filter("a frame", |[a, b]| a.normalize().cross(b.normalize()).length() > 0.01)
 }

@@ -1,6 +1,6 @@
 use super::*;
 
-/// A text after a value was given to a key, or none.
+/// Returns a text after a key was set to a value, or removed if the value is `none`.
 fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     let value = (value != "none").then(|| {
         let mut table: toml::Table = toml::from_str(&format!("value = {value}")).unwrap();
@@ -9,10 +9,9 @@ fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     edited(text, &path.parse().unwrap(), value.as_ref())
 }
 
-/// Each with the layout of its table, the change, and the text that comes of it. Every text of them is edited with the line ends of
-/// DOS and a byte-order mark too.
+/// Text, key, value, and the expected text. Each text is also edited with DOS line ends and a byte-order mark.
 const CHANGES: [(&str, &str, &str, &str); 36] = [
-    // existing values
+    // Existing values.
     (
         "[camera] # c\nfov=45   # degrees\n",
         "camera.fov",
@@ -65,7 +64,7 @@ const CHANGES: [(&str, &str, &str, &str); 36] = [
         "[1, 2, 3]",
         "[m]\na = [1, 2, 3] # a\n",
     ),
-    // keys that are not
+    // Absent keys.
     (
         "[camera]\nfov = 45 # c\n\n[render]\n",
         "camera.up",
@@ -158,7 +157,7 @@ const CHANGES: [(&str, &str, &str, &str); 36] = [
         "3",
         "image = { width = 4 }\ncamera.fov = 45\nrender = { seed = 3 }\n[[shapes]]\n",
     ),
-    // keys that go
+    // Removed keys.
     (
         "[camera]\nfov = 45\na = 1\nb = 2\n",
         "camera.a",
@@ -218,7 +217,7 @@ fn only_the_bytes_of_a_value_change() {
 
 #[test]
 fn what_has_no_place_is_refused() {
-    for (text, path, value, told) in [
+    for (text, path, value, message) in [
         ("[camera]\nfov = 45\n", "camera.fov.a", "1", "is in no table"),
         (
             "[[shapes]]\nradius = 1\n",
@@ -236,7 +235,7 @@ fn what_has_no_place_is_refused() {
         ("[m\n", "m.a", "1", "m.a: "),
     ] {
         let error = set(text, path, value).unwrap_err();
-        assert!(error.contains(told) && error.starts_with(path), "{error}");
+        assert!(error.contains(message) && error.starts_with(path), "{error}");
     }
 }
 

@@ -50,13 +50,13 @@ export function setUpCompare(picture, onKey, showNotice) {
     }
   }
 
-  onState((state, heard) => {
+  onState((state, isCurrent) => {
     element("reference-name").textContent = state.comparable[1] ?? "none";
     const apart = state.apart;
     const number = (value) => (value === null ? "not finite" : value === 0 ? "0" : value.toPrecision(3));
     element("rmse").textContent = apart ? number(apart.rmse) : "–";
     element("flip").textContent = apart ? number(apart.flip) : "–";
-    if (!heard) return;
+    if (!isCurrent) return;
     if (viewName(state.view) === "compare") {
       document.querySelector(`input[name=against][value=${state.view.compare}]`).checked = true;
     }

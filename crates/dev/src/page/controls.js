@@ -1,5 +1,6 @@
-// Controls for the values of an object: number boxes, sliders, colours, vectors, choices, switches and texts. Each maker returns
-// {inputs, elements, update}. It calls `change(value, i)` with the new value; `i` is the changed index of a list.
+// Controls for the values of an object: number boxes, sliders, colours, vectors, choices, switches and texts. Each
+// maker returns {inputs, elements, update}. It calls `change(value, i)` with the new value; `i` is the changed index of
+// a list.
 
 import { colorOf, hexOf } from "/color.js";
 import { digits, fit, numberField, say } from "/numbers.js";

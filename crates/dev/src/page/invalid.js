@@ -1,4 +1,5 @@
-// Invalid pixels: counts of NaN, infinite and negative values in the panel, and a badge on the image that scrolls to them.
+// Invalid pixels: counts of NaN, infinite and negative values in the panel, and a badge on the image that scrolls to
+// them.
 
 import { ask, element, onFrame, onState } from "/link.js";
 
@@ -7,8 +8,8 @@ const KINDS = [["nan", "NaN"], ["infinite", "infinite"], ["negative", "negative"
 export function setUpInvalid() {
   element("marks").addEventListener("change", ({ target }) => ask({ marks: target.checked }));
   element("invalid").addEventListener("click", reveal);
-  onState((state, heard) => {
-    if (heard) element("marks").checked = state.marks;
+  onState((state, isCurrent) => {
+    if (isCurrent) element("marks").checked = state.marks;
   });
   onFrame(show);
 }

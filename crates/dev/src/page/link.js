@@ -13,7 +13,7 @@ let [received, drawn] = [0, 0]; // frame counters, so that a frame decoded late 
 
 export const element = (id) => document.getElementById(id);
 
-export const onState = (f) => listeners.state.push(f); // f(state, heard)
+export const onState = (f) => listeners.state.push(f); // f(state, isCurrent)
 export const onFrame = (f) => listeners.frame.push(f); // f(header, images by name)
 export const onLink = (f) => listeners.link.push(f); // f(isConnected, isFull)
 export const onRefused = (f) => listeners.refused.push(f); // f(text)
@@ -38,7 +38,8 @@ export const put = (question) => send(question, false);
 // Resolves to the values of a pixel: {x, y, values}.
 export const askPixel = (pixel) => put({ pixel });
 
-// Returns whether the program has executed all commands of this page. Until then its state must not replace newer input.
+// Returns whether the program has executed all commands of this page. Until then its state must not replace newer
+// input.
 export const isHeard = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.heard >= asked;
 export const lastState = () => state;
 
@@ -106,8 +107,8 @@ async function showFrame(data) {
   }
 }
 
-// Reports a frame, and with it all earlier ones, as displayed once the browser has drawn it. The program keeps few frames in
-// flight, so that a slow connection delays no newer frame.
+// Reports a frame, and with it all earlier ones, as displayed once the browser has drawn it. The program keeps few
+// frames in flight, so that a slow connection delays no newer frame.
 function acknowledge(from, number) {
   requestAnimationFrame(() => {
     if (from.readyState === WebSocket.OPEN) from.send(JSON.stringify({ shown: number }));

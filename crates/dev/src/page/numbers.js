@@ -33,9 +33,9 @@ function stepOf({ kind, unit, range }, list) {
   return range && range[1] - range[0] <= 2 ? 0.01 : 0.1;
 }
 
-// Turns a box into the editor of a field's number. `numbers()` returns the list that contains the number. `use(x)` receives a new
-// value on Enter or when the box loses the focus, unless the text is empty or not a number. Returns a function that shows a
-// value unless the user is typing one.
+// Turns a box into the editor of a field's number. `numbers()` returns the list that contains the number. `use(x)`
+// receives a new value on Enter or when the box loses the focus, unless the text is empty or not a number. Returns a
+// function that shows a value unless the user is typing one.
 export function numberField(box, field, numbers, use) {
   let last;
   const take = (x) => {

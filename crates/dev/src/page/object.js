@@ -100,8 +100,8 @@ function showUndo({ undo, redo, undo_blocked }) {
   }
 }
 
-// Writes a value, or element `i` of a list, to keep other viewers' changes of the other elements. The next change is sent after
-// the previous one was executed, so that a slider never runs ahead of the file.
+// Writes a value, or element `i` of a list, to keep other viewers' changes of the other elements. The next change is
+// sent after the previous one was executed, so that a slider never runs ahead of the file.
 function write(field, value, i, note) {
   const isPart = i !== undefined && valueOf(field) !== undefined;
   const set = { path: isPart ? `${field.path}[${i}]` : field.path, value: isPart ? value[i] : value, gesture };

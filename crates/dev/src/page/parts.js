@@ -22,8 +22,8 @@ export function keep(known, items, keyOf, makeOne) {
   }));
 }
 
-// Sets the children of parents, each given as [parent, children]. Children that stay are not touched; half-typed numbers in
-// removed ones are discarded.
+// Sets the children of parents, each given as [parent, children]. Children that stay are not touched; half-typed
+// numbers in removed ones are discarded.
 export function place(...lists) {
   const focus = document.activeElement;
   const all = new Set(lists.flatMap(([, children]) => children));

@@ -24,8 +24,8 @@ export function setUpRender(onKey, showNotice) {
     }
   });
   element("preview").addEventListener("change", ({ target }) => ask({ preview: Number(target.value) }));
-  onState((state, heard) => {
-    if (!heard) return;
+  onState((state, isCurrent) => {
+    if (!isCurrent) return;
     element("pause").setAttribute("aria-pressed", state.paused);
     element("pause").textContent = state.paused ? "Resume" : "Pause";
     element("pause").title = state.paused ? "Resume rendering (Space)" : "Pause rendering (Space)";

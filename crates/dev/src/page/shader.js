@@ -16,9 +16,9 @@ const isMoved = (slider) => slider.value !== slider.default;
 export function setUpShader(showNotice) {
   element("copy-sliders").addEventListener("click", () => copy(showNotice));
   element("reset-sliders").addEventListener("click", () => ask("reset_sliders"));
-  onState((state, heard) => {
+  onState((state, isCurrent) => {
     rows = keep(rows, state.sliders, rowKey, rowOf);
-    for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, heard && !underWay);
+    for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, isCurrent && !underWay);
     place([element("sliders"), [...rows.values()].map(({ item }) => item)]);
     const moved = state.sliders.some(isMoved);
     for (const id of ["copy-sliders", "reset-sliders"]) enable(element(id), moved);
@@ -71,13 +71,13 @@ function rowOf(slider) {
   });
   const item = make("li", {}, head, make("span", { className: "pair" }, ...inputs));
   let isNew = true;
-  const show = (now, { editor }, heard) => {
+  const show = (now, { editor }, isCurrent) => {
     link.textContent = `${now.file}:${now.line}`;
     const href = editorLink(editor, { file: now.path, line: now.line });
     if (href) link.href = href;
     else link.removeAttribute("href");
     reset.hidden = !isMoved(now);
-    if (heard || isNew) update(now);
+    if (isCurrent || isNew) update(now);
     isNew = false;
   };
   return { item, show };

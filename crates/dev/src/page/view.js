@@ -77,8 +77,8 @@ function look(change) {
   ask({ look: choice });
 }
 
-function showState(state, heard) {
-  if (!heard) return;
+function showState(state, isCurrent) {
+  if (!isCurrent) return;
   const name = viewName(state.view);
   for (const radio of radios()) radio.checked = radio.value === name;
   showMissing(Object.fromEntries(state.missing_views));

@@ -55,8 +55,8 @@ impl Painter {
         }
     }
 
-    /// Takes a kernel that was compiled while a newer one was asked for. It is newer than what is on screen, and is shown until
-    /// the newer one is compiled, if it fits the scene.
+    /// Takes a kernel whose request was overtaken by a newer one. It is newer than the displayed kernel, and is shown
+    /// until the newer one is compiled, if it fits the scene.
     fn take_overtaken(&mut self, built: BuildResult) {
         let constants = self.loaded.as_ref().map(|loaded| self.constants(loaded));
         let is_useful = self.pending.is_some() && built.id >= self.oldest && constants == Some(built.constants);
@@ -185,7 +185,7 @@ impl Painter {
         drop_contained(self.running.take());
     }
 
-    /// Keeps the kernel that differs from the new one by its layers only, which viewers return to.
+    /// Keeps a kernel that differs from the new one only in its layers, because viewers switch back to it.
     fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
         let is_sibling = |known: &Running| {
             let same_scene = are_of_one_scene(&known.constants, constants);

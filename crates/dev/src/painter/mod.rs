@@ -88,7 +88,7 @@ pub struct Painter {
     camera_waits: bool,
     /// The changes of the scene file that can be undone.
     history: History,
-    /// The same for the watcher.
+    /// The changes of the scene file, shared with the watcher, which need not read them again.
     writes: Arc<Mutex<Writes>>,
     /// The files of the scene.
     files: Vec<(PathBuf, FileStamp)>,
@@ -113,13 +113,13 @@ pub struct Painter {
     frames: u64,
     /// Number of images.
     revision: u64,
-    /// When the change was noticed that the image does not show yet, and whether it was a save.
+    /// Time at which the newest change that is not displayed yet was noticed, and true if it was a save.
     since: Option<(Instant, bool)>,
     /// Seconds from the last change to its first image.
     latency: Option<f64>,
     /// Seconds spent on compiling for the next frame.
     compiled: Option<f64>,
-    /// When the first image after a save was shown, until the image is finished.
+    /// Time at which the first image after a save was shown; `None` once the image is finished.
     first_frame: Option<Instant>,
     last_frame: Instant,
     frame_cost: Duration,
@@ -169,7 +169,7 @@ impl Painter {
         builder: Builder,
         (out, looking): (Option<PathBuf>, Option<Arc<AtomicUsize>>),
         writes: Arc<Mutex<Writes>>,
-        told: SessionChannels,
+        channels: SessionChannels,
     ) -> Painter {
         let SessionChannels {
             report,
@@ -179,7 +179,7 @@ impl Painter {
             editor,
             seen: seen_sender,
             events,
-        } = told;
+        } = channels;
         let state = State {
             scene: sources.scene.display().to_string(),
             shaders: sources.shaders.as_ref().map(|folder| folder.display().to_string()),
@@ -254,7 +254,8 @@ impl Painter {
             Event::Reference(reference) => self.take_reference(reference),
             Event::Measured(apart) => self.take_measured(apart),
             Event::Viewers => {
-                // No viewer has waited for the image until now; nor for the compiler, if it has finished.
+                // The latency restarts, because no viewer has waited for the image; nor for the compiler, if it has
+                // finished.
                 if self.pending.is_none() {
                     self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
                     self.compiled = None;
@@ -275,7 +276,7 @@ impl Painter {
                 self.times.part(part, took);
             }
         }
-        // A snapshot from before the last write of this session says nothing new about the scene.
+        // A snapshot from before the last write of this session contains an outdated scene.
         let is_new = writes == self.writes.lock().unwrap_or_else(PoisonError::into_inner).count;
         let known = self.loaded.as_ref().map(|loaded| loaded.text.as_bytes());
         if let (true, Some((_, FileStamp::Content(content)))) = (is_new, snapshot.files.first())
@@ -298,13 +299,14 @@ impl Painter {
         self.show_files(noticed, shown_otherwise);
     }
 
-    /// Takes a scene or its errors. Returns whether the same rendering must be displayed differently.
+    /// Takes a scene or its errors. Returns true if the display settings changed, so that the same rendering is
+    /// displayed differently.
     fn take_scene(&mut self, scene: Result<Arc<Loaded>, Vec<Diagnostic>>) -> bool {
         let mut shown_otherwise = false;
         match scene {
             Ok(loaded) => {
                 self.problems.scene.clear();
-                // An edit of the file's camera shows on screen.
+                // Values of the camera that were edited in the file replace those of the moved camera.
                 if let (Some(camera), Some(old)) = (&self.camera, &self.loaded) {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
@@ -333,7 +335,7 @@ impl Painter {
         self.keep_view();
         self.settle((noticed, true));
         self.upload_sliders((noticed, true));
-        // The rendering may be unchanged; otherwise its first image follows without a request.
+        // Shows an unchanged rendering with new display settings. The first image of a new rendering is shown later.
         let picture = self.running.as_ref().filter(|running| !running.canvas.is_new());
         if shown_otherwise && self.pending.is_none() && picture.is_some() {
             self.changed((noticed, true));
@@ -446,7 +448,7 @@ impl Painter {
             .is_some_and(|running| {
                 let more = !running.canvas.is_done(self.seen());
                 let first = running.canvas.is_new();
-                // The compiler gets the processor, except while the camera moves.
+                // While a kernel is compiled, the image is not refined, except that the camera may still move.
                 self.camera_waits || (more && (first || (self.pending.is_none() && !self.paused)))
             })
     }
@@ -457,7 +459,7 @@ impl Painter {
         let Some(loaded) = self.loaded.clone() else { return };
         let camera = self.packed_camera(&loaded);
         let Some(running) = &mut self.running else { return };
-        // Only a complete first image is interrupted, so that a moving camera shows images at all.
+        // Only a complete first image is interrupted; otherwise a moving camera would never show an image.
         if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
             running.slider_values = self.sliders.bits(&running.sliders);
             let restarted = guarded(|| {

@@ -135,8 +135,8 @@ impl Painter {
         if done || self.written != Some(self.revision) {
             self.written = Some(self.revision);
             let failed = replace(out, &png()).err();
-            let told = |error| Diagnostic::plain("file", format!("{}: cannot be written: {error}", out.display()));
-            self.problems.out = failed.map(told);
+            let problem = |error| Diagnostic::plain("file", format!("{}: cannot be written: {error}", out.display()));
+            self.problems.out = failed.map(problem);
         }
     }
 
@@ -147,7 +147,7 @@ impl Painter {
             .running
             .as_ref()
             .map(|running| (running.canvas.size(), running.canvas.finest_size()));
-        // A lower preview resolution is the choice of a viewer.
+        // A lower resolution that a viewer selected by the preview scale is not reported.
         let smaller = sizes.filter(|(asked, shown)| asked.map(|side| side.div_ceil(scale)) != *shown);
         if self.smaller != smaller {
             self.smaller = smaller;

@@ -1,6 +1,7 @@
-//! From black over violet, red and orange to a pale yellow: brighter all the way, also in gray and to who sees few colours.
+//! A color map from black over violet, red and orange to pale yellow. Luminance increases monotonically, so that it
+//! also works in grayscale and for color-blind viewers.
 
-/// Colours of a screen, evenly spaced.
+/// Evenly spaced display colors.
 const KNOTS: [[u8; 3]; 9] = [
     [0, 0, 4],
     [30, 16, 70],
@@ -13,7 +14,7 @@ const KNOTS: [[u8; 3]; 9] = [
     [252, 253, 191],
 ];
 
-/// The colour of a value, in 255 steps.
+/// Returns the display color of a value from 0 to 255.
 pub fn color(value: u8) -> [u8; 3] {
     let place = f64::from(value) / 255.0 * (KNOTS.len() - 1) as f64;
     let knot = (place as usize).min(KNOTS.len() - 2);

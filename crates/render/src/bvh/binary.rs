@@ -205,9 +205,9 @@ fn split(items: &mut [BuildItem], bounds: &Bounds, levels: u32) -> usize {
 /// Splits at the median centroid along the axis of largest centroid extent.
 fn split_in_half(items: &mut [BuildItem], bounds: &Bounds) -> usize {
     let half = items.len() / 2;
-    let reach = (bounds.high_middle - bounds.low_middle).xyz();
-    if reach.max_element() > 0.0 {
-        let axis = reach.max_position();
+    let extent = (bounds.high_middle - bounds.low_middle).xyz();
+    if extent.max_element() > 0.0 {
+        let axis = extent.max_position();
         let key = |item: &BuildItem| (item.middle()[axis], item.number());
         items.select_nth_unstable_by(half, |a, b| {
             let (a, b) = (key(a), key(b));

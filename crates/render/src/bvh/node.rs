@@ -107,7 +107,7 @@ fn step(exponent: u8) -> f32 {
     f32::from_bits(u32::from(exponent) << 23)
 }
 
-/// Decodes a bound like the kernels: multiplication and addition are both rounded.
+/// Decodes a bound in the same way as the kernels: multiplication and addition are both rounded.
 fn bound(base: f32, q: u8, scale: f32) -> f32 {
     base + f32::from(q) * scale
 }

@@ -22,10 +22,10 @@ impl Random {
     }
 }
 
-fn around(middle: Vec3, reach: Vec3) -> Aabb {
+fn around(middle: Vec3, extent: Vec3) -> Aabb {
     Aabb {
-        low: middle - reach,
-        high: middle + reach,
+        low: middle - extent,
+        high: middle + extent,
     }
 }
 
@@ -161,8 +161,8 @@ fn zeros_of_both_signs() {
 
 #[test]
 fn equal_boxes() {
-    for reach in [0.0, 1.0, 1e30] {
-        assert!(check_builds(&vec![around(Vec3::splat(0.3), Vec3::splat(reach)); 3000]) <= 12);
+    for extent in [0.0, 1.0, 1e30] {
+        assert!(check_builds(&vec![around(Vec3::splat(0.3), Vec3::splat(extent)); 3000]) <= 12);
     }
     let boxes = vec![around(Vec3::NEG_ONE, Vec3::ONE); 1_000_000];
     check(&build(&boxes, 4), &boxes, 4);
@@ -173,15 +173,15 @@ fn boxes_in_geometric_progression() {
     for axis in [Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::ONE] {
         // Equal, touching, nested and degenerate boxes, down to denormal numbers.
         let at = |i: i32| 2f32.powi(-i);
-        let boxes = |reach: f32, offset: f32| -> Vec<Aabb> {
+        let boxes = |extent: f32, offset: f32| -> Vec<Aabb> {
             (-120..150)
-                .map(|i| around(axis * at(i), Vec3::splat(reach) + axis * (offset * at(i))))
+                .map(|i| around(axis * at(i), Vec3::splat(extent) + axis * (offset * at(i))))
                 .collect()
         };
-        for (reach, offset) in [(0.0, 0.0), (0.0, 0.25), (0.0, 1.0), (1e-30, 0.0), (1.0, 0.0)] {
-            check_builds(&boxes(reach, offset));
-            let often: Vec<Aabb> = (0..50).flat_map(|_| boxes(reach, offset)).collect();
-            check_builds(&often);
+        for (extent, offset) in [(0.0, 0.0), (0.0, 0.25), (0.0, 1.0), (1e-30, 0.0), (1.0, 0.0)] {
+            check_builds(&boxes(extent, offset));
+            let repeated: Vec<Aabb> = (0..50).flat_map(|_| boxes(extent, offset)).collect();
+            check_builds(&repeated);
         }
     }
     // Slow growth degenerates the binary tree into a chain if its depth is not limited.

@@ -1,4 +1,4 @@
-//! Twin of `shaders/alpha.wgsl`: alpha cutout and alpha blending of surfaces.
+//! Twin of `shaders/alpha.wgsl`: surfaces with alpha.
 
 use glam::{UVec2, UVec4, Vec2, Vec3};
 

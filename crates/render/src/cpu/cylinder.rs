@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// Distance and normal of a hit; INFINITE_T if it misses.
+    /// Returns the distance and the normal of a hit; INFINITE_T if it misses.
     fn hit(q: &Primitive, ray: Ray) -> (f32, Vec3) {
         let t = intersect_cylinder(q, false, ray, INFINITE_T);
         (
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_huge_cylinder_keeps_its_digits_near_the_origin() {
-        // A pipe on which the scene stands, and a tower whose roof it is.
+        // The scene lies on the side of a horizontal cylinder, and on the cap of a vertical one.
         let pipe = primitive(
             CYLINDER,
             DVec3::NEG_Z * 1e6,

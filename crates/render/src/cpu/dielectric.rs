@@ -1,4 +1,4 @@
-//! Twin of `shaders/dielectric.wgsl`: the materials `dielectric` and `glass` where light bounces.
+//! Twin of `shaders/dielectric.wgsl`: path sampling of the smooth materials `dielectric` and `glass`.
 
 use std::f32::consts::LOG2_E;
 

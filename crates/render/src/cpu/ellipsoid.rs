@@ -102,7 +102,7 @@ mod tests {
         );
     }
 
-    /// The hit of the assignment's ellipsoid lies on the quadric |M (p - c)|^2 = 1, and its normal is the gradient there.
+    /// The hit with a general ellipsoid lies on the quadric |M (p - c)|^2 = 1, and its normal is the gradient there.
     #[test]
     fn an_ellipsoid_is_its_quadric() {
         let center = DVec3::new(0.5, 0.4, 0.4);

@@ -1,4 +1,4 @@
-//! Twin of `shaders/emitter.wgsl`: selection of emitters and samples of their light.
+//! Twin of `shaders/emitter.wgsl`: emitter selection and light sampling.
 
 use glam::{UVec2, Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/energy.wgsl`: directional albedo of microfacet lobes by single scattering, from tables.
+//! Twin of `shaders/energy.wgsl`: single-scattering albedo of microfacet lobes, from tables.
 
 use glam::{Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/equirect.wgsl`: directions around a scene, and the cells of the image that surrounds it.
+//! Twin of `shaders/equirect.wgsl`: equirectangular mapping of the environment map, and its cells.
 
 use glam::{Vec2, Vec3};
 

@@ -1,5 +1,6 @@
-//! `ewa_color` with weights that are computed once for all textures of a size that a material looks up at a point. The textures of a model are
-//! mostly of one size, and the weights take most of the time of a lookup. The bits are those of [`super::texture::ewa_color`].
+//! Elliptical weighted average with cached weights: textures of the same size that a material looks up at a point share
+//! them. Most textures of a model have the same size, and the weights take most of the time of a lookup. The bits are
+//! those of [`super::texture::ewa_color`].
 
 use std::cell::RefCell;
 use std::sync::LazyLock;
@@ -12,7 +13,7 @@ use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color,
 use super::texture::level_of_length;
 use crate::records::{FLOAT, LINEAR8, Packed, SRGB8, Texture};
 
-/// Returns `ewa_color` of `shaders/texture.wgsl`.
+/// Returns the same as `ewa_color` of `shaders/texture.wgsl`.
 pub fn color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
     LAST.with_borrow_mut(|kernel| {
         let key = Key::of(t, f);
@@ -27,7 +28,7 @@ thread_local! {
     static LAST: RefCell<Kernel> = const { RefCell::new(Kernel::NONE) };
 }
 
-/// Everything that the weights depend on.
+/// The values that the weights depend on.
 #[derive(Clone, Copy, PartialEq)]
 struct Key {
     size: [u32; 2],
@@ -51,7 +52,7 @@ impl Key {
 /// The texels in a footprint and their weights.
 struct Kernel {
     key: Key,
-    /// The finer level, and the one after it if both are mixed.
+    /// Weights of the finer level, and of the next one if both are blended.
     levels: [Weights; 2],
     finer: u32,
     /// Share of the coarser level.
@@ -63,7 +64,7 @@ struct Weights {
     /// Index within the level.
     texels: Vec<u32>,
     weights: Vec<f32>,
-    /// Index of the first texel with a weight above 0: the sum is of differences to it.
+    /// Index of the first texel with a weight above 0; the sum is one of differences to it.
     base: usize,
     /// Inverse of the sum of the weights; 0 if that is 0.
     scale: f32,
@@ -194,7 +195,7 @@ impl Weights {
 static SRGB: LazyLock<Table> = LazyLock::new(|| Table::new(SRGB8));
 static LINEAR: LazyLock<Table> = LazyLock::new(|| Table::new(LINEAR8));
 
-/// The values of [`unpacked_color`], for each exponent and each nine digits.
+/// Table of [`unpacked_color`], indexed by the exponent and nine digits.
 struct Table(Box<[f32; 1 << 14]>);
 
 impl Table {

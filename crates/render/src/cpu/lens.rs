@@ -1,4 +1,4 @@
-//! Twin of `shaders/lens.wgsl`: a thin lens.
+//! Twin of `shaders/lens.wgsl`: thin lens cameras.
 
 use glam::Vec2;
 

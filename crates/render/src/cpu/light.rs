@@ -1,4 +1,4 @@
-//! Twin of `shaders/light.wgsl`: the samples of one light, as seen from a point.
+//! Twin of `shaders/light.wgsl`: vectors from a point to the samples of a light.
 
 use glam::{Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/light_tree.wgsl`: importance of the children of a light tree node.
+//! Twin of `shaders/light_tree.wgsl`: importance sampling of light-tree nodes.
 
 use glam::{BVec4A, Vec3, Vec4};
 

@@ -1,4 +1,5 @@
-//! Intersection and occlusion by the primitives outside of the BVH: the same results as `shaders/buffers.wgsl` and `shaders/linear_primitives.wgsl`.
+//! Intersection and occlusion by the primitives outside of the BVH, with the results of `shaders/buffers.wgsl` and
+//! `shaders/linear_primitives.wgsl`.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/lobe.wgsl`: lobes of rough surfaces.
+//! Twin of `shaders/lobe.wgsl`: microfacet lobes.
 
 use glam::{Vec2, Vec3};
 

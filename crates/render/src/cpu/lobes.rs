@@ -1,4 +1,4 @@
-//! Phong's lobes in all directions of a block at once: the same as `phong_lobes`, one by one.
+//! SIMD evaluation of Phong's lobes for all directions of a block, with the results of `phong_lobes`.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
@@ -9,7 +9,7 @@ use super::surface::Surface;
 use super::traversal::{Directions, MOST};
 use crate::records::Material;
 
-/// Bit i is set where direction i lights the surface: [`is_lit`](super::phong::is_lit) for each.
+/// Returns a mask whose bit i is set if direction i lights the surface, as [`is_lit`](super::phong::is_lit).
 pub fn lit_bits(level: Level, surface: &Surface, to: &Directions) -> u32 {
     dispatch!(level, simd => {
         let mut bits = 0;
@@ -20,7 +20,8 @@ pub fn lit_bits(level: Level, surface: &Surface, to: &Directions) -> u32 {
     })
 }
 
-/// [`phong_lobes`](super::phong::phong_lobes) in all these directions: the diffuse ones, and the specular ones.
+/// Returns [`phong_lobes`](super::phong::phong_lobes) in all these directions: the diffuse values, then the specular
+/// ones.
 pub fn lobes_of_all(
     level: Level,
     surface: &Surface,
@@ -87,7 +88,7 @@ fn dot_vector<S: Simd>(a: Vec3, [x, y, z]: &[S::f32s; 3]) -> S::f32s {
     *x * a.x + *y * a.y + *z * a.z
 }
 
-/// Directions from the i-th on, as many as a vector has places.
+/// Returns one SIMD vector of directions, from index i on.
 #[inline(always)]
 fn components<S: Simd>(simd: S, to: &Directions, i: usize) -> [S::f32s; 3] {
     let [x, y, z] = &to.along;
@@ -130,7 +131,7 @@ mod tests {
         }
     }
 
-    /// Every set of instructions gives the bits of the functions for one sample.
+    /// Every instruction set gives the bits of the functions for one sample.
     #[test]
     fn all_at_once_is_one_by_one() {
         let to = LightSegments {

@@ -1,4 +1,4 @@
-//! Twin of `shaders/metal.wgsl`: the material `conductor` where it is rough, or has an index of refraction.
+//! Twin of `shaders/metal.wgsl`: the material `conductor` with roughness or an index of refraction.
 
 use glam::{Vec2, Vec3};
 
@@ -96,11 +96,11 @@ mod tests {
         }
     }
 
-    /// Fresnel's amplitudes with a complex index.
+    /// Returns the reflectance from Fresnel's amplitudes with a complex index.
     fn by_amplitudes(eta: f64, k: f64, c: f64) -> f64 {
         let n = Complex(eta, k);
         let n2 = n.times(n);
-        // n cos of the refracted ray: sqrt(n^2 - sin^2).
+        // The index times the cosine of the refracted ray: sqrt(n^2 - sin^2).
         let nt = n2.plus(Complex(1.0 - c * c, 0.0), -1.0).root();
         let s = Complex(c, 0.0);
         let s_ratio = s.plus(nt, -1.0).square() / s.plus(nt, 1.0).square();
@@ -129,7 +129,7 @@ mod tests {
                 );
             }
         }
-        // Without k, it is glass.
+        // With k = 0 the result is that of a dielectric.
         let glass =
             crate::cpu::specular::fresnel(0.6, crate::cpu::specular::refracted_cosine(0.6, 1.0 / 1.5), 1.0 / 1.5);
         assert!((conductor_fresnel(1.5, 0.0, 0.6) - glass).abs() < 1e-6);

@@ -1,7 +1,7 @@
-//! The CPU path: the twins of the WGSL functions, by the same names, with the same arguments and order of operations,
-//! and a renderer over threads. It is the reference that the GPU path is held against.
+//! The CPU path: twins of the WGSL functions, with the same names, arguments and order of operations, and a renderer
+//! that runs them on several threads. It is the reference for tests of the GPU path.
 //!
-//! What a function does is said in its WGSL file.
+//! The WGSL files document the functions.
 #![allow(missing_docs, reason = "documented in the WGSL files")]
 
 pub mod adaptive;

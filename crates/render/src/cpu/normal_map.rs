@@ -1,4 +1,4 @@
-//! Twin of `shaders/normal_map.wgsl`: the normals that normal maps give.
+//! Twin of `shaders/normal_map.wgsl`: normal mapping.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/panorama.wgsl`: a panorama of all directions.
+//! Twin of `shaders/panorama.wgsl`: equirectangular camera.
 
 use std::f32::consts::{PI, TAU};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/path.wgsl`: paths from the camera through mirrors and glass.
+//! Twin of `shaders/path.wgsl`: specular paths from the camera.
 
 use glam::{UVec2, Vec3};
 
@@ -186,10 +186,11 @@ mod tests {
             dv: zero,
         };
         let leaning = normalize(Vec3::new(1.0, 0.0, 1.0));
-        // Seen from above, what leans by 45 degrees reflects along the triangle's plane or below; from its side it is usable.
+        // A normal tilted by 45 degrees, seen from above, reflects along the plane of the triangle or below it. Seen
+        // from the side to which it tilts, it is usable.
         assert_eq!(usable_normal(surface(-0.1), leaning), smooth_normal);
         assert_eq!(usable_normal(surface(0.5), leaning), leaning);
-        // Grazing, the smooth one would reflect into the triangle too.
+        // At a grazing angle the smooth normal would also reflect below the plane.
         assert_eq!(usable_normal(surface(-8.0), leaning), Vec3::Z);
     }
 }

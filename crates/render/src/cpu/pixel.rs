@@ -1,4 +1,4 @@
-//! Twin of `shaders/pixel.wgsl`: the samples of a pixel.
+//! Twin of `shaders/pixel.wgsl`: camera samples of a pixel.
 
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4, Vec4Swizzles};
 
@@ -16,7 +16,8 @@ use super::sequence::sobol_sample;
 use crate::records::{Packed, RANDOM};
 use wgray_scene::Integrator;
 
-/// One sample of a pixel: its radiance times its weight, and its weight; and where layers are wanted its part of these.
+/// Returns one sample of a pixel: its weighted radiance and its weight, and its contribution to the layers if they are
+/// enabled.
 pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> (Vec4, Layers) {
     match scene.integrator {
         Integrator::Phong => {

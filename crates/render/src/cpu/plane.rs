@@ -1,4 +1,4 @@
-//! Twin of `shaders/plane.wgsl`: z = 0 in local space.
+//! Twin of `shaders/plane.wgsl`: the infinite plane z = 0 of local space.
 
 use glam::Vec3;
 
@@ -22,7 +22,7 @@ mod tests {
     use crate::pack::primitive;
     use crate::records::{INFINITE_T, PLANE};
 
-    /// z = 1.
+    /// Returns the t of the hit with the plane z = 1.
     fn hit(origin: [f32; 3], direction: [f32; 3]) -> f32 {
         let plane = primitive(PLANE, DVec3::new(7.0, -3.0, 1.0), DMat3::IDENTITY, 0, 0);
         let ray = Ray {

@@ -1,4 +1,4 @@
-//! Twin of `shaders/primitive.wgsl`: what is different from one kind of primitives to the next.
+//! Twin of `shaders/primitive.wgsl`: dispatch by the kind of a primitive.
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/procedural.wgsl`: checker and line textures, averaged over the footprint.
+//! Twin of `shaders/procedural.wgsl`: checker and line textures, filtered analytically.
 
 use std::f32::consts::PI;
 

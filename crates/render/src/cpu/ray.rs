@@ -1,4 +1,4 @@
-//! Twin of `shaders/ray.wgsl`: rays, and the local space that every primitive is intersected in.
+//! Twin of `shaders/ray.wgsl`: rays, hits, and the local space in which primitives are intersected.
 
 use glam::{UVec2, Vec2, Vec3};
 

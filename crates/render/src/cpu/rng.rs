@@ -1,4 +1,4 @@
-//! Twin of `shaders/rng.wgsl`: random numbers as functions of what they are for.
+//! Twin of `shaders/rng.wgsl`: counter-based random numbers.
 
 use glam::UVec4;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/rough_dielectric.wgsl`: the material `dielectric` where it is rough.
+//! Twin of `shaders/rough_dielectric.wgsl`: the rough material `dielectric`.
 
 use glam::{Vec2, Vec3};
 

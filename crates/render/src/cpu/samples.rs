@@ -1,5 +1,4 @@
-//! All samples of a block at once: in arrays, of which a processor takes several numbers at a time. They are those of
-//! `block_sample` and `segment`, one by one.
+//! SIMD evaluation of all samples of a block, with the results of `block_sample` and `segment`.
 
 use std::sync::LazyLock;
 
@@ -10,10 +9,10 @@ use super::shadow::{SampleBlock, block_sample};
 use super::traversal::{Directions, MOST};
 use crate::records::GRID;
 
-/// The instructions that this processor has for several numbers at once.
+/// The SIMD instruction set of this processor.
 pub static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 
-/// The samples of a block on the unit square; the first stands in all places that are left.
+/// The samples of a block on the unit square. Unused lanes repeat the first one.
 pub struct Samples {
     count: usize,
     x: [f32; MOST],
@@ -21,7 +20,7 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Those of this block.
+    /// Returns the samples of a block.
     pub fn of(block: SampleBlock) -> Samples {
         let count = block.count as usize;
         let first = block_sample(block, 0);
@@ -31,7 +30,7 @@ impl Samples {
             y: [first.y; MOST],
         };
         if block.pattern == GRID {
-            // Without a division for each.
+            // Avoids a division per sample.
             let cell = 1.0 / block.side as f32;
             let (mut column, mut row) = (block.first % block.side, block.first / block.side);
             for (x, y) in samples.x.iter_mut().zip(&mut samples.y).take(count) {
@@ -51,7 +50,7 @@ impl Samples {
         samples
     }
 
-    /// The vectors to them.
+    /// Returns the vectors to the samples.
     pub fn segments(&self, level: Level, to: LightSegments) -> Directions {
         dispatch!(level, _simd => {
             let mut along = [[0.0; MOST]; 3];

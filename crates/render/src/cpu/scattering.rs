@@ -1,4 +1,4 @@
-//! Twin of `shaders/scattering.wgsl`: evaluation and sampling of BSDFs, whatever the material.
+//! Twin of `shaders/scattering.wgsl`: scattering at a surface for all material kinds.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -23,7 +23,7 @@ use crate::records::{
     Packed, ROUGH_GLASS, THIN,
 };
 
-/// The lobes of materials that are not [`PRINCIPLED`].
+/// Placeholder for the lobes of materials that are not [`PRINCIPLED`].
 pub static NO_MIXTURE: PrincipledLobes = PrincipledLobes {
     diffuse: Vec3::ZERO,
     alpha: Vec2::ZERO,

@@ -1,4 +1,4 @@
-//! Twin of `shaders/shadow.wgsl`: shadow rays, from one point to a block of samples of one light at a time.
+//! Twin of `shaders/shadow.wgsl`: shadow rays from a point to a block of samples of a light.
 
 use glam::{UVec2, Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/slab.wgsl`: rays and boxes along the axes.
+//! Twin of `shaders/slab.wgsl`: intersection of rays with axis-aligned boxes.
 
 use glam::{Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/specular.wgsl`: mirrors and glass.
+//! Twin of `shaders/specular.wgsl`: specular reflection and refraction.
 
 use glam::Vec3;
 

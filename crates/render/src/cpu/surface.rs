@@ -1,4 +1,4 @@
-//! Twin of `shaders/surface.wgsl`: the point where a ray meets a primitive.
+//! Twin of `shaders/surface.wgsl`: the point where a ray hits a surface.
 
 use glam::{UVec2, Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/texel.wgsl`: images as arrays of texels.
+//! Twin of `shaders/texel.wgsl`: texels of images.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/texture.wgsl`: colors of textures, and materials evaluated with them.
+//! Twin of `shaders/texture.wgsl`: texture lookups and filters, and their application to materials.
 
 use glam::{Vec2, Vec3};
 

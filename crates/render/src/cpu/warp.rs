@@ -1,4 +1,4 @@
-//! Twin of `shaders/warp.wgsl`: uniform numbers of the unit square as points and directions.
+//! Twin of `shaders/warp.wgsl`: mappings from the unit square to points and directions.
 
 use glam::{Vec2, Vec3};
 

@@ -103,15 +103,15 @@ pub(super) fn fitting(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<u
     let everything: Vec<usize> = (0..infos.len()).collect();
     match found.as_slice() {
         [] => {
-            let there = listed(&everything);
+            let available = listed(&everything);
             Err(format!(
-                "no adapter's name, driver or type contains '{name}'; available: cpu, gpu, auto, {there}"
+                "no adapter's name, driver or type contains '{name}'; available: cpu, gpu, auto, {available}"
             ))
         }
         [first, rest @ ..] if rest.iter().any(|i| infos[*i].name != infos[*first].name) => {
-            let there = listed(&found);
+            let matching = listed(&found);
             Err(format!(
-                "'{name}' matches several adapters; use a longer name, a driver or a number: {there}"
+                "'{name}' matches several adapters; use a longer name, a driver or a number: {matching}"
             ))
         }
         _ => Ok(found),

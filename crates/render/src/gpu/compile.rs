@@ -1,4 +1,4 @@
-//! From a kernel's text to what the device takes: parsed, checked and specialised by naga.
+//! Kernel compilation with naga: parsing, validation, specialization and SPIR-V.
 
 use std::borrow::Cow;
 
@@ -27,7 +27,7 @@ pub fn check(source: &Source) -> Result<ValidKernel, ShaderError> {
     check_at(source).map_err(|(error, _)| error)
 }
 
-/// Parses and validates a kernel. An error comes with its place in the whole text, if it has one.
+/// Parses and validates a kernel. Errors include the byte offset in the whole text, if known.
 pub fn check_at(source: &Source) -> Result<ValidKernel, (ShaderError, Option<usize>)> {
     let start = |span: Option<Span>| span.and_then(Span::to_range).map(|range| range.start);
     if let Some((place, rule)) = too_deep(&source.text) {
@@ -65,7 +65,7 @@ impl ValidKernel {
         usage.is_some_and(|usage| usage.intersects(GlobalUse::WRITE | GlobalUse::ATOMIC))
     }
 
-    /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.
+    /// Returns the SPIR-V of a specialized kernel, whose float operations are executed exactly as written.
     pub fn exact_spirv(
         &self,
         kernel: &Kernel,
@@ -76,7 +76,8 @@ impl ValidKernel {
         self.exact_entry(kernel.entry_point, &constants.constants(), rounding, controls)
     }
 
-    /// Any compute entry point as SPIR-V, for these values of its overrides, computed on the device exactly as it is written.
+    /// Returns the SPIR-V of any compute entry point with these values of overrides, whose float operations are
+    /// executed exactly as written.
     pub fn exact_entry(
         &self,
         entry: &str,
@@ -99,7 +100,7 @@ impl ValidKernel {
         let mut module = specialised.into_owned();
         prune(&mut module);
         let info = validate(&module).map_err(|error| ShaderError::other("specialisation", &error))?;
-        // The kernels' loops all count to a bound, so that naga need not bound them again.
+        // naga need not bound loops, because each loop of the kernels counts to a bound.
         let options = spv::Options {
             lang_version: (1, 3),
             force_loop_bounding: false,
@@ -121,7 +122,7 @@ impl ValidKernel {
         Ok(spirv::ask_for(controls, &spirv::forbid_contraction(&words)))
     }
 
-    /// This kernel with quotients and square roots by `shaders/rounding.wgsl`.
+    /// Returns the kernel with quotients and square roots replaced by functions of `shaders/rounding.wgsl`.
     fn rounded_in_software(&self) -> Result<ValidKernel, ShaderError> {
         let mut module = self.module.clone();
         round_in_software(&mut module, &self.info).map_err(|error| ShaderError::other(ROUNDING, &error))?;

@@ -196,8 +196,8 @@ impl Device {
     pub(super) fn wait_for(&self, mapping: &Mapping) -> Result<(), RenderError> {
         self.wait()?;
         // Another thread that waits for the same device may run the callback a little later.
-        let told = mapping.0.recv().map_err(|error| self.error(error))?;
-        told.map_err(|error| self.error(error))
+        let result = mapping.0.recv().map_err(|error| self.error(error))?;
+        result.map_err(|error| self.error(error))
     }
 
     /// Returns the contents of a mapped buffer, and unmaps it.

@@ -1,11 +1,11 @@
-//! The functions of WGSL that call another one for each kind of primitive, with the kind as a constant: from the list of kinds.
+//! Generated WGSL functions that call another one for each kind of primitive, with the kind as a constant.
 
 use std::fmt::Write as _;
 
 use crate::records::{PRIMITIVE_KINDS, PrimitiveForm};
 
-/// Loops over the primitives outside of the BVH, which are sorted by kind: the functions that a kernel with the scene as constants has
-/// without loops.
+/// Returns WGSL loops over the primitives outside of the BVH, which are sorted by kind. Kernels with a baked scene have
+/// straight-line code for these functions instead.
 pub fn linear_loops() -> String {
     functions(
         true,
@@ -34,8 +34,9 @@ pub fn linear_loops() -> String {
     )
 }
 
-/// The tests of the primitive of an item in `bvh.wgsl`: its hit, whether it occludes one sample of a light, and whether it cuts a segment. Loops
-/// stand where an `if` would do, because software Vulkan skips them.
+/// Returns the WGSL tests of a BVH item's primitive in `bvh.wgsl`: the closest hit, the occlusion of light samples, and
+/// the occlusion of a segment. They use loops in place of `if`, because software Vulkan skips a loop that no lane
+/// enters.
 pub fn item_tests() -> String {
     functions(
         false,
@@ -68,7 +69,8 @@ pub fn item_tests() -> String {
     )
 }
 
-/// Functions of a signature, a start, a statement with the name of each kind for `KIND`, and a result. Planes are infinite, and in no BVH.
+/// Writes functions, each given by its signature, first statement, statement per kind (with the name of the kind for
+/// `KIND`) and result. Planes are infinite and therefore not in a BVH.
 fn functions(with_planes: bool, functions: &[(&str, &str, &str, &str)]) -> String {
     let mut out = String::new();
     for (signature, start, statement, result) in functions {

@@ -2,19 +2,19 @@
 
 use std::ops::Range;
 
-/// A function of a text, by bytes.
+/// A function in a text, with byte offsets.
 pub struct FunctionText<'a> {
-    /// Its name.
+    /// Name.
     pub name: &'a str,
-    /// The offset of `fn`.
+    /// Offset of `fn`.
     pub start: usize,
-    /// The type that it returns, as it is written; empty if it returns nothing.
+    /// Return type as written; empty if the function returns nothing.
     pub result: &'a str,
-    /// Its body with both braces.
+    /// Body, including both braces.
     pub body: Range<usize>,
 }
 
-/// The functions up to the first whose braces do not match.
+/// Returns the functions of a text, up to the first one with unmatched braces.
 pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
     let plain = without_comments(text);
     let mut found = Vec::new();
@@ -43,7 +43,7 @@ pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
     found
 }
 
-/// A text of as many bytes, with blanks in place of comments.
+/// Returns the text with comments replaced by blanks; byte offsets do not change.
 pub fn without_comments(text: &str) -> String {
     let mut plain = text.as_bytes().to_vec();
     let mut i = 0;
@@ -68,7 +68,7 @@ pub fn without_comments(text: &str) -> String {
     String::from_utf8(plain).unwrap_or_default() // whole characters were replaced
 }
 
-/// Returns whether two texts differ in comments and white space at most.
+/// Returns true if two texts are equal, except for comments and white space.
 pub fn is_same_code(a: &str, b: &str) -> bool {
     // WGSL nests block comments, and ends line comments at more characters than `\n`.
     let is_simple =
@@ -86,7 +86,7 @@ fn next_word(text: &str, from: usize, word: &str) -> Option<usize> {
         .find(|&i| !text[..i].ends_with(part_of_name) && !text[i + word.len()..].starts_with(part_of_name))
 }
 
-/// The brace that closes the one at a place.
+/// Returns the offset of the brace that closes the one at `open`.
 fn closing(text: &str, open: usize) -> Option<usize> {
     let mut depth = 0usize;
     for (i, byte) in text.bytes().enumerate().skip(open) {

@@ -166,11 +166,11 @@ impl Sides<'_> {
             let stores = AddressSpace::Storage {
                 access: StorageAccess::LOAD | StorageAccess::STORE,
             };
-            let there = |variable: &GlobalVariable| {
+            let is_bound = |variable: &GlobalVariable| {
                 let bound = variable.binding.is_some(); // a private variable may have the same name
                 variable.binding == known.binding || (bound && variable.name == known.name)
             };
-            if known.space == stores && !own.global_variables.iter().any(|(_, variable)| there(variable)) {
+            if known.space == stores && !own.global_variables.iter().any(|(_, variable)| is_bound(variable)) {
                 let file = self.file_with(right.global_variables.get_span(handle));
                 let ty = type_name(right, known.ty);
                 let space = space_name(known.space);

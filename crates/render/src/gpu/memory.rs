@@ -17,8 +17,8 @@ pub struct Held {
 pub type FailedAllocation = (String, u64);
 
 impl Held {
-    /// Adds the failed allocation, if it is known, and the memory in use to an out-of-memory error that has no message yet. Other errors are
-    /// returned unchanged.
+    /// Adds the failed allocation, if it is known, and the memory in use to an out-of-memory error that has no message
+    /// yet. Other errors are returned unchanged.
     pub fn explain(&self, error: RenderError, asked: Option<&FailedAllocation>) -> RenderError {
         match error {
             RenderError::OutOfMemory { device, message: None } => RenderError::OutOfMemory {
@@ -34,25 +34,25 @@ impl Held {
             Some((what, bytes)) => format!("the driver has no {} MiB for {what}", mebibytes(*bytes)),
             None => "the driver has no more".to_owned(),
         };
-        let there = [
+        let used = [
             (self.scene, "for the scene"),
             (self.film, "for the film"),
             (self.copies, "for copies of parts of it"),
         ];
-        let there: Vec<String> = there
+        let used: Vec<String> = used
             .iter()
             .filter(|(bytes, _)| *bytes > 0)
             .map(|(bytes, what)| format!("{} {what}", mebibytes(*bytes)))
             .collect();
-        let beside = match there.is_empty() {
+        let beside = match used.is_empty() {
             true => String::new(),
-            false => format!(" in addition to {}", there.join(", ")),
+            false => format!(" in addition to {}", used.join(", ")),
         };
         format!("{asked}{beside}; render a crop or a smaller image, or use the CPU")
     }
 }
 
-/// With a digit behind the point, so that little is not nothing.
+/// Formats a size in MiB with one decimal, so that small sizes are not printed as 0.
 fn mebibytes(bytes: u64) -> String {
     format!("{:.1}", bytes as f64 / f64::from(1 << 20))
 }
@@ -76,14 +76,14 @@ mod tests {
             copies: 0,
         };
         let asked = ("a copy of it".to_string(), 64 << 20);
-        let told = held.explain(error(), Some(&asked));
+        let error_with_use = held.explain(error(), Some(&asked));
         let rest = "render a crop or a smaller image, or use the CPU";
         let line = format!(
             "gpu: out of memory: the driver has no 64.0 MiB for a copy of it in addition to 1.5 for the scene, 64.0 for the \
              film; {rest}"
         );
-        assert_eq!(told.to_string(), line);
-        assert_eq!(held.explain(told, None).to_string(), line);
+        assert_eq!(error_with_use.to_string(), line);
+        assert_eq!(held.explain(error_with_use, None).to_string(), line);
         let unknown = Held::default().explain(error(), None).to_string();
         assert_eq!(unknown, format!("gpu: out of memory: the driver has no more; {rest}"));
         let other = RenderError::Cancelled;

@@ -1,4 +1,4 @@
-//! The GPU path: kernels in WGSL, run by wgpu. Only this module names wgpu.
+//! Rendering on GPUs: WGSL kernels, executed by wgpu. Only this module uses wgpu.
 
 mod adapter;
 mod bake;
@@ -36,5 +36,5 @@ pub use kernel_plan::{KernelPlan, plan_kernel};
 pub use renderer::{Dispatch, Gpu, Options};
 pub use rounding::Rounding;
 pub use validate::{Forms, check_kernels};
-// for kernels other than the renderer's
+// For kernels other than the renderer's.
 pub use {naga, wgpu};

@@ -12,7 +12,7 @@ use naga::{Function, Module, Span, Type, WithSpan};
 use super::compose::Source;
 use super::functions::functions;
 
-/// The scalar types of WGSL as naga's messages have them.
+/// Scalar types in naga's messages, and their WGSL names.
 const SCALARS: [(&str, &str); 4] = [
     ("Scalar { kind: Float, width: 4 }", "f32"),
     ("Scalar { kind: Sint, width: 4 }", "i32"),
@@ -202,7 +202,7 @@ fn without_type(message: &str) -> &str {
     end.map_or(message, |end| &message[end + 1..])
 }
 
-/// A type as WGSL writes it.
+/// Returns the name of a type in WGSL.
 pub fn type_name(module: &Module, ty: naga::Handle<Type>) -> String {
     let mut out = String::new();
     let written = module.to_ctx().write_type(ty, &mut out);

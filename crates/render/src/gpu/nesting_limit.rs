@@ -13,7 +13,7 @@ const ALTERNATIVES: usize = 400;
 pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
     let plain = without_comments(text);
     let bytes = plain.as_bytes();
-    let told = |at: usize, what: &str, most: usize| {
+    let violation = |at: usize, what: &str, most: usize| {
         Some((
             at..at + 1,
             format!("{what} must be nested at most {most} levels deep here"),
@@ -50,13 +50,13 @@ pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
                     *count = if goes_on { *count + 1 } else { 0 };
                 }
                 if alternatives.iter().sum::<usize>() > ALTERNATIVES {
-                    return told(at, "`else if`", ALTERNATIVES);
+                    return violation(at, "`else if`", ALTERNATIVES);
                 }
             }
             _ => {}
         }
         if depth > OPERATORS {
-            return told(at, "operators", OPERATORS);
+            return violation(at, "operators", OPERATORS);
         }
     }
     None

@@ -1,4 +1,4 @@
-//! Pipelines: a kernel, compiled for a scene, as a device runs it.
+//! Compute pipelines: kernels compiled for a scene.
 
 use std::borrow::Cow;
 
@@ -11,26 +11,26 @@ use super::rounding::Rounding;
 use crate::error::RenderError;
 use crate::records::Specialization;
 
-/// Side of a workgroup, as the kernels declare it.
+/// Side of a workgroup; the kernels declare the same.
 pub const WORKGROUP: u32 = 8;
 
 const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
 const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
 const WRITE: BufferBindingType = BufferBindingType::Storage { read_only: false };
 
-/// The groups of `shaders/bindings.wgsl`: what changes with every call, with the scene, with its shapes.
+/// The bind groups of `shaders/bindings.wgsl`: per dispatch, per scene, and the shapes of the scene.
 pub const GROUPS: [&[BufferBindingType]; 3] = [
     &[UNIFORM, WRITE, WRITE],
     &[UNIFORM, UNIFORM, UNIFORM, UNIFORM, READ, READ],
     &[READ, READ, READ, READ],
 ];
 
-/// The group of what changes with every call; it ends with the values of sliders, if a kernel has any.
+/// Index of the bind group per dispatch. Its last binding contains the slider values, if the kernel has any.
 pub const DISPATCH_GROUP: usize = 0;
-/// The group of the scene, which ends with its texels.
+/// Index of the bind group of the scene. Its last bindings contain the texels.
 pub const SCENE: usize = 1;
 
-/// The number of storage buffers.
+/// Number of storage buffers, without those for further texels.
 pub const STORAGE_BUFFERS: usize = {
     let (mut count, mut group) = (0, 0);
     while group < GROUPS.len() {
@@ -46,11 +46,11 @@ pub const STORAGE_BUFFERS: usize = {
     count
 };
 
-/// WebGPU promises so many by default.
+/// WebGPU guarantees 8 storage buffers per shader stage by default.
 const _: () = assert!(STORAGE_BUFFERS <= 8);
 
-/// Returns the bind group layouts of every kernel. The group of the scene ends with the further buffers of texels, the group of a dispatch with
-/// the values of sliders if the kernel has any.
+/// Returns the bind group layouts of every kernel, with `more_texels` further texel buffers and, if the kernel has
+/// sliders, their values.
 pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) -> Vec<wgpu::BindGroupLayout> {
     let layout = |(group, types): (usize, &&[BufferBindingType])| {
         let more = match group {
@@ -80,7 +80,7 @@ pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) ->
     GROUPS.iter().enumerate().map(layout).collect()
 }
 
-/// A group of buffers, in the order of their bindings.
+/// Creates a bind group of buffers, in the order of their bindings.
 pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
     let entries: Vec<wgpu::BindGroupEntry> = (0..)
         .zip(buffers)
@@ -96,8 +96,8 @@ pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&w
     })
 }
 
-/// Compiles a kernel: to SPIR-V that is computed as written (`exact`), or as plain WGSL through wgpu. naga checks it
-/// on either way, so that messages are the same.
+/// Compiles a kernel: with `exact` to SPIR-V whose float operations are executed as written, else from WGSL by wgpu.
+/// Both are validated by naga first, so that the error messages are the same.
 pub fn pipeline(
     device: &Device,
     layouts: &[wgpu::BindGroupLayout],
@@ -115,7 +115,7 @@ pub fn pipeline(
     device.checked(|| {
         let module = match exact {
             Some(spirv) => {
-                constants.clear(); // resolved already
+                constants.clear(); // already resolved in the SPIR-V
                 let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
                     entry_points: Cow::Owned(vec![wgpu::PassthroughShaderEntryPoint {
                         name: Cow::Borrowed(kernel.entry_point),

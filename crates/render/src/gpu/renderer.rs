@@ -373,11 +373,11 @@ impl Gpu {
         let completion: Vec<u32> = self.device.mapped(&self.completion[1])?;
         let (completion, ticks) = completion.split_at((RECEIPT / 4) as usize);
         if let Some(timer) = &self.timer {
-            let told = timer.took(ticks);
+            let measured = timer.took(ticks);
             self.dispatches.push(Dispatch {
                 kernel,
-                took: told.unwrap_or(waited),
-                by_device: told.is_some(),
+                took: measured.unwrap_or(waited),
+                by_device: measured.is_some(),
                 samples: tile.pixels() * u64::from(samples),
             });
         }

@@ -1,4 +1,4 @@
-//! Errors of shaders, with the place that the author wrote.
+//! Shader errors, with their location in the author's file.
 
 use super::compose::Source;
 use super::naga_messages::chain;

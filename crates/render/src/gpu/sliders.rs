@@ -1,5 +1,5 @@
-//! Overrides in shaders as sliders of the development mode: kernels read their values from a uniform buffer, so that a new
-//! value needs no compiler.
+//! Overrides in shaders as sliders of the development mode: kernels read their values from a uniform buffer, so that a
+//! new value needs no compiler.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use super::pipeline::{DISPATCH_GROUP, GROUPS};
 use crate::error::ShaderError;
 use wgray_scene::Integrator;
 
-/// The binding of the values in the group of a call, after those of every kernel.
+/// The binding of the slider values in the dispatch group, after the bindings that all kernels have.
 const BINDING: usize = GROUPS[DISPATCH_GROUP].len();
 /// The name of the buffer of values in a kernel.
 const VALUES: &str = "slider_values";
@@ -104,7 +104,8 @@ impl Slider {
     }
 }
 
-/// Returns the sliders of the kernel that renders: the overrides that have a default value and are not needed to compile.
+/// Returns the sliders of the kernel that renders: the overrides that have a default value and are not needed to
+/// compile.
 pub fn sliders(shaders: &Shaders, integrator: Integrator, adaptive: bool) -> Vec<Slider> {
     if !shaders.files().any(|(_, text)| text.contains("override")) {
         return Vec::new();

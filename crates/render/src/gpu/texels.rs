@@ -142,13 +142,13 @@ mod tests {
     #[test]
     fn what_a_device_cannot_see_is_told_with_the_way_out() {
         let storage = STORAGE_BUFFERS as u32;
-        let told = |info: GpuInfo, packed: &Packed| TexelParts::of(&info, packed).unwrap_err().to_string();
+        let message = |info: GpuInfo, packed: &Packed| TexelParts::of(&info, packed).unwrap_err().to_string();
         assert_eq!(
-            told(info(1 << 20, storage), &packed(1, (1 << 18) + 1)),
+            message(info(1 << 20, storage), &packed(1, (1 << 18) + 1)),
             "small: the scene's images need 1.0 MiB; the limit is 1 x 1.0 MiB; the CPU has no such limit"
         );
         assert_eq!(
-            told(info(1 << 18, storage), &packed(5000, 0)),
+            message(info(1 << 18, storage), &packed(5000, 0)),
             "small: the scene's shapes need 0.4 MiB; the limit of a buffer is 0.2 MiB; the CPU has no such limit"
         );
         TexelParts::of(&info(1 << 18, storage), &packed(3000, 0)).unwrap();

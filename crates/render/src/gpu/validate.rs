@@ -1,4 +1,4 @@
-//! All kernels of a scene, checked without a device, and all that is wrong with them at once.
+//! Validation of all kernels of a scene without a device; reports all errors at once.
 
 use rayon::prelude::*;
 
@@ -12,7 +12,7 @@ use super::rounding::Rounding;
 use crate::error::{ShaderError, ShaderErrors};
 use crate::records::Packed;
 
-/// Maximum number of errors that are searched in a kernel.
+/// Maximum number of reported errors of a kernel.
 const MOST: usize = 16;
 
 /// The representation of the scene in the checked kernels.
@@ -24,12 +24,12 @@ pub enum Forms {
     All,
 }
 
-/// Compiles every kernel for a scene, to SPIR-V, as far as that goes without a driver, and compares its interface with
-/// what the program binds.
+/// Compiles every kernel for a scene to SPIR-V, without a driver, and compares its interface with the bindings of the
+/// program.
 ///
 /// # Errors
 ///
-/// All that is wrong, each mistake once however many kernels have it. Of a function the first one is found.
+/// All errors, without duplicates that several kernels share. In each function only the first error is found.
 pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result<(), ShaderErrors> {
     let baked = (forms == Forms::All).then(|| bake_if_small(packed)).flatten();
     let mut scenes = vec![None];
@@ -48,7 +48,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
             errors.push(error);
         }
     }
-    // A mistake in a declaration also breaks the code that the program generates from it: that follows from the cause.
+    // An error in a declaration also causes errors in the code that the program generates from it; these are omitted.
     if errors.iter().any(|error| is_in_file(error, shaders)) {
         errors.retain(|error| is_in_file(error, shaders));
     }
@@ -59,7 +59,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
     }
 }
 
-/// Returns whether an error is at a place in a shader file.
+/// Returns true if the location of an error is in a shader file.
 fn is_in_file(error: &ShaderError, shaders: &Shaders) -> bool {
     let file = error.place.split(':').next();
     shaders.files().any(|(name, _)| Some(name) == file)
@@ -100,7 +100,7 @@ fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Sourc
         };
         let culprit = match at {
             Some(at) => texts.iter().position(|text| (text.start..text.body.end).contains(&at)),
-            // naga does not say where: it is where the mistake goes with the body.
+            // naga reports no location: the error is in the function without whose body it disappears.
             None => {
                 (0..texts.len()).find(|i| check_at(&emptied(*i)).err().map(|(error, _)| error).as_ref() != Some(&error))
             }
@@ -155,12 +155,12 @@ mod tests {
 
     #[track_caller]
     fn says(edits: &[(&str, &str, &str)], wanted: &[&str]) {
-        let said = said(edits);
-        assert_eq!(said.len(), wanted.len(), "{said:#?}");
+        let messages = said(edits);
+        assert_eq!(messages.len(), wanted.len(), "{messages:#?}");
         for wanted in wanted {
             let (place, parts) = wanted.split_once(' ').unwrap();
             let fits = |line: &&String| line.starts_with(place) && parts.split(" .. ").all(|part| line.contains(part));
-            assert!(said.iter().any(|line| fits(&line)), "{wanted}: {said:#?}");
+            assert!(messages.iter().any(|line| fits(&line)), "{wanted}: {messages:#?}");
         }
     }
 
@@ -265,7 +265,7 @@ mod tests {
             &[("bindings.wgsl", "texels: array<u32>", "texels: array<u32, 16>")],
             &["bindings.wgsl: `texels` is `array<u32, 16>` and must be `array<u32>`"],
         );
-        // A buffer that is only read, and not needed, may go.
+        // A read-only buffer that is not needed may be absent.
         says(&[("bindings.wgsl", "", "// nothing")], &[]);
     }
 
@@ -298,13 +298,14 @@ mod tests {
 
     #[test]
     fn errors_in_generated_code_are_left_out_where_a_file_has_the_cause() {
-        let said = said(&[("bindings.wgsl", "records: array<vec4u>", "records: array<vec2u>")]);
+        let messages = said(&[("bindings.wgsl", "records: array<vec4u>", "records: array<vec2u>")]);
         assert!(
-            said.iter()
+            messages
+                .iter()
                 .any(|line| line.starts_with("bindings.wgsl:") && line.contains("laid out")),
-            "{said:#?}"
+            "{messages:#?}"
         );
-        assert!(said.iter().all(|line| !line.starts_with('(')), "{said:#?}");
+        assert!(messages.iter().all(|line| !line.starts_with('(')), "{messages:#?}");
     }
 
     #[test]
@@ -387,12 +388,13 @@ mod tests {
             ("let x = b == camera;", "`camera` (`Camera`)"),
             ("let x = camera == camera;", "Incompatible operands"),
         ] {
-            let said = with(body);
-            // `film` is in two kernels only: in the third it is another mistake.
-            let line = said
+            let messages = with(body);
+            // Find the message of this error: only two of the three kernels have `film`, and the third reports another
+            // error.
+            let line = messages
                 .iter()
                 .find(|line| line.contains(wanted))
-                .unwrap_or_else(|| panic!("{body}: {said:?}"));
+                .unwrap_or_else(|| panic!("{body}: {messages:?}"));
             let message = line.split_once(' ').unwrap().1;
             assert!(line.starts_with("phong.wgsl:"), "{line}");
             let numbered = message

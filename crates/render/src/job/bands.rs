@@ -142,7 +142,7 @@ impl<'a> Bands<'a> {
         };
         for piece in store.pieces() {
             if piece.film.pixels() > largest_film && !piece.reached.pass.is_empty() {
-                continue; // another backend had room for it
+                continue; // from another backend, which supports larger films
             }
             add_new(&mut all, y, piece.region.y0);
             y = piece.region.y1;

@@ -104,7 +104,8 @@ impl Identity {
         }
     }
 
-    /// Describes the first difference of another job from this one: "its size is A, not B". Returns `None` if they are equal.
+    /// Describes the first difference of another job from this one: "its size is A, not B". Returns `None` if they are
+    /// equal.
     pub fn difference(&self, other: &Identity) -> Option<String> {
         let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
         let short = |hash: &str| hash.get(..16).unwrap_or(hash).to_owned();

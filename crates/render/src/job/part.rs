@@ -340,8 +340,8 @@ fn missing(from: u32, to: u32, tiles: &[Tile]) -> String {
         return rows;
     };
     const MOST: usize = 20;
-    let there: BTreeSet<u32> = tiles.iter().map(|tile| tile.number).collect();
-    let absent = (1..=of).filter(|number| !there.contains(number));
+    let present: BTreeSet<u32> = tiles.iter().map(|tile| tile.number).collect();
+    let absent = (1..=of).filter(|number| !present.contains(number));
     let mut names: Vec<String> = absent
         .take(MOST + 1)
         .map(|number| Tile { number, of }.to_string())
@@ -465,11 +465,11 @@ mod tests {
             (0.0, 0.0, "its depth, 0, must be"),
             (1.0, f64::INFINITY, "its exposure "),
         ] {
-            let told = told(|header, _| {
+            let message = told(|header, _| {
                 part(header).middle_depth = depth.to_bits();
                 part(header).exposure = exposure.to_bits();
             });
-            assert!(told.starts_with(wanted), "{told}");
+            assert!(message.starts_with(wanted), "{message}");
         }
         let unfinished = told(|_, piece| piece.reached.pass = 8..16);
         assert_eq!(unfinished, "its piece of the pixels 0,0,4,3 is not finished");

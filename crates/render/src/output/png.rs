@@ -13,11 +13,11 @@ use crate::error::RenderError;
 use crate::film::mean;
 use wgray_image::GAMMA;
 
-/// A PNG file of 8-bit RGB in memory, packed for speed.
+/// Encodes 8-bit RGB as a PNG in memory, with fast compression.
 ///
 /// # Errors
 ///
-/// Sizes that do not fit the number of bytes.
+/// The length of `rgb` does not match the size.
 pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     let mut file = Vec::new();
     let mut png = encoder(&mut file, (width, height), ColorType::Rgb, BitDepth::Eight);
@@ -28,7 +28,7 @@ pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     Ok(file)
 }
 
-/// Reads the texts before the pixels of a PNG.
+/// Reads the Latin-1 text chunks before the pixels of a PNG.
 pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     let reader = Decoder::new(file).read_info().ok()?;
     let texts = reader.info().uncompressed_latin1_text.iter();
@@ -90,7 +90,8 @@ pub fn write(
     Ok(())
 }
 
-/// Puts texts into a file's header: as Latin-1 where they are that, as every reader knows, else as UTF-8.
+/// Adds metadata to the header: as Latin-1 text chunks, which every reader supports, or as UTF-8 if the text requires
+/// it.
 fn tell<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) -> Result<(), EncodingError> {
     for (name, text) in metadata.pairs.iter().cloned() {
         match text.chars().all(|c| c <= '\u{ff}') {
@@ -101,7 +102,7 @@ fn tell<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) -> Result<
     Ok(())
 }
 
-/// The bytes of all pixels of a band: of the radiance, or of an AOV.
+/// Returns the bytes of all pixels of a band: of the radiance, or of an AOV.
 fn bytes(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> Vec<u8> {
     match (content, layout.alpha) {
         (None, true) => rounded(band, depth, |i| {
@@ -121,7 +122,7 @@ fn bytes(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> 
     }
 }
 
-/// All pixels of a band, from values of 0 to 1.
+/// Quantizes the pixels of a band, whose values are from 0 to 1.
 fn rounded<const N: usize>(band: Band, depth: BitDepth, pixel: impl Fn(usize) -> [f64; N] + Sync) -> Vec<u8> {
     let pixels = (0..band.film.sums.len()).into_par_iter();
     match depth {

@@ -32,15 +32,15 @@ pub const MAX_LISTED_EMITTERS: usize = 16;
 const MAX_TREE_EMITTERS: usize = 500_000;
 
 /// Collects all emitters: primitives, delta lights, triangles of meshes and the environment map. Sets
-/// [`Material::density`], the PDF of samples on emissive surfaces. `around` is the integral of the environment map over
-/// all directions, if the scene has one.
+/// [`Material::density`], the PDF of samples on emissive surfaces. `environment_integral` is the integral of the
+/// environment map over all directions, if the scene has one.
 pub fn emitters(
     scene: &Scene,
     materials: &mut [Material],
     delta_lights: &[Light],
     primitives: &[(Primitive, bool)],
     trees: &PackedBvh,
-    around: Option<f64>,
+    environment_integral: Option<f64>,
 ) -> PackedEmitters {
     // Mean radiance of each material, and its power per area.
     let radiances: Vec<f64> = (materials.iter().enumerate())
@@ -57,7 +57,7 @@ pub fn emitters(
             std::f64::consts::PI * radiance * sides
         })
         .collect();
-    let mut shining = PackedEmitters::default();
+    let mut packed = PackedEmitters::default();
     let mut powers = Vec::new();
     // Material of each emitter; a unique number for lights without one.
     let mut kinds = Vec::new();
@@ -68,7 +68,7 @@ pub fn emitters(
             let light = light_of(primitive, i, material, t_max(scene.render.shadow_epsilon));
             powers.push(strength * area(primitive));
             kinds.push(primitive.material as usize);
-            shining.lighting.lights.push(light);
+            packed.lighting.lights.push(light);
         }
     }
     for light in delta_lights.iter().filter(|light| light.color != Vec3::ZERO) {
@@ -77,17 +77,17 @@ pub fn emitters(
             SPOT => spot_power(light) * mean(light.color),
             _ => std::f64::consts::PI * radius(primitives, trees).powi(2) * mean(light.color),
         });
-        shining.lighting.lights.push(*light);
+        packed.lighting.lights.push(*light);
     }
-    let environment = shining.lighting.lights.len();
+    let environment = packed.lighting.lights.len();
     let of_materials = kinds.len();
     kinds.extend((of_materials..environment).map(|i| materials.len() + i));
-    if let Some(around) = around {
-        powers.push(std::f64::consts::PI * radius(primitives, trees).powi(2) * around);
-        shining.lighting.lights.push(environment_light());
+    if let Some(environment_integral) = environment_integral {
+        powers.push(std::f64::consts::PI * radius(primitives, trees).powi(2) * environment_integral);
+        packed.lighting.lights.push(environment_light());
         kinds.push(materials.len() + environment);
     }
-    let mut places: Vec<(u32, u32)> = (0..shining.lighting.lights.len() as u32).map(|i| (0, i)).collect();
+    let mut places: Vec<(u32, u32)> = (0..packed.lighting.lights.len() as u32).map(|i| (0, i)).collect();
     for (number, instance) in (1..).zip(&trees.instances) {
         let mesh = &trees.meshes[instance.mesh as usize];
         let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
@@ -107,8 +107,8 @@ pub fn emitters(
             }
         }
     }
-    balance(&mut powers, &places, &shining.lighting.lights);
-    let is_far = |place: &(u32, u32)| is_far(&shining.lighting.lights, place);
+    balance(&mut powers, &places, &packed.lighting.lights);
+    let is_far = |place: &(u32, u32)| is_far(&packed.lighting.lights, place);
     let near = places.iter().filter(|place| !is_far(place)).count();
     if (MAX_LISTED_EMITTERS + 1..=MAX_TREE_EMITTERS).contains(&near) {
         let found = EmitterRef {
@@ -117,7 +117,7 @@ pub fn emitters(
             radiances,
             strengths,
         };
-        return with_tree(shining, materials, primitives, trees, &found);
+        return with_tree(packed, materials, primitives, trees, &found);
     }
     for (kind, factor) in defend(&mut powers, &kinds, |i| is_far(&places[i])) {
         if let Some(strength) = strengths.get_mut(kind) {
@@ -133,14 +133,14 @@ pub fn emitters(
             0.0
         };
     }
-    for (light, power) in shining.lighting.lights.iter_mut().zip(&powers) {
+    for (light, power) in packed.lighting.lights.iter_mut().zip(&powers) {
         light.density = match light.kind {
             POINT | DIRECTIONAL | SPOT | ENVIRONMENT => (power / total) as f32,
             _ => materials[primitives[light.primitive as usize].0.material as usize].density,
         };
     }
-    shining.environment = around.map_or(0.0, |_| powers[environment] / total);
-    shining.lighting.emitters = (table(&powers).into_iter().zip(places))
+    packed.environment = environment_integral.map_or(0.0, |_| powers[environment] / total);
+    packed.lighting.emitters = (table(&powers).into_iter().zip(places))
         .map(|((threshold, other), (instance, index))| Emitter {
             threshold,
             other,
@@ -148,7 +148,7 @@ pub fn emitters(
             index,
         })
         .collect();
-    shining
+    packed
 }
 
 /// Defensive sampling of near emitters: scales the power of each kind so that a quarter of the samples are uniform over
@@ -227,13 +227,13 @@ struct EmitterRef {
 
 /// Builds the light tree over all near emitters. The alias table selects the tree or a distant emitter.
 fn with_tree(
-    mut shining: PackedEmitters,
+    mut packed: PackedEmitters,
     materials: &mut [Material],
     primitives: &[(Primitive, bool)],
     trees: &PackedBvh,
     found: &EmitterRef,
 ) -> PackedEmitters {
-    let is_far = |place: &(u32, u32)| is_far(&shining.lighting.lights, place);
+    let is_far = |place: &(u32, u32)| is_far(&packed.lighting.lights, place);
     let (mut in_tree, mut far) = (Vec::new(), Vec::new());
     for (place, power) in found.places.iter().zip(&found.powers) {
         if is_far(place) { &mut far } else { &mut in_tree }.push((*place, *power));
@@ -245,7 +245,7 @@ fn with_tree(
         .iter()
         .map(|(place @ (instance, index), _)| {
             let lamp = match *instance {
-                0 => lamp_of(&shining.lighting.lights[*index as usize], primitives, &found.radiances),
+                0 => lamp_of(&packed.lighting.lights[*index as usize], primitives, &found.radiances),
                 number => {
                     let (corners, material) = face(trees, number as usize - 1, *index);
                     lamp_of_triangle(corners, found.radiances[material as usize], true)
@@ -259,31 +259,31 @@ fn with_tree(
             }
         })
         .collect();
-    shining.lighting.nodes = light_tree::build(&lamps);
-    shining.lighting.leaves = vec![NO_INDEX; primitives.len()];
-    shining.of_instances = vec![NO_INDEX; trees.instances.len()];
+    packed.lighting.nodes = light_tree::build(&lamps);
+    packed.lighting.leaves = vec![NO_INDEX; primitives.len()];
+    packed.of_instances = vec![NO_INDEX; trees.instances.len()];
     for lamp in lamps.iter().filter(|lamp| lamp.instance != 0) {
         let number = lamp.instance as usize - 1;
-        if shining.of_instances[number] == NO_INDEX {
-            shining.of_instances[number] = shining.lighting.leaves.len() as u32;
+        if packed.of_instances[number] == NO_INDEX {
+            packed.of_instances[number] = packed.lighting.leaves.len() as u32;
             let triangles = trees.meshes[trees.instances[number].mesh as usize].triangles.len();
-            shining
+            packed
                 .lighting
                 .leaves
-                .resize(shining.lighting.leaves.len() + triangles, NO_INDEX);
+                .resize(packed.lighting.leaves.len() + triangles, NO_INDEX);
         }
     }
-    for (number, node) in (0..).zip(&shining.lighting.nodes) {
+    for (number, node) in (0..).zip(&packed.lighting.nodes) {
         for (i, child) in (4 * number..).zip(0..4) {
             if node.children[child] != NO_INDEX || node.intensity[child] == 0.0 {
                 continue;
             }
             let place = match node.instance[child] {
-                0 => shining.lighting.lights[node.index[child] as usize].primitive,
-                number => shining.of_instances[number as usize - 1] + node.index[child],
+                0 => packed.lighting.lights[node.index[child] as usize].primitive,
+                number => packed.of_instances[number as usize - 1] + node.index[child],
             };
             if place != NO_INDEX {
-                shining.lighting.leaves[place as usize] = i;
+                packed.lighting.leaves[place as usize] = i;
             }
         }
     }
@@ -291,10 +291,10 @@ fn with_tree(
         material.density = if *strength > 0.0 { 1.0 } else { 0.0 };
     }
     for ((_, index), power) in &far {
-        let light = &mut shining.lighting.lights[*index as usize];
+        let light = &mut packed.lighting.lights[*index as usize];
         light.density = (power / total) as f32;
         if light.kind == ENVIRONMENT {
-            shining.environment = power / total;
+            packed.environment = power / total;
         }
     }
     let weights: Vec<f64> = [of_tree]
@@ -302,7 +302,7 @@ fn with_tree(
         .chain(far.iter().map(|(_, power)| *power))
         .collect();
     let places = [(0, NO_INDEX)].into_iter().chain(far.iter().map(|(place, _)| *place));
-    shining.lighting.emitters = (table(&weights).into_iter().zip(places))
+    packed.lighting.emitters = (table(&weights).into_iter().zip(places))
         .map(|((threshold, other), (instance, index))| Emitter {
             threshold,
             other,
@@ -310,7 +310,7 @@ fn with_tree(
             index,
         })
         .collect();
-    shining
+    packed
 }
 
 /// Returns the corners of a triangle of an instance, and its material.

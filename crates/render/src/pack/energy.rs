@@ -10,7 +10,7 @@ use crate::cpu::math::{dot, max};
 use crate::cpu::sequence::sobol_sample;
 use crate::cpu::specular::{fresnel, refracted_cosine};
 
-/// Number of sampled normals if the roughness is known, and per row if not. Sobol' points, as few microfacets tilt
+/// Number of sampled normals if the roughness is known, and per row if not. Sobol' points, since few microfacets tilt
 /// enough for total internal reflection, and a grid would miss them.
 const FACETS: (u32, u32) = (4096, 1024);
 
@@ -99,7 +99,8 @@ pub enum Parts {
 /// Number of rows by textured roughness and by textured anisotropy.
 const ROWS: (u32, u32) = (10, 6);
 
-/// Correction of the tables of glass: total internal reflection makes a kink, which linear interpolation cuts off.
+/// Correction factor of the tables of glass: total internal reflection makes a kink, where linear interpolation is too
+/// low.
 const CUT: f32 = 1.004;
 
 /// Returns the table of anisotropic microfacets for `single_scatter_albedo_aniso`: the numbers of rows by roughness and
@@ -166,10 +167,10 @@ pub fn aniso_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32>
 
 /// Returns the direction at table coordinates. Inverse of `aniso_table_position`.
 fn aniso_direction(alpha: Vec2, place: Vec2) -> Vec3 {
-    let seen = alpha.y + (alpha.x - alpha.y) * (place.x * place.x);
-    let between = (seen * seen - alpha.y * alpha.y) / max(alpha.x * alpha.x - alpha.y * alpha.y, 1e-12);
+    let roughness = alpha.y + (alpha.x - alpha.y) * (place.x * place.x);
+    let between = (roughness * roughness - alpha.y * alpha.y) / max(alpha.x * alpha.x - alpha.y * alpha.y, 1e-12);
     let along = max(0.0, if between > 1.0 { 1.0 } else { between });
-    let half_way = 0.5 * seen.sqrt();
+    let half_way = 0.5 * roughness.sqrt();
     // Root of the quadratic equation of `aniso_table_position`.
     let b = 1.0 + 2.0 * half_way - 2.0 * place.y;
     let root = (b * b + 8.0 * half_way * place.y).sqrt();

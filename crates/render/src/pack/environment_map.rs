@@ -10,7 +10,7 @@ use super::{BACKGROUND, ENVIRONMENT_BLOCKS, ENVIRONMENT_INVISIBLE, ENVIRONMENT_M
 use wgray_scene::downsample::linear;
 use wgray_scene::{self as scene, EnvironmentImage, Scene};
 
-/// Maps with a smaller integral count as black, as their PDFs would approach the subnormal numbers.
+/// Maps with a smaller integral count as black, since their PDFs would approach the subnormal numbers.
 const DARKEST: f64 = 1e-25;
 /// Blocks with a smaller fraction of the total power get no light samples; only BSDF samples find them.
 const DARKEST_SHARE: f64 = 1e-12;
@@ -46,7 +46,7 @@ impl EnvironmentMap {
     }
 
     pub fn sum(&self) -> Option<f64> {
-        self.0.as_ref().map(|around| around.sum)
+        self.0.as_ref().map(|map| map.sum)
     }
 
     /// Returns the flags that kernels have as constants.
@@ -60,22 +60,22 @@ impl EnvironmentMap {
 
     /// Returns the map's fields of the record. `share` is the probability of sampling the map.
     pub fn record(&self, share: f64) -> Environment {
-        let Some(around) = &self.0 else {
+        let Some(map) = &self.0 else {
             return bytemuck::Zeroable::zeroed();
         };
-        let [x, y, z] = around.rows;
+        let [x, y, z] = map.rows;
         Environment {
             x,
-            texels: around.texels as u32,
+            texels: map.texels as u32,
             y,
-            width: around.width,
+            width: map.width,
             z,
-            height: around.height,
-            cells: around.cells as u32,
+            height: map.height,
+            cells: map.cells as u32,
             // Relative to the sum of three components at four corners.
             density: (share / 12.0) as f32,
-            blocks: around.blocks as u32,
-            shifts: around.shifts,
+            blocks: map.blocks as u32,
+            shifts: map.shifts,
             ..bytemuck::Zeroable::zeroed()
         }
     }

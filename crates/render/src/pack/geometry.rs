@@ -16,8 +16,8 @@ use wgray_scene::{Geometry, Scene, Shape};
 /// Maximum number of bounded primitives without a BVH. Few are faster as constants in a linear loop.
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
-/// Builds the BVH over a scene's mesh instances and these primitives, given with their indices and as shadow casters.
-/// Also returns [`Counts::room`](super::Counts::room).
+/// Builds the BVH over a scene's mesh instances and these primitives, each with its index and true if it casts a
+/// shadow. Also returns [`Counts::room`](super::Counts::room).
 pub fn trees(
     scene: &Scene,
     primitives: &[(u32, &Primitive, bool)],
@@ -83,15 +83,18 @@ pub fn trees(
     (trees, Vec4::new(BOX_PAD * condition_number, farthest, 0.0, 0.0))
 }
 
-/// Returns the meshes that need computed tangents: those with a normal map in any instance. Other tangent directions,
-/// of anisotropy and coat normal maps, use the tangents of the mesh or else of its triangles.
+/// Returns the meshes that are packed with vertex tangents: those with a normal map in any instance, and those that
+/// have tangents and a material with tangent directions (anisotropy, coat normal map). Without vertex tangents such
+/// directions use the tangents of the triangles.
 fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
-    let wants = |mesh: &Mesh, material: &usize| {
+    let needs_tangents = |mesh: &Mesh, material: &usize| {
         let material = &scene.materials[*material];
         material.normal_map.is_some() || !mesh.tangents.is_empty() && material.has_direction()
     };
     let mesh = |shape: &Shape| match &shape.geometry {
-        Geometry::Mesh { mesh, materials, .. } if materials.iter().any(|m| wants(mesh, m)) => Some(Arc::as_ptr(mesh)),
+        Geometry::Mesh { mesh, materials, .. } if materials.iter().any(|m| needs_tangents(mesh, m)) => {
+            Some(Arc::as_ptr(mesh))
+        }
         _ => None,
     };
     scene.shapes.iter().filter_map(mesh).collect()
@@ -116,16 +119,16 @@ impl PackedBvh {
                 row = more_uvs + mesh.more_uvs.len() as u32;
                 let nodes = node_row;
                 node_row += NODE_ROWS * mesh.nodes.len() as u32;
-                let or_nothing = |row: u32, exists: bool| if exists { row } else { NO_INDEX };
+                let row_or_none = |row: u32, exists: bool| if exists { row } else { NO_INDEX };
                 [
                     nodes,
                     triangles,
                     vertices,
-                    or_nothing(attributes, !mesh.attributes.is_empty()),
-                    or_nothing(tangents, !mesh.tangents.is_empty()),
-                    or_nothing(groups, !mesh.groups.is_empty()),
-                    or_nothing(colors, !mesh.colors.is_empty()),
-                    or_nothing(more_uvs, !mesh.more_uvs.is_empty()),
+                    row_or_none(attributes, !mesh.attributes.is_empty()),
+                    row_or_none(tangents, !mesh.tangents.is_empty()),
+                    row_or_none(groups, !mesh.groups.is_empty()),
+                    row_or_none(colors, !mesh.colors.is_empty()),
+                    row_or_none(more_uvs, !mesh.more_uvs.is_empty()),
                 ]
             })
             .collect();

@@ -42,10 +42,10 @@ fn camera_visibility(material: &scene::Material) -> u32 {
     }
 }
 
-/// Record of microfacets. `found` resolves a textured roughness.
-fn faceted(facets: &Facets, found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
+/// Record of microfacets. `resolve` looks up a textured roughness.
+fn faceted(facets: &Facets, resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
     Material {
-        roughness: of_value(&facets.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, found),
+        roughness: of_value(&facets.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, resolve),
         anisotropy: facets.anisotropy as f32,
         rotation: (facets.rotation / 180.0) as f32,
         energy: if facets.compensated { 0 } else { NO_INDEX },
@@ -138,7 +138,7 @@ impl Appearances {
     fn material(&mut self, scene: &Scene, material: &scene::Material) -> Material {
         let mut lookups = Lookups::default();
         let uv_set = |i: usize| scene.textures[i].uv_set;
-        let mut found = |color: &Color, purpose: u32, channel: Option<(Channel, u32)>| match *color {
+        let mut resolve = |color: &Color, purpose: u32, channel: Option<(Channel, u32)>| match *color {
             Color::Plain(color) => color.as_vec3(),
             Color::Texture(i) => match scene.textures[i].kind {
                 TextureKind::Constant(color) => color.as_vec3(),
@@ -157,23 +157,23 @@ impl Appearances {
             } => Material {
                 ambient: match scene.render.integrator.follows_paths() {
                     true => Vec3::ZERO, // not used
-                    false => found(ambient, FOR_AMBIENT, None),
+                    false => resolve(ambient, FOR_AMBIENT, None),
                 },
                 kind: PHONG,
-                diffuse: found(diffuse, FOR_DIFFUSE, None),
+                diffuse: resolve(diffuse, FOR_DIFFUSE, None),
                 shininess: *shininess as f32,
-                specular: found(specular, FOR_SPECULAR, None),
+                specular: resolve(specular, FOR_SPECULAR, None),
                 exponent: *shininess as u32,
                 ..bytemuck::Zeroable::zeroed()
             },
             Reflection::Mirror { tint } => Material {
                 kind: MIRROR,
-                tint: found(tint, FOR_TINT, None),
+                tint: resolve(tint, FOR_TINT, None),
                 ..bytemuck::Zeroable::zeroed()
             },
             Reflection::Glass { ior, tint } => Material {
                 kind: GLASS,
-                tint: found(tint, FOR_TINT, None),
+                tint: resolve(tint, FOR_TINT, None),
                 ior: *ior as f32,
                 ..bytemuck::Zeroable::zeroed()
             },
@@ -183,10 +183,10 @@ impl Appearances {
                 facets,
             } => Material {
                 kind: METAL,
-                tint: found(tint, FOR_TINT, None),
+                tint: resolve(tint, FOR_TINT, None),
                 eta: index.map_or(Vec3::ZERO, |index| index.eta.as_vec3()),
                 k: index.map_or(Vec3::ZERO, |index| index.k.as_vec3()),
-                ..faceted(facets, &mut found)
+                ..faceted(facets, &mut resolve)
             },
             Reflection::Dielectric {
                 ior,
@@ -196,23 +196,23 @@ impl Appearances {
                 facets,
             } => Material {
                 kind: if *thin { THIN } else { ROUGH_GLASS },
-                tint: found(tint, FOR_TINT, None),
+                tint: resolve(tint, FOR_TINT, None),
                 ior: *ior as f32,
                 absorption: absorption.as_vec3(),
-                ..faceted(facets, &mut found)
+                ..faceted(facets, &mut resolve)
             },
-            Reflection::Principled(principled) => self::principled(principled, &mut found),
+            Reflection::Principled(principled) => self::principled(principled, &mut resolve),
             Reflection::Diffuse {
                 color: albedo,
                 roughness,
             } => Material {
                 kind: DIFFUSE,
-                diffuse: found(albedo, FOR_DIFFUSE, None),
-                roughness: of_value(roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, &mut found),
+                diffuse: resolve(albedo, FOR_DIFFUSE, None),
+                roughness: of_value(roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, &mut resolve),
                 ..bytemuck::Zeroable::zeroed()
             },
         };
-        record.emission = found(&material.emission, FOR_EMISSION, None);
+        record.emission = resolve(&material.emission, FOR_EMISSION, None);
         let has = |purpose: u32| lookups.0.iter().any(|lookup| lookup.purposes & purpose != 0);
         let textured = has(FOR_ROUGHNESS);
         let mut record = simplest(record, textured);
@@ -407,32 +407,40 @@ impl Lookups {
 }
 
 /// Record of a principled material, without the shared parameters.
-fn principled(p: &scene::Principled, found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
-    let sees_through = p.alpha_mode != AlphaMode::Opaque;
+fn principled(
+    p: &scene::Principled,
+    resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
+) -> Material {
+    let has_alpha = p.alpha_mode != AlphaMode::Opaque;
     Material {
         kind: PRINCIPLED,
-        diffuse: found(&p.base_color, FOR_DIFFUSE, None),
-        specular: found(&p.specular_color, FOR_SPECULAR, None),
+        diffuse: resolve(&p.base_color, FOR_DIFFUSE, None),
+        specular: resolve(&p.specular_color, FOR_SPECULAR, None),
         ior: p.ior as f32,
         absorption: p.absorption.as_vec3(),
-        roughness: of_value(&p.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, found),
-        anisotropy: of_value(&p.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL, found),
+        roughness: of_value(&p.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, resolve),
+        anisotropy: of_value(&p.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL, resolve),
         rotation: (p.anisotropy_rotation / std::f64::consts::PI) as f32,
         thin: p.thin.into(),
-        sheen: found(&p.sheen_color, FOR_SHEEN, None),
-        sheen_roughness: of_value(&p.sheen_roughness, FOR_SHEEN_ROUGHNESS, SHEEN_ROUGHNESS_CHANNEL, found),
-        metallic: of_value(&p.metallic, FOR_METALLIC, METALLIC_CHANNEL, found),
-        transmission: of_value(&p.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL, found),
-        clearcoat: of_value(&p.clearcoat, FOR_COAT, COAT_CHANNEL, found),
+        sheen: resolve(&p.sheen_color, FOR_SHEEN, None),
+        sheen_roughness: of_value(
+            &p.sheen_roughness,
+            FOR_SHEEN_ROUGHNESS,
+            SHEEN_ROUGHNESS_CHANNEL,
+            resolve,
+        ),
+        metallic: of_value(&p.metallic, FOR_METALLIC, METALLIC_CHANNEL, resolve),
+        transmission: of_value(&p.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL, resolve),
+        clearcoat: of_value(&p.clearcoat, FOR_COAT, COAT_CHANNEL, resolve),
         clearcoat_roughness: of_value(
             &p.clearcoat_roughness,
             FOR_COAT_ROUGHNESS,
             COAT_ROUGHNESS_CHANNEL,
-            found,
+            resolve,
         ),
-        specular_weight: of_value(&p.specular, FOR_WEIGHT, WEIGHT_CHANNEL, found),
-        opacity: match sees_through {
-            true => of_value(&p.alpha, FOR_OPACITY, OPACITY_CHANNEL, found),
+        specular_weight: of_value(&p.specular, FOR_WEIGHT, WEIGHT_CHANNEL, resolve),
+        opacity: match has_alpha {
+            true => of_value(&p.alpha, FOR_OPACITY, OPACITY_CHANNEL, resolve),
             false => 1.0,
         },
         cutoff: p.alpha_cutoff as f32,
@@ -450,17 +458,17 @@ fn principled(p: &scene::Principled, found: &mut impl FnMut(&Color, u32, Option<
     }
 }
 
-/// Resolves a scalar: a constant, or a channel of the texture that `found` resolves.
+/// Resolves a scalar: a constant, or a channel of the texture that `resolve` looks up.
 fn of_value(
     value: &Value,
     purpose: u32,
     place: u32,
-    found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
+    resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
 ) -> f32 {
     match *value {
         Value::Plain(number) => number as f32,
         Value::Texture(i, channel) => {
-            let color = found(&Color::Texture(i), purpose, Some((channel, place)));
+            let color = resolve(&Color::Texture(i), purpose, Some((channel, place)));
             color[number_of(channel) as usize]
         }
     }

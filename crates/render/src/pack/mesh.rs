@@ -30,10 +30,14 @@ impl PackedMesh {
     fn of(mesh: &Mesh, tangents: Option<VertexTangents>) -> PackedMesh {
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
         let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| Aabb::around(&corners(t))).collect();
-        let whole = boxes.iter().fold(Aabb::EMPTY, |all, b| all.with(b));
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, b| all.with(b));
         let tree = build(&boxes, MAX_LEAF_SIZE);
         let (triangles, copies, tangents) = match &tangents {
-            Some(of) => (&of.triangles, of.copies.as_slice(), of.tangents.as_slice()),
+            Some(generated) => (
+                &generated.triangles,
+                generated.copies.as_slice(),
+                generated.tangents.as_slice(),
+            ),
             None => (&mesh.triangles, &[][..], &[][..]),
         };
         let triangles = tree.order.par_iter().map(|&number| {
@@ -54,7 +58,9 @@ impl PackedMesh {
         };
         let attributes = (0..with_attributes).into_par_iter().map(original);
         let attributes = attributes.map(|i| normal(i).extend(uv(i).y));
-        let tangents = tangents.par_iter().map(|of| [of.u.extend(0.0), of.v.extend(0.0)]);
+        let tangents = tangents
+            .par_iter()
+            .map(|frame| [frame.u.extend(0.0), frame.v.extend(0.0)]);
         let colors = (0..if mesh.colors.is_empty() { 0 } else { count })
             .into_par_iter()
             .map(original);
@@ -78,8 +84,8 @@ impl PackedMesh {
             colors: colors.collect(),
             more_uvs: more_uvs.collect(),
             groups: tree.order.iter().filter_map(group).collect(),
-            low: whole.low,
-            high: whole.high,
+            low: bounds.low,
+            high: bounds.high,
             nodes: cast_vec(tree.nodes),
         }
     }

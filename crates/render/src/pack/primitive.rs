@@ -1,14 +1,14 @@
-//! The records of primitives, and what packing knows of each kind of them: bounds and area.
+//! Records of primitives, with their bounds and areas.
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::{CYLINDER, DISK, ELLIPSOID, PLANE, Primitive, RECTANGLE, Sphere, TRIANGLE};
 use wgray_scene::{Bounds, Geometry, Parallelogram, Scene};
 
-/// The factor by which bounding spheres are enlarged, for the rounding of the records.
+/// Factor by which bounding spheres are enlarged, for the rounding of the records.
 const SPHERE_MARGIN: f64 = 1.0 + 1e-5;
 
-/// The radius of a plane's bounding sphere: larger than any scene, and its square is finite.
+/// Radius of a plane's bounding sphere: larger than any scene, with a finite square.
 const UNBOUNDED: f64 = 1e18;
 
 pub(super) fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
@@ -61,8 +61,9 @@ pub(super) fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: 
     )
 }
 
-/// The primitive whose transform from local space has these columns and this translation. The anchor of a solid is a point of its surface, the one
-/// towards the origin, so that coordinates near the origin keep their digits however large the solid is.
+/// Returns the primitive with these columns and this translation of the transform to world space. The anchor of a solid
+/// is a surface point towards the origin, so that coordinates near the origin keep their precision however large the
+/// solid is.
 pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
     let to_local = columns.inverse();
     let rows = to_local.transpose();
@@ -77,7 +78,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
         anchor = (center + columns * outwards).as_vec3();
         middle = to_local * (center - anchor.as_dvec3());
     }
-    // The level of a cylinder is that of its side.
+    // `level` of a cylinder is that of its side.
     let square = match kind {
         CYLINDER => middle.truncate().length_squared(),
         _ => middle.length_squared(),
@@ -96,7 +97,8 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
     }
 }
 
-/// Returns a point on the surface of a cylinder, in local space, near a point: on a cap if the point is beyond it, else on the side.
+/// Returns a point on the surface of a cylinder near a local point: on a cap if the point is beyond it, else on the
+/// side.
 fn nearest_of_cylinder(point: DVec3) -> DVec3 {
     let across = point.truncate();
     let across = match point.z.abs() > 1.0 && across.length() < 1.0 {
@@ -106,24 +108,24 @@ fn nearest_of_cylinder(point: DVec3) -> DVec3 {
     across.extend(point.z.clamp(-1.0, 1.0))
 }
 
-/// The images of the axes of a primitive's local space.
+/// Returns the axes of local space in world space.
 pub fn axes(primitive: &Primitive) -> [DVec3; 3] {
     let columns = columns(primitive);
     [columns.x_axis, columns.y_axis, columns.z_axis]
 }
 
-/// The linear map from a primitive's local space.
+/// Returns the linear part of the transform to world space.
 fn columns(primitive: &Primitive) -> DMat3 {
     let [x, y, z] = [primitive.x, primitive.y, primitive.z].map(Vec3::as_dvec3);
     DMat3::from_cols(x, y, z).transpose().inverse()
 }
 
-/// The image of the origin of a primitive's local space.
+/// Returns the origin of local space in world space.
 fn center(primitive: &Primitive) -> DVec3 {
     primitive.anchor.as_dvec3() + columns(primitive) * primitive.middle.as_dvec3()
 }
 
-/// The bounding box of a primitive; that of a plane is infinite.
+/// Returns the bounding box, which is infinite for a plane.
 pub fn bounding_box(primitive: &Primitive) -> Bounds {
     let [a, b, c] = axes(primitive);
     let center = center(primitive);
@@ -143,7 +145,7 @@ pub fn bounding_box(primitive: &Primitive) -> Bounds {
     (center - half, center + half)
 }
 
-/// A bounding sphere of a primitive; that of a plane is larger than any scene.
+/// Returns a bounding sphere, which is larger than any scene for a plane.
 pub fn bounding_sphere(primitive: &Primitive) -> Sphere {
     let [a, b, c] = axes(primitive);
     let center = center(primitive);
@@ -168,7 +170,8 @@ pub fn bounding_sphere(primitive: &Primitive) -> Sphere {
     }
 }
 
-/// The area of a primitive, from which light is sampled. That of an ellipsoid is the estimate of `ellipsoid_area` in WGSL; that of a plane is 0.
+/// Returns the area over which light samples are distributed: for an ellipsoid the estimate of `ellipsoid_area` in
+/// WGSL, for a plane 0.
 pub fn area(primitive: &Primitive) -> f64 {
     let [u, v, w] = axes(primitive);
     let span = u.cross(v).length();
@@ -187,8 +190,8 @@ pub fn area(primitive: &Primitive) -> f64 {
     }
 }
 
-/// The largest factor by which a linear map stretches any vector: the root of the largest eigenvalue of its square, a
-/// symmetric matrix (Smith, "Eigenvalues of a Symmetric 3 x 3 Matrix", CACM 4(4), 1961).
+/// Returns the largest singular value of a linear map: the root of the largest eigenvalue of its transpose times
+/// itself, a symmetric matrix (Smith, "Eigenvalues of a Symmetric 3 x 3 Matrix", CACM 4(4), 1961).
 fn largest_stretch(map: DMat3) -> f64 {
     let square = map.transpose() * map;
     let trace = |m: &DMat3| m.x_axis.x + m.y_axis.y + m.z_axis.z;

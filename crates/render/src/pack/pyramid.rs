@@ -8,19 +8,19 @@ use wgray_scene::downsample::{Level, decoded, half_of};
 use wgray_scene::texture::words;
 use wgray_scene::{Encoding, Image, Texels};
 
-/// Adds an image's levels to the texels, from the finest on, each row by row from the bottom; a table of the levels'
-/// places comes before them. Returns the table's place.
+/// Appends the table of an image's levels to the texels, and then the levels from the finest on, each row by row from
+/// the bottom. Returns the offset of the table.
 pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     let table = texels.len();
     let is_float = matches!(image.texels, Texels::Floats(_));
     let more = words(image.width, image.height, levels, is_float) as usize;
     match more > 1 << 20 {
-        true => texels.reserve_exact(more), // nothing spare: there are few of that size
+        true => texels.reserve_exact(more), // large images are few: no spare capacity
         false => texels.reserve(more),
     }
     texels.resize(table + levels as usize, 0);
     let height = image.height as usize;
-    // The finest level is not kept in linear light: it would take six times the memory of its texels.
+    // The finest level is not decoded as a whole: its linear colors would use six times the memory of its texels.
     let mut level = None;
     for i in 0..levels as usize {
         texels[table + i] = texels.len() as u32;
@@ -38,7 +38,8 @@ pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     table as u32
 }
 
-/// Appends rows of this many words in parallel. Memory that is set to zero first would be touched by a single thread.
+/// Appends rows of `words` words in parallel, to uninitialized memory: a single thread would touch all of it to zero
+/// it.
 fn append<I: Iterator<Item = u32>>(
     texels: &mut Vec<u32>,
     (words, rows): (usize, usize),
@@ -92,7 +93,7 @@ fn write_level(image: &Image, level: &Level, texels: &mut Vec<u32>) {
     }
 }
 
-/// A value by the encoding's curve, in steps of 8 bits.
+/// Encodes a linear value, in steps of 8 bits.
 fn steps(x: f64, encoding: Encoding) -> f64 {
     match encoding {
         Encoding::Srgb => linear_to_srgb(x) * 255.0,
@@ -100,36 +101,36 @@ fn steps(x: f64, encoding: Encoding) -> f64 {
     }
 }
 
-/// Returns a color in such steps as a word: see `unpacked_color` in `shaders/texel.wgsl`.
+/// Packs a color in these steps into a word: see `unpacked_color` in `shaders/texel.wgsl`.
 fn packed(steps: [f64; 3]) -> u32 {
     let exponent = exponent(steps.into_iter().fold(0.0, f64::max));
     joined(steps.map(|x| mantissa(x, exponent)), exponent)
 }
 
-/// Returns the exponent of a color by its largest value, which then has nine binary digits, or fewer where the least unit is too
-/// large for that.
+/// Returns the exponent of a color for its largest component, whose mantissa then has nine binary digits, or fewer if
+/// the smallest unit is too large for that.
 fn exponent(largest: f64) -> u32 {
     let exponent = ((largest as f32).to_bits() >> 23).clamp(103, 134) - 103;
     exponent + u32::from(largest * units(exponent) >= 511.5) // rounds to 512
 }
 
 fn mantissa(x: f64, exponent: u32) -> u32 {
-    // Rounded half up, without a call of the C library.
+    // Rounds half up, without a call of the C library.
     let x = x * units(exponent);
     let whole = x as u32;
-    whole.saturating_add(u32::from(x - f64::from(whole) >= 0.5)) // tables have exponents that are too small for the value
+    whole.saturating_add(u32::from(x - f64::from(whole) >= 0.5)) // tables include exponents too small for x
 }
 
 fn joined([red, green, blue]: [u32; 3], exponent: u32) -> u32 {
     red | green << 9 | blue << 18 | exponent << 27
 }
 
-/// Returns [`packed`] of a linear color by the curve of sRGB in 32-bit floats, which take a third of the time; `None` where their
-/// error could change a bit.
+/// Returns [`packed`] of a linear color encoded as sRGB in 32-bit floats, in a third of the time; `None` if their error
+/// could change a bit.
 fn approximately_packed(color: DVec3) -> Option<u32> {
     /// Bound of the relative error of the curve, some hundred units in the last place.
     const ERROR: f64 = 1e-5;
-    /// Distance of a mantissa, which is at most 512, from a whole number at which its rounding is certain.
+    /// Maximum distance of a mantissa, at most 512, from an integer at which its rounding is certain.
     const CERTAIN: f64 = 0.5 - 2.0 * 512.0 * ERROR;
     let steps = color.as_vec3().to_array().map(|x| {
         let curve = if x <= 0.003_130_8 {
@@ -151,9 +152,9 @@ fn approximately_packed(color: DVec3) -> Option<u32> {
     is_certain.then(|| joined(rounded, exponent))
 }
 
-/// [`packed`] of bytes, by tables: the finest levels are most of the texels.
+/// Tables of [`packed`] for bytes: most of the texels are those of the finest levels.
 struct PackedBytes {
-    /// The exponent of a color by its largest byte.
+    /// Exponent of a color for its largest byte.
     exponents: [u32; 256],
     /// For each exponent, the mantissas of all bytes.
     mantissas: Vec<[u32; 256]>,
@@ -179,7 +180,7 @@ impl PackedBytes {
     }
 }
 
-/// Returns how many units of an exponent are 1: a power of two.
+/// Returns the number of units of an exponent per 8-bit step, a power of two.
 fn units(exponent: u32) -> f64 {
     f64::from(f32::from_bits((159 - exponent) << 23))
 }
@@ -188,7 +189,7 @@ fn units(exponent: u32) -> f64 {
 mod tests {
     use super::*;
 
-    /// Numbers that fill the unit interval evenly.
+    /// Returns numbers that fill the unit interval evenly.
     fn additive(start: f64) -> impl Iterator<Item = f64> {
         (0..).map(move |i| (start + 0.618_033_988_749_895 * f64::from(i)).fract())
     }
@@ -210,9 +211,9 @@ mod tests {
             let scale = 0.5_f64.powi(i as i32 % 30) * if i % 7 == 0 { 0.0 } else { 1.0 };
             let color = DVec3::new(r * 0.5_f64.powi(i as i32 / 30 % 30), g * scale, b.powi(4));
             let exact = packed(color.to_array().map(|x| steps(x, Encoding::Srgb)));
-            let quick = approximately_packed(color);
-            assert_eq!(quick.unwrap_or(exact), exact, "{color}");
-            certain += usize::from(quick.is_some());
+            let approximate = approximately_packed(color);
+            assert_eq!(approximate.unwrap_or(exact), exact, "{color}");
+            certain += usize::from(approximate.is_some());
         }
         assert!(certain > 150_000, "{certain} of 200000");
         assert_eq!(approximately_packed(DVec3::ZERO), Some(packed([0.0; 3])));

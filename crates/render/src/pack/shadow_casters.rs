@@ -1,5 +1,5 @@
-//! The primitives that can occlude a segment from a surface to a light. A flat primitive cannot if all shapes and lights lie on one side of
-//! its plane, as the walls of a room do.
+//! Selection of the primitives that can cast shadows. A flat primitive cannot if all shapes and lights lie on one side
+//! of its plane, like the walls of a room.
 
 use glam::DVec3;
 
@@ -7,11 +7,13 @@ use super::{MAX_LINEAR_PRIMITIVES, Primitive};
 use crate::cpu::primitive::is_solid;
 use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
 
-/// A point within this distance of a plane counts as on it, relative to the coordinates: the rounding of the plane's record.
+/// Maximum distance at which a point counts as on a plane, relative to the coordinates: the rounding of the plane's
+/// record.
 const TOLERANCE: f64 = 1e-6;
 
-/// For each primitive outside of the BVH, whether it can occlude a point of a surface from a light. If there are more than
-/// [`MAX_LINEAR_PRIMITIVES`], planes are not tested, because each test takes a time in proportion to the number of shapes.
+/// Returns, for each primitive outside of the BVH, whether it can occlude a surface from a light. If there are more
+/// than [`MAX_LINEAR_PRIMITIVES`], planes are not tested, because the time of each test is proportional to the number
+/// of shapes.
 pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     let is_tested = primitives.len() <= MAX_LINEAR_PRIMITIVES && !has_environment_map(scene);
     let casts =
@@ -19,11 +21,11 @@ pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     primitives.iter().map(casts).collect()
 }
 
-/// Returns whether the material of a primitive lets it occlude light.
+/// Returns true if the material of a primitive casts shadows.
 pub fn may_cast_shadow(scene: &Scene, primitive: &Primitive) -> bool {
     match scene.shapes.get(primitive.shape as usize) {
         Some(shape) => casts_shadow(scene, shape.material),
-        // An area light that is an emitter occludes what is behind it.
+        // An area light that is an emitter occludes light from behind it.
         None => scene.render.integrator.needs_emitters(),
     }
 }
@@ -33,7 +35,7 @@ pub fn casts_shadow(scene: &Scene, material: usize) -> bool {
     scene.render.shadows == Shadows::Opaque || !is_glass
 }
 
-/// Light of an environment map comes from both sides of every plane.
+/// Returns true if the scene has an environment map, whose light comes from both sides of every plane.
 fn has_environment_map(scene: &Scene) -> bool {
     scene
         .environment
@@ -41,7 +43,7 @@ fn has_environment_map(scene: &Scene) -> bool {
         .is_some_and(|environment| environment.image.is_some())
 }
 
-/// Returns whether there is a part of a shape or a light on each side of the plane of a flat primitive.
+/// Returns true if parts of shapes or lights lie on both sides of the plane of a flat primitive.
 fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
     let normal = primitive.z.as_dvec3().normalize();
     let center = primitive.anchor.as_dvec3();
@@ -52,24 +54,24 @@ fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
         below && above
     };
     let mut point = |p: DVec3| height((p - center).dot(normal), p.abs().max(center.abs()).max_element());
-    let of_lights = scene.lights.iter().any(|light| match light {
+    let both_by_lights = scene.lights.iter().any(|light| match light {
         Light::Rectangle { rectangle, .. } => rectangle.corners().into_iter().any(&mut point),
         Light::Point { position, .. } | Light::Spot { position, .. } => point(*position),
         Light::Directional { .. } => false,
     });
-    let of_shapes = of_lights
+    let both_by_shapes = both_by_lights
         || scene.shapes.iter().any(|shape| {
             let mut found = false;
             shape.geometry.each_extreme(normal, |p| found |= point(p));
             found
         });
-    // Infinitely far away: directions.
-    let of_directions = of_shapes
+    // Directional lights and planes, which extend to infinity, by direction.
+    let both_by_directions = both_by_shapes
         || scene.lights.iter().any(|light| match light {
             Light::Directional { direction, .. } => height(-direction.dot(normal), 1.0),
             _ => false,
         });
-    of_directions
+    both_by_directions
         || scene.shapes.iter().any(|shape| match shape.geometry {
             Geometry::Plane { tangent, bitangent, .. } => [tangent, bitangent, -tangent, -bitangent]
                 .into_iter()
@@ -84,7 +86,7 @@ mod tests {
     use crate::pack::pack_shapes;
     use wgray_scene::Description;
 
-    /// Returns whether each primitive of a scene with these shapes can cast a shadow.
+    /// Returns, for each primitive of a scene with these shapes, whether it can cast a shadow.
     fn casting(shapes: &str) -> Vec<bool> {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -9, 1], look_at = [0, 0, 0], fov = 45 }}\n\
@@ -96,7 +98,7 @@ mod tests {
 
     const FLOOR: &str = "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [1, 2, 3]\nnormal = [0.6, 0, 0.8]\n";
 
-    /// A sphere whose center is at a height above the floor.
+    /// Returns a sphere whose center is at a height above the floor.
     fn ball(height: f64) -> String {
         let center = [1.0 + 0.6 * height, 2.0, 3.0 + 0.8 * height];
         format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = {center:?}\nradius = 1\n")

@@ -1,4 +1,4 @@
-//! The specialization of a kernel: the features that a scene uses, so that a kernel without them computes nothing for them.
+//! Specialization of a kernel to the features that a scene uses, so that unused ones cost nothing.
 
 use glam::{UVec4, Vec3};
 
@@ -18,7 +18,7 @@ pub(super) struct Parts<'a> {
     pub scene: &'a Scene,
     pub appearances: &'a Appearances,
     pub materials: &'a [Material],
-    /// The number of lights that are rectangles; they are the first.
+    /// Number of area lights (rectangles), which are the first.
     pub area_lights: usize,
     pub lights: &'a [Light],
     pub shining: &'a PackedEmitters,
@@ -91,15 +91,15 @@ impl Parts<'_> {
         }
     }
 
-    /// Returns the bits of the kinds of primitives whose range in [`Counts`] is not empty up to `end`.
+    /// Returns the bits of the kinds of primitives whose range in [`Counts`], up to `end`, is not empty.
     fn kinds(&self, end: fn(UVec4) -> u32) -> u32 {
         let kinds = (0..).zip(self.counts.primitives);
         kinds.fold(0, |bits, (kind, range)| bits | u32::from(end(range) > range.x) << kind)
     }
 }
 
-/// The samples that adaptive sampling gives all pixels before it decides on more: a round, or as many as it takes for an
-/// estimate of the variance.
+/// Returns the number of pilot samples of adaptive sampling: whole rounds, at least as many samples as an estimate of
+/// the variance requires, at most `most`.
 fn first_look(integrator: Integrator, round: u32, most: u32) -> u32 {
     let least = integrator.pilot_samples();
     least.next_multiple_of(round).max(round).min(most)
@@ -116,7 +116,7 @@ fn pattern(samples: Samples) -> u32 {
     }
 }
 
-/// The side of a pattern's grid of cells, or else the number of its samples.
+/// Returns the side of the grid for patterns with cells, else the number of samples.
 fn side(samples: Samples) -> u32 {
     if samples.pattern.needs_square() {
         samples.count.isqrt()
@@ -134,7 +134,8 @@ fn is_specular(material: &scene::Material) -> bool {
     }
 }
 
-/// Bits of the largest shininess, if all are whole numbers so small that squaring beats the general power.
+/// Returns the bit length of the largest shininess if all are integers up to 4096, for which repeated squaring is
+/// faster than the general power; else 0.
 fn exponent_bits(validated: &[scene::Material], packed: &[Material]) -> u32 {
     let whole = validated.iter().all(|material| {
         if let Reflection::Phong { shininess, .. } = &material.reflection {
@@ -146,7 +147,7 @@ fn exponent_bits(validated: &[scene::Material], packed: &[Material]) -> u32 {
     if whole { u32::BITS - largest.leading_zeros() } else { 0 }
 }
 
-/// Bits of the kinds of materials that may mirror or refract alone.
+/// Returns the bits of the kinds of materials whose BSDF may be a delta.
 fn delta_kinds(materials: &[Material], appearances: &Appearances) -> u32 {
     let may = |material: &&Material| {
         let textured = appearances.has_lookup(material, FOR_ROUGHNESS);
@@ -195,7 +196,7 @@ fn of_paths(
     }
 }
 
-/// The lobes that any principled material has.
+/// Returns the bits of the lobes that any principled material has.
 fn lobes(materials: &[Material], appearances: &Appearances) -> u32 {
     let mut principled = materials
         .iter()

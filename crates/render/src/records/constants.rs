@@ -71,7 +71,7 @@ constants! {
     pub const MASK: u32 = 1;
     /// [`Material::alpha_mode`]: the opacity is the probability that a ray hits the surface.
     pub const BLEND: u32 = 2;
-    /// Maximum number of surfaces that a ray passes by their alpha.
+    /// Maximum number of surfaces that a ray skips by their alpha.
     pub const MAX_ALPHA_SKIPS: u32 = 64;
     /// Bits of the kinds of materials whose BSDF is a pure delta.
     pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
@@ -95,7 +95,7 @@ constants! {
     pub const NORMAL_BINS: u32 = 17;
     /// [`Light::kind`](super::Light::kind): a spot light.
     pub const SPOT: u32 = KINDS + 4;
-    /// [`Material::camera_visibility`]: camera rays pass its back faces.
+    /// [`Material::camera_visibility`]: camera rays skip its back faces.
     pub const CULL_BACKFACE: u32 = 2;
     /// [`Material::vertex_colors`]: vertex colors are ignored.
     pub const NO_COLORS: u32 = 0;
@@ -103,7 +103,7 @@ constants! {
     pub const COLORS_OF_BASE: u32 = 1;
     /// [`Material::vertex_colors`]: they multiply the emission and the opacity.
     pub const COLORS_OF_EMISSION: u32 = 2;
-    /// Maximum number of camera-invisible surfaces that a camera ray passes; it sees the next one.
+    /// Maximum number of camera-invisible surfaces that a camera ray skips; the next one is visible.
     pub const MAX_CAMERA_SKIPS: u32 = 64;
 
     /// Number of bounces, from the camera on, at which glass splits a path into reflection and refraction.
@@ -138,7 +138,7 @@ constants! {
     /// [`Texture::wrap`]: repeat, mirroring every other copy.
     pub const MIRRORED: u32 = 2;
 
-    /// [`Lookup::purposes`], flags of the parameters that a texture gives: [`Material::ambient`].
+    /// [`Lookup::purposes`], flags of the parameters that a texture sets: [`Material::ambient`].
     pub const FOR_AMBIENT: u32 = 0x1;
     /// [`Lookup::purposes`]: [`Material::diffuse`].
     pub const FOR_DIFFUSE: u32 = 0x2;
@@ -211,7 +211,7 @@ constants! {
 
     /// Maximum distance of a hit, also that of a miss.
     pub const INFINITE_T: f32 = f32::MAX;
-    /// The index that stands for none.
+    /// Index that refers to nothing.
     pub const NO_INDEX: u32 = u32::MAX;
     /// The instance and primitive of a ray that does not start on a surface.
     pub const NO_PRIMITIVE: UVec2 = UVec2::new(0, NO_INDEX);

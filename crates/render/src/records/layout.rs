@@ -51,7 +51,8 @@ records! {
         pub radiance: Vec3,
         /// `t_max` of shadow rays to a point on a surface, relative to its distance.
         pub t_max: f32,
-        /// World-space direction to the center of the environment map. From here on 0 without a map.
+        /// World-space direction to the center of the environment map. This and the following fields are 0 without a
+        /// map.
         pub x: Vec3,
         /// Offset of its texels: three floats each, row by row from the top, between rows of the means at the poles.
         pub texels: u32,
@@ -182,7 +183,7 @@ records! {
     pub struct Lookup {
         /// Index of the texture.
         pub texture: u32,
-        /// The material parameters that it gives: flags such as [`FOR_DIFFUSE`].
+        /// The material parameters that it sets: flags such as [`FOR_DIFFUSE`].
         pub purposes: u32,
         /// The channel of each scalar parameter in two bits: 0 red, 1 green, 2 blue.
         pub channels: u32,
@@ -243,7 +244,7 @@ records! {
         /// Under `path`: [`Material::density`], or the probability of a delta light or the environment; 0 in a light
         /// tree.
         pub density: f32,
-        /// 1 if the front side emits alone, else 2.
+        /// Number of emitting sides: 1 (the front) or 2.
         pub sides: u32,
         /// [`SPOT`]: 1 minus the cosine of the outer half angle.
         pub cone: f32,

@@ -1,4 +1,4 @@
-//! The lobes of `principled` materials beside the diffuse one, a row for each.
+//! The lobes of `principled` materials besides the diffuse one, as a table.
 
 #[cfg(doc)]
 use super::PRINCIPLED;
@@ -6,15 +6,15 @@ use super::record::constants;
 use super::{FOR_ANISOTROPY, FOR_COAT, FOR_METALLIC, FOR_SHEEN, FOR_TRANSMISSION, FOR_WEIGHT, Material};
 use glam::Vec3;
 
-/// A row of the list.
+/// A lobe of `principled` materials.
 pub struct Lobe {
     /// Its bit in [`Specialization::lobes`](super::Specialization::lobes).
     pub bit: u32,
     /// Its name in `wgray info`.
     pub name: &'static str,
-    /// The lookups by which a texture may give a material this lobe.
+    /// Purposes of the texture lookups that may give a material this lobe.
     pub purposes: u32,
-    /// Returns whether a material has it without textures.
+    /// Returns true if a material has it without textures.
     pub is_in: fn(&Material) -> bool,
 }
 
@@ -27,7 +27,7 @@ constants! {
     pub const LOBE_COAT: u32 = 4;
     /// A lobe of [`PRINCIPLED`] materials: sheen.
     pub const LOBE_SHEEN: u32 = 8;
-    /// With the lobes of [`PRINCIPLED`] materials: any is anisotropic.
+    /// A flag beside the lobes of [`PRINCIPLED`] materials: any is anisotropic.
     pub const LOBE_ANISOTROPY: u32 = 16;
 }
 

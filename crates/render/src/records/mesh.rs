@@ -1,4 +1,4 @@
-//! Packed meshes: triangles in the order of the leaves of a BVH, vertices in rows.
+//! Packed meshes: triangles in the order of the leaves of a BVH, and vertex attributes in rows.
 
 use bytemuck::cast_slice;
 use glam::{UVec4, Vec3, Vec4};

@@ -1,4 +1,4 @@
-//! The records and constants that the CPU path and the kernels share: each is stated once, as a Rust struct and as WGSL.
+//! Records and constants that the CPU path and the kernels share. Each is declared once, for both Rust and WGSL.
 
 mod constants;
 mod layout;
@@ -18,7 +18,7 @@ pub use primitive_kinds::*;
 pub use record::{Field, Record};
 pub use specialization::Specialization;
 
-/// The declarations of all constants in WGSL.
+/// Returns the WGSL declarations of all constants.
 pub fn constant_declarations() -> String {
     [
         primitive_kinds::constant_declarations(),

@@ -21,8 +21,8 @@ pub struct Packed {
     pub integrator: Integrator,
     /// Values of the scene as a whole.
     pub environment: Environment,
-    /// The primitives, including the rectangles of lights: those outside of the BVH, sorted by kind and in each kind by whether they
-    /// can cast a shadow, then those in it.
+    /// The primitives, including the rectangles of lights. Those outside of the BVH come first, sorted by kind and, for
+    /// each kind, by whether they can cast a shadow.
     pub primitives: Vec<Primitive>,
     /// The bounding sphere of each primitive.
     pub bounds: Vec<Sphere>,
@@ -42,31 +42,33 @@ pub struct Packed {
     pub specialization: Specialization,
 }
 
-/// The BVH over all instances of meshes, and over the bounded primitives where these are many.
+/// The BVH over all instances of meshes, and over the bounded primitives if there are many of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedBvh {
     /// Its nodes.
     pub nodes: Vec<Node>,
-    /// The contents of its leaves, in their order.
+    /// The items of its leaves, in their order.
     pub items: Vec<BvhItem>,
     /// The instances of meshes.
     pub instances: Vec<Instance>,
     /// The meshes.
     pub meshes: Vec<Arc<PackedMesh>>,
-    /// The material of each group of each instance, and [`NO_SHADOW`].
+    /// The material of each group of each instance, with the flag [`NO_SHADOW`].
     pub group_words: Vec<u32>,
 }
 
 /// The lights and emitters of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lighting {
-    /// The lights, rectangles first; each refers to its primitive. If the integrator needs emitters, every emissive primitive is one.
+    /// The lights, rectangles first; each refers to its primitive. If the integrator needs emitters, every emissive
+    /// primitive has a light.
     pub lights: Vec<Light>,
-    /// The table from which emitters are sampled, if the integrator needs it.
+    /// The alias table of emitters, if the integrator needs it.
     pub emitters: Vec<Emitter>,
-    /// The light tree, which is a single emitter of the table; empty if there are few emitters.
+    /// The light tree, which is a single entry of the alias table; empty if there are few emitters.
     pub nodes: Vec<LightNode>,
-    /// The leaf of each primitive and of each triangle of emissive instances in the light tree, encoded as [`LightNode::parent`]; else [`NO_INDEX`].
+    /// The leaf of each primitive and of each triangle of emissive instances in the light tree, encoded as
+    /// [`LightNode::parent`], else [`NO_INDEX`].
     pub leaves: Vec<u32>,
 }
 
@@ -93,8 +95,8 @@ pub struct Sampling {
 }
 
 impl Packed {
-    /// Returns the number of light samples per hit over all lights; a point or directional light counts as one. Under the integrator `path` it is one
-    /// for all lights.
+    /// Returns the number of light samples per hit over all lights; a point or directional light counts as one. Under
+    /// the integrator `path` it is one for all lights.
     pub fn light_samples(&self) -> u64 {
         if self.integrator.needs_emitters() {
             return u64::from(!self.lighting.emitters.is_empty());
@@ -142,7 +144,8 @@ impl Packed {
         of_meshes.sum::<u64>() + self.lists().map(|bytes| bytes.len() as u64).sum::<u64>()
     }
 
-    /// Returns the records of all lists but those of meshes. Every field is named, so that a new one cannot be forgotten.
+    /// Returns the bytes of all lists except those of meshes. Every field is named, so that a new one cannot be
+    /// forgotten.
     pub fn lists(&self) -> impl Iterator<Item = &[u8]> {
         let Packed {
             origin: _,
@@ -202,7 +205,7 @@ impl Packed {
         self.specialization.alpha != 0
     }
 
-    /// Returns the form of its film.
+    /// Returns the layout of its film.
     pub fn film_layout(&self) -> FilmLayout {
         FilmLayout {
             adaptive: self.sampling.adaptive,

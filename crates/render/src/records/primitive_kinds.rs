@@ -1,14 +1,14 @@
-//! The kinds of primitives, a row for each: both backends, packing and the dispatch of the kernels read this list.
+//! The kinds of primitives, as a table for both backends, packing and the dispatch by kind in kernels.
 
 #[cfg(doc)]
 use super::Primitive;
 use super::record::constants;
 
-/// A row of the list.
+/// A kind of primitive.
 pub struct PrimitiveKind {
     /// The name of its constant, in Rust and in WGSL.
     pub name: &'static str,
-    /// It is flat, a convex solid or infinite.
+    /// Its form: flat, a convex solid or infinite.
     pub form: PrimitiveForm,
 }
 
@@ -19,7 +19,7 @@ pub enum PrimitiveForm {
     Flat,
     /// The surface of a convex solid: a ray that leaves it through the inside hits it again.
     Solid,
-    /// A plane, which is in no BVH.
+    /// A plane, which is never in a BVH.
     Infinite,
 }
 

@@ -1,5 +1,5 @@
-//! Records that the host and the shaders share, each stated once: a Rust struct, and from the same list of fields what
-//! WGSL says of it. `layout.rs` has the records, `constants.rs` and `specialization.rs` the numbers.
+//! Records that the host and the shaders share. Each is declared once, as a list of fields that expands to a Rust
+//! struct and to its WGSL declaration. `layout.rs` has the records, `constants.rs` and `specialization.rs` the numbers.
 
 use super::KINDS;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
@@ -8,9 +8,9 @@ use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 pub trait Field: Copy {
     /// Its name in WGSL.
     const WGSL: &'static str;
-    /// A constant of it in WGSL.
+    /// Returns the WGSL expression of its value.
     fn constant(self) -> String;
-    /// WGSL that reads it from `words`, the part of a row that it takes.
+    /// Returns the WGSL expression that reads it from `words`, its components of a row.
     fn from_row(words: &str) -> String;
 }
 
@@ -42,19 +42,19 @@ fields! {
     UVec4: "vec4u", |v| format!("vec4u({}u, {}u, {}u, {}u)", v.x, v.y, v.z, v.w), |words| words.to_string();
 }
 
-/// A record that the shaders know by the same name.
+/// A record that the shaders declare by the same name.
 pub trait Record: bytemuck::Pod {
     /// Its name.
     const NAME: &'static str;
-    /// Its declaration in WGSL.
+    /// Returns its declaration in WGSL.
     fn declaration() -> String;
-    /// A constant of it in WGSL.
+    /// Returns the WGSL expression of its value.
     fn constant(&self) -> String;
-    /// WGSL's value of it from the rows of 16 bytes `r0`, `r1` and so on.
+    /// Returns the WGSL expression that reads it from the rows of 16 bytes `r0`, `r1` and so on.
     fn from_rows() -> String;
 }
 
-/// A field's words in the rows that its record is made of, where it starts at this byte.
+/// Returns the WGSL expression of a field's words in the rows of its record; `offset` and `size` are in bytes.
 pub fn words_of_row(offset: usize, size: usize) -> String {
     let (row, first, count) = (offset / 16, offset % 16 / 4, size / 4);
     match count {
@@ -95,19 +95,19 @@ macro_rules! records {
             }
         )*
 
-        /// The declarations of all records in WGSL.
+        /// Returns the WGSL declarations of all records.
         pub fn declarations() -> String {
             [$($name::declaration()),*].join("\n")
         }
     };
 }
 
-/// Declares constants for both sides; `constant_declarations` gives those of WGSL.
+/// Declares constants in Rust; `constant_declarations` returns their WGSL declarations.
 macro_rules! constants {
     ($($(#[$doc:meta])* pub const $name:ident: $ty:ty = $value:expr;)*) => {
         $($(#[$doc])* pub const $name: $ty = $value;)*
 
-        /// The same constants in WGSL.
+        /// Returns the WGSL declarations of these constants.
         pub fn constant_declarations() -> String {
             let all = [$(format!(
                 "const {}: {} = {};\n",

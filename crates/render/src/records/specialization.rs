@@ -89,7 +89,7 @@ specialization! {
     anisotropic = "ANISOTROPIC",
     /// Bits of the lobes of [`PRINCIPLED`](super::PRINCIPLED) materials, such as [`LOBE_COAT`](super::LOBE_COAT).
     lobes = "LOBES",
-    /// 1 if rays pass any surface by its alpha, else 0.
+    /// 1 if rays may skip any surface by its alpha, else 0.
     alpha_surfaces = "ALPHA_SURFACES",
     /// 1 if any medium absorbs light, else 0.
     absorption = "ABSORPTION",

@@ -207,8 +207,8 @@ fn names_end_in_json_in_any_case() {
         assert_eq!(load(name, GOOD, &Overrides::default()).unwrap().shapes.len(), 3);
     }
     for name in ["a.toml", "json"] {
-        let told = load(name, GOOD, &Overrides::default()).unwrap_err().to_string();
-        assert!(told.contains(&format!("{name}:1:1: ")), "{told}");
+        let message = load(name, GOOD, &Overrides::default()).unwrap_err().to_string();
+        assert!(message.contains(&format!("{name}:1:1: ")), "{message}");
     }
 }
 
@@ -237,14 +237,14 @@ fn overrides_stand_in_for_the_files_values() {
     let render = scene.render;
     assert_eq!((scene.width, scene.height, render.seed), (30, 20, 7));
     assert_eq!((render.pixel_samples.count, render.light_samples.count), (5, 3));
-    let told = |overrides: &Overrides| load("a.json", GOOD, overrides).unwrap_err().to_string();
+    let refused = |overrides: &Overrides| load("a.json", GOOD, overrides).unwrap_err().to_string();
     let overrides = Overrides {
         pixel_samples: Some(5),
         pixel_pattern: Some(Pattern::Grid),
         ..Overrides::default()
     };
     assert_eq!(
-        told(&overrides),
+        refused(&overrides),
         "pixel_samples: 5 must be a square number, such as 4 or 9: the pattern \"grid\" is an n x n grid; other patterns take any number"
     );
     let overrides = |integrator, max_depth| Overrides {
@@ -255,11 +255,11 @@ fn overrides_stand_in_for_the_files_values() {
     let scene = load("a.json", GOOD, &overrides(None, Some(0))).unwrap();
     assert_eq!(scene.render.max_depth, 0);
     assert_eq!(
-        told(&overrides(None, Some(1025))),
+        refused(&overrides(None, Some(1025))),
         "max_depth: 1025 must be from 0 to 1024"
     );
     // The materials need the path integrator.
-    let message = told(&overrides(Some(Integrator::Phong), None));
+    let message = refused(&overrides(Some(Integrator::Phong), None));
     let rule = "a.json:20: materials[2].type: \"specular\" needs integrator = \"path\"";
     assert!(message.ends_with(rule), "{message}");
     let diffuse = GOOD.replace("specular", "diffuse");
@@ -306,7 +306,7 @@ fn defines_have_the_files_own_keys() {
     assert_eq!(scene.render.pixel_samples.count, 5);
     let scene = load("cam_config.position[1]=-3.5").unwrap();
     assert_eq!(scene.camera.position.z, -3.5, "+Y is up there");
-    for (define, told) in [
+    for (define, expected) in [
         ("spp=0", "define.spp: 0 must be from 1 to 65536"),
         ("spp=many", "define.spp: \"many\" must be a whole number"),
         ("render.seed=3", "define.render: unknown key; expected one of \"spp\""),
@@ -327,7 +327,7 @@ fn defines_have_the_files_own_keys() {
         ("objects[0].scale=0", "define.objects[0].scale: "),
     ] {
         let message = load(define).unwrap_err().to_string();
-        assert!(message.starts_with(told), "{define}: {message}");
+        assert!(message.starts_with(expected), "{define}: {message}");
     }
 }
 
@@ -346,16 +346,16 @@ fn meshes_lie_in_the_folder_above_or_where_it_is_told() {
     };
     Scene::load(&path).unwrap();
     within(&folder.path().join("assets")).unwrap();
-    let told = within(&configs).unwrap_err();
+    let message = within(&configs).unwrap_err();
     assert!(
-        told.contains(":23: objects[0].obj_file_path: \"../assets/floor.obj\" lies outside of the scene's folder"),
-        "{told}"
+        message.contains(":23: objects[0].obj_file_path: \"../assets/floor.obj\" lies outside of the scene's folder"),
+        "{message}"
     );
     fs::write(&path, GOOD.replace("../assets", "../../assets")).unwrap();
-    let told = Scene::load(&path).unwrap_err().to_string();
+    let message = Scene::load(&path).unwrap_err().to_string();
     assert!(
-        told.contains(":23: objects[0].obj_file_path: \"../../assets/floor.obj\" "),
-        "{told}"
+        message.contains(":23: objects[0].obj_file_path: \"../../assets/floor.obj\" "),
+        "{message}"
     );
 }
 
@@ -530,12 +530,12 @@ const BAD: &[(&str, &str, &str)] = &[
 
 #[test]
 fn bad_files_are_told_with_place_key_value_and_rule() {
-    for (piece, bad, told) in BAD {
+    for (piece, bad, expected) in BAD {
         assert_eq!(GOOD.matches(piece).count(), 1, "{piece}");
         let text = GOOD.replace(piece, bad);
         let error = load("a.json", &text, &Overrides::default()).unwrap_err().to_string();
         let (_, rest) = error.split_once("a.json:").unwrap();
-        assert!(rest.starts_with(told), "{rest}\n{told}");
+        assert!(rest.starts_with(expected), "{rest}\n{expected}");
         assert_eq!(rest.lines().count(), 1);
     }
 }
@@ -560,8 +560,8 @@ fn the_page_has_every_key_and_a_good_example() {
         ("objects[].", "\"has_bvh\": true"),
     ] {
         let text = GOOD.replace(before, &format!("\"?\": 1, {before}"));
-        let told = Description::parse(&text, "a.json").unwrap_err().to_string();
-        let (_, names) = told.split_once("expected one of ").unwrap();
+        let message = Description::parse(&text, "a.json").unwrap_err().to_string();
+        let (_, names) = message.split_once("expected one of ").unwrap();
         keys.extend(
             names
                 .split(", ")
@@ -580,13 +580,13 @@ fn any_prefix_of_a_file_is_refused_with_a_place() {
         assert!(matches!(error, SceneError::Syntax { .. }), "{end}: {error}");
     }
     for text in ["3", "[]", "null", "\"\"", "{}"] {
-        let told = Scene::parse(text, "a.json").unwrap_err().to_string();
-        assert!(told.starts_with("a.json:1:"), "{told}");
+        let message = Scene::parse(text, "a.json").unwrap_err().to_string();
+        assert!(message.starts_with("a.json:1:"), "{message}");
     }
     let deep = "[".repeat(100_000);
-    let told = Scene::parse(&deep, "a.json").unwrap_err().to_string();
-    assert!(told.contains("at most 127 levels deep"), "{told}");
+    let message = Scene::parse(&deep, "a.json").unwrap_err().to_string();
+    assert!(message.contains("at most 127 levels deep"), "{message}");
     let large = " ".repeat(LARGEST + 1);
-    let told = Scene::parse(&large, "a.json").unwrap_err().to_string();
-    assert_eq!(told, "a.json:1:1: a JSON scene must not be larger than 4 MiB");
+    let message = Scene::parse(&large, "a.json").unwrap_err().to_string();
+    assert_eq!(message, "a.json:1:1: a JSON scene must not be larger than 4 MiB");
 }

@@ -10,20 +10,20 @@ use crate::limits::DEEPEST;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
-    /// Direct light and Phong's reflection model, the formula in the scene format's page.
+    /// Direct light with the Phong reflection model, as defined in the documentation of the scene format.
     Phong,
-    /// Paths of light from surface to surface.
+    /// Path tracing: global illumination.
     Path,
 }
 
 /// The properties of an integrator.
 struct Row {
     name: &'static str,
-    /// The fewest and the most bounces of a path.
+    /// Minimum and maximum number of bounces that `max_depth` accepts.
     depths: (u32, u32),
-    /// The default pattern of samples.
+    /// Default sampling pattern.
     pattern: Pattern,
-    /// The fewest samples per pixel that adaptive sampling takes before it estimates the error.
+    /// Minimum number of pilot samples per pixel, after which adaptive sampling estimates the error.
     pilot_samples: u32,
     follows_paths: bool,
     needs_emitters: bool,
@@ -31,7 +31,7 @@ struct Row {
 }
 
 impl Integrator {
-    /// All of them.
+    /// All integrators.
     pub const ALL: [Integrator; 2] = [Integrator::Phong, Integrator::Path];
 
     const fn row(self) -> Row {
@@ -45,7 +45,7 @@ impl Integrator {
                 needs_emitters: false,
                 has_layers: false,
             },
-            // Few samples miss light that is rarely found, and underestimate the error.
+            // More pilot samples: few of them may miss rare paths, and then underestimate the error.
             Integrator::Path => Row {
                 name: "path",
                 depths: (0, DEEPEST),
@@ -58,33 +58,33 @@ impl Integrator {
         }
     }
 
-    /// The name in files and options.
+    /// Returns the name in files and options.
     pub const fn name(self) -> &'static str {
         self.row().name
     }
 
-    /// The fewest and the most bounces of a path.
+    /// Returns the minimum and maximum number of bounces that `max_depth` accepts.
     pub const fn depths(self) -> (u32, u32) {
         self.row().depths
     }
 
-    /// The pattern of samples that have none of their own.
+    /// Returns the default sampling pattern.
     pub const fn pattern(self) -> Pattern {
         self.row().pattern
     }
 
-    /// The fewest samples per pixel that adaptive sampling takes before it estimates the error.
+    /// Returns the minimum number of pilot samples per pixel, after which adaptive sampling estimates the error.
     pub const fn pilot_samples(self) -> u32 {
         self.row().pilot_samples
     }
 
-    /// Returns whether light is traced from surface to surface, so that the keys of paths apply, and ambient light and transparent shadows do not.
+    /// Returns true for path tracing, which supports the keys of paths but not ambient light and transparent shadows.
     pub const fn follows_paths(self) -> bool {
         self.row().follows_paths
     }
 
-    /// Returns whether light is sampled from a table of emitters: emissive surfaces, the environment and lights. Otherwise all lights are summed, and
-    /// nothing else emits.
+    /// Returns true if lights are selected from a table of emitters: emissive surfaces, the environment and lights.
+    /// Otherwise the contributions of all lights are summed, and nothing else emits.
     pub const fn needs_emitters(self) -> bool {
         self.row().needs_emitters
     }

@@ -190,7 +190,8 @@ pub struct CylinderDescription {
     /// Radius.
     #[schemars(with = "Length")]
     pub radius: f64,
-    /// Direction from the axis where the texture coordinate u is 0; any length. If absent, x, or y if the axis is nearly along x.
+    /// Direction from the axis where the texture coordinate u is 0; any length. If absent, x, or y if the axis is
+    /// nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,

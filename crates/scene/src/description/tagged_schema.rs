@@ -1,15 +1,16 @@
-//! The JSON Schema of tables whose key `type` says which they are.
+//! JSON Schema of tables whose key `type` selects their schema.
 
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
-/// Returns the schema of a table whose key `type` selects one of several types. Each has a tag, a description and a schema, which becomes a
-/// definition named after `shape`.
+/// Returns the schema of a table whose key `type` selects one of several types. Each has a tag, a description and a
+/// schema, which becomes a definition named after `shape`.
 pub(crate) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
     let tags: Vec<&str> = types.iter().map(|(tag, ..)| *tag).collect();
     let descriptions: Vec<&str> = types.iter().map(|(_, description, _)| description.trim()).collect();
     let key = json!({ "description": "The type.", "type": "string", "enum": tags, "enumDescriptions": descriptions });
-    // A condition for each type, so that an error is reported at its key. Some editors ignore conditions for completion: `anyOf` is for them.
+    // A condition for each type, so that an error is reported at its key. Some editors ignore conditions for
+    // completion: `anyOf` is for them.
     let mut all = vec![json!({})];
     let mut conditions = Vec::new();
     for (tag, description, schema) in types {

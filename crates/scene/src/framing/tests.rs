@@ -28,7 +28,7 @@ fn corners(low: [f64; 3], top: [f64; 3]) -> Vec<DVec3> {
     (0..8).map(|i| DVec3::new(side(i, 0), side(i, 1), side(i, 2))).collect()
 }
 
-/// Boxes, flat ones, lines, a point, and points that no corner of their box is.
+/// Returns point sets: boxes, flat boxes, lines, a point, and points that are not corners of their bounding box.
 fn clouds() -> Vec<Vec<DVec3>> {
     let mut clouds = vec![
         corners([-1.0; 3], [1.0; 3]),
@@ -176,7 +176,8 @@ fn the_margins_of_a_leaning_triangle_are_equal() {
     let points: Vec<DVec3> = points.chain([DVec3::new(0.0, -1.0, 3.0)]).collect();
     for aspect in [0.25, 4.0] {
         let camera = camera(&points, Framing::new(View::Front, aspect));
-        // The lower end is at depth D + 1 and the upper at D, for a camera at height h: -(0 - h) / (D + 1) = (3 - h) / D.
+        // The lower end is at depth D + 1 and the upper at D, for a camera at height h: -(0 - h) / (D + 1) = (3 - h) /
+        // D.
         let near = -1.0 - camera.position.y;
         let height = 3.0 * (near + 1.0) / (2.0 * near + 1.0);
         assert!(

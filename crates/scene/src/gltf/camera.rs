@@ -36,9 +36,9 @@ impl Document {
             );
             return Ok(None);
         }
-        let way = ((low + high) / 2.0 - position).dot(forward);
+        let depth = ((low + high) / 2.0 - position).dot(forward);
         let size = (high - low).max_element();
-        let distance = if way > 1e-3 * size { way } else { size.max(1.0) };
+        let distance = if depth > 1e-3 * size { depth } else { size.max(1.0) };
         let look_at = position + forward * distance;
         let (description, aspect) = match (&camera.perspective, &camera.orthographic) {
             (Some(of), _) => {

@@ -1,16 +1,16 @@
-//! A JSON with a value that is strange, for tests; the fuzz targets have it too.
+//! Random mutation of JSON, for tests and fuzz targets.
 
 use serde_json::{Value, json};
 
-/// All ways to values of a JSON.
-fn ways(value: &Value, way: &mut String, all: &mut Vec<String>) {
-    all.push(way.clone());
-    let length = way.len();
+/// Collects the JSON pointers of all values.
+fn ways(value: &Value, pointer: &mut String, all: &mut Vec<String>) {
+    all.push(pointer.clone());
+    let length = pointer.len();
     let mut inner = |key: &str, value: &Value| {
-        way.push('/');
-        way.push_str(key);
-        ways(value, way, all);
-        way.truncate(length);
+        pointer.push('/');
+        pointer.push_str(key);
+        ways(value, pointer, all);
+        pointer.truncate(length);
     };
     match value {
         Value::Object(map) => map.iter().for_each(|(key, value)| inner(key, value)),
@@ -22,14 +22,14 @@ fn ways(value: &Value, way: &mut String, all: &mut Vec<String>) {
     }
 }
 
-/// Puts something else in the place of one value, or takes it away. `below` chooses among so many.
+/// Replaces or removes one value. `below(n)` returns a random number less than `n`.
 pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
     let mut all = Vec::new();
     ways(json, &mut String::new(), &mut all);
     let other = json.pointer(&all[below(all.len())]).cloned();
-    let way = &all[1 + below(all.len() - 1)];
-    let (outer, key) = way.rsplit_once('/').unwrap_or_default();
-    let strange = [
+    let pointer = &all[1 + below(all.len() - 1)];
+    let (outer, key) = pointer.rsplit_once('/').unwrap_or_default();
+    let values = [
         json!(0),
         json!(1),
         json!(2),
@@ -72,12 +72,12 @@ pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
             Some(Value::Array(list)) => list.extend(list.last().cloned()),
             _ => {}
         }
-    } else if let Some(value) = json.pointer_mut(way) {
+    } else if let Some(value) = json.pointer_mut(pointer) {
         *value = match (kind, other) {
             (2, Some(other)) => other,
-            // Numbers become numbers, most of the time.
-            (3..7, _) if value.is_number() => strange[below(21)].clone(),
-            _ => strange[below(strange.len())].clone(),
+            // Numbers are usually replaced by numbers.
+            (3..7, _) if value.is_number() => values[below(21)].clone(),
+            _ => values[below(values.len())].clone(),
         };
     }
 }

@@ -255,7 +255,7 @@ mod tests {
         }
         let good = json!({ "name": "a", "length": 1, "place": [1, 2, 3], "list": [1], "is_on": true });
         serde_json::from_value::<View>(good.clone()).unwrap();
-        for (key, value, told) in [
+        for (key, value, expected) in [
             ("name", json!(3), "expected a string, found 3"),
             (
                 "length",
@@ -278,16 +278,16 @@ mod tests {
             let mut bad = good.clone();
             bad[key] = value;
             let error = serde_json::from_value::<View>(bad).unwrap_err();
-            assert_eq!(plain(&error), told, "{error}");
+            assert_eq!(plain(&error), expected, "{error}");
         }
-        for (value, told) in [
+        for (value, expected) in [
             (json!([1, 2, 3]), "expected a string, found 1"),
             (json!([]), "expected an object, found a list of 0"),
             (json!("x"), "expected an object, found \"x\""),
             (json!({}), "\"name\" is required"),
         ] {
             let error = serde_json::from_value::<View>(value).unwrap_err();
-            assert!(plain(&error).starts_with(told), "{error}");
+            assert!(plain(&error).starts_with(expected), "{error}");
         }
     }
 }

@@ -1,11 +1,11 @@
-//! A glTF file with everything in it that is looked at, for tests; the fuzz targets have it too.
+//! A glTF file with every feature that the importer reads, for tests and fuzz targets.
 
 use std::io::Cursor;
 
 use image::{ImageFormat, Rgba, RgbaImage};
 use serde_json::{Value, json};
 
-/// A file that has what the importer looks at, and its bytes.
+/// Returns the JSON and the binary chunk of the file.
 pub fn everything() -> (Value, Vec<u8>) {
     let mut binary = Vec::new();
     let mut views = Vec::new();

@@ -1,4 +1,5 @@
-//! Small files that ask for much, and numbers at the ends of their ranges: a message or a model, soon and in little memory.
+//! Tests of small files that request much memory or time, and of extreme numbers: imports must succeed or fail quickly
+//! and in little memory.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +16,7 @@ fn read(json: &Value, binary: &[u8]) -> Result<Imported, String> {
     read.map_err(|error| error.to_string().replace(&format!("{}: ", path.display()), ""))
 }
 
-/// A file with a triangle; accessor 0 has its corners, 1 its texture coordinates, 2 normals, 3 is zeros.
+/// Returns a file with one triangle. Accessor 0 has its positions, 1 texture coordinates, 2 normals, and 3 zeros.
 fn triangle(corners: [f32; 9], uvs: [f32; 6]) -> (Value, Vec<u8>) {
     let normals = [0.0, 0.0, 1.0].repeat(3);
     let all = corners.iter().chain(&uvs).chain(&normals);
@@ -45,7 +46,7 @@ const UVS: [f32; 6] = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
 
 #[test]
 fn weights_are_not_multiplied_by_nodes() {
-    // Each node with all weights would be 40 GB.
+    // A copy of the weights for each node would take 40 GB.
     let (mut json, binary) = triangle(CORNERS, UVS);
     json["meshes"][0]["weights"] = json!(vec![0; 1_000_000]);
     json["nodes"] = json!(vec![json!({ "mesh": 0 }); 10_000]);
@@ -55,7 +56,7 @@ fn weights_are_not_multiplied_by_nodes() {
 
 #[test]
 fn sets_of_texture_coordinates_are_few() {
-    // All of them would be 8 GB.
+    // All sets would take 8 GB.
     let (mut json, binary) = triangle(CORNERS, UVS);
     json["accessors"][3]["type"] = json!("VEC3");
     json["accessors"]
@@ -106,11 +107,11 @@ fn numbers_that_are_none_are_told() {
             let mut corners = CORNERS;
             corners[k] = x;
             let (json, binary) = triangle(corners, UVS);
-            let told = read(&json, &binary).unwrap_err();
+            let message = read(&json, &binary).unwrap_err();
             let what = "meshes[0].primitives[0].attributes.POSITION: 1 triangle has a vertex with a coordinate";
             assert!(
-                told.starts_with("scene: has no triangles") && told.contains(what),
-                "{told}"
+                message.starts_with("scene: has no triangles") && message.contains(what),
+                "{message}"
             );
         }
     }

@@ -134,8 +134,8 @@ fn check_version(top: &Map<String, Value>) -> Result<(), GltfFault> {
         let (major, minor) = text.split_once('.')?;
         Some((major.parse::<u32>().ok()?, minor.parse::<u32>().ok()?))
     };
-    let said = |key: &str| asset.get(key).filter(|value| !value.is_null());
-    let version = said("version").ok_or_else(|| GltfFault::key("asset.version", "is required"))?;
+    let member = |key: &str| asset.get(key).filter(|value| !value.is_null());
+    let version = member("version").ok_or_else(|| GltfFault::key("asset.version", "is required"))?;
     match version.as_str().and_then(number) {
         Some((2, _)) => {}
         _ => {
@@ -145,7 +145,7 @@ fn check_version(top: &Map<String, Value>) -> Result<(), GltfFault> {
             ));
         }
     }
-    match said("minVersion") {
+    match member("minVersion") {
         None => Ok(()),
         Some(least) => match least.as_str().and_then(number) {
             Some(least) if least <= (2, 0) => Ok(()),

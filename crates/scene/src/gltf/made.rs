@@ -1,4 +1,4 @@
-//! Files for the tests, made in memory.
+//! glTF files in memory, for tests.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::document::Document;
 use super::error::GltfFault;
 
-/// A container with this JSON and this binary chunk.
+/// Returns a GLB container with this JSON and this binary chunk.
 pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -26,7 +26,7 @@ pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Reads a file from memory, in a folder that is empty.
+/// Reads a file from memory. Its folder does not exist, so it cannot refer to other files.
 pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     Document::read(
         bytes,
@@ -36,7 +36,7 @@ pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     )
 }
 
-/// JSON of a file with one buffer in the container, and the views and accessors of it.
+/// Returns the JSON of a file with one buffer in the container, and these buffer views and accessors.
 pub fn json_of(binary: &[u8], views: Value, accessors: Value) -> Value {
     json!({
         "asset": { "version": "2.0" },
@@ -46,12 +46,12 @@ pub fn json_of(binary: &[u8], views: Value, accessors: Value) -> Value {
     })
 }
 
-/// A document with these views and accessors of bytes.
+/// Returns a document with these buffer views and accessors.
 pub fn document(binary: &[u8], views: Value, accessors: Value) -> Document {
     read(container(&json_of(binary, views, accessors), binary)).unwrap()
 }
 
-/// A document of one view, all bytes, and one accessor.
+/// Returns a document with one accessor, whose buffer view contains all bytes.
 pub fn accessor(binary: &[u8], accessor: Value) -> Document {
     let views = json!([{ "buffer": 0, "byteLength": binary.len() }]);
     document(binary, views, json!([accessor]))

@@ -1,4 +1,4 @@
-//! Skins: section 3.7.3. A vertex goes with its joints, wherever the node of its mesh is.
+//! Skins (section 3.7.3). The transform of the node of a skinned mesh has no effect on its vertices.
 
 use glam::{DAffine3, DMat4};
 use gltf_json::mesh::{Primitive, Semantic};
@@ -8,7 +8,7 @@ use super::document::Document;
 use super::error::GltfError;
 use super::node::Nodes;
 
-/// The joints of a skin, as maps from the mesh's coordinates to the scene's.
+/// The joints of a skin, as transforms from object to world space.
 pub struct Skin {
     joints: Vec<DAffine3>,
 }
@@ -50,7 +50,7 @@ impl Skin {
         Ok(Skin { joints })
     }
 
-    /// The map of each vertex of a primitive: the mean of its joints', by their weights.
+    /// Returns the transform of each vertex of a primitive: the weighted mean of its joints' transforms.
     pub fn maps(
         &self,
         document: &Document,
@@ -96,7 +96,7 @@ impl Skin {
             }
         }
         let mean = |(sum, weight): (DAffine3, f64)| match weight > 0.0 {
-            // Weights that are rounded do not add up to 1.
+            // Normalized, because rounded weights do not sum to 1.
             true => DAffine3 {
                 matrix3: sum.matrix3 * (1.0 / weight),
                 translation: sum.translation / weight,

@@ -36,7 +36,8 @@ pub struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// Reads the positions; `None` if the primitive has none. `first` is the number of vertices that the mesh has before.
+    /// Reads the positions; `None` if the primitive has none. `first` is the number of vertices that the mesh has
+    /// before.
     pub fn of(
         document: &'a Document,
         (primitive, place): (&'a Primitive, &'a str),

@@ -1,4 +1,4 @@
-//! Files of another program's encoder against what its transcoder decodes them to, and damaged files.
+//! Tests with files of another encoder and the output of its transcoder, and with damaged files.
 
 use std::fs;
 use std::path::PathBuf;
@@ -58,7 +58,7 @@ fn files_decode_to_what_the_reference_makes_of_them() {
         assert_eq!(image.color().has_alpha(), has_alpha, "{name}");
         assert!(image.into_rgba8() == reference(name), "{name}");
     }
-    // The comparison can fail.
+    // Control: different images are not equal.
     for [a, b] in [["etc1s-48x20", "zstandard-48x20"], ["etc1s-48x20", "etc1s-48x20-alpha"]] {
         assert!(decoded(&file(a)).unwrap().into_rgba8() != reference(b), "{a} {b}");
     }

@@ -70,14 +70,14 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
     fn files_are_read_or_the_message_says_why_not() {
         let folder = tempfile::tempdir().unwrap();
         let load = |name: &str| Scene::load(folder.path().join(name));
-        let told = |name: &str| load(name).unwrap_err().to_string();
+        let message_of = |name: &str| load(name).unwrap_err().to_string();
         let path = |name: &str| folder.path().join(name).display().to_string();
         let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
         write("good.toml", SCENE.as_bytes());
         assert_eq!(load("good.toml").unwrap().width, 4);
         write("latin.toml", b"# \xc3\xa9t\xc3\xa9\n# \xc3\xa9t\xe9");
         assert_eq!(
-            told("latin.toml"),
+            message_of("latin.toml"),
             format!("{}:2:5: not valid UTF-8", path("latin.toml"))
         );
         for (name, bytes, encoding) in [
@@ -89,15 +89,15 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
                 "{}:1:1: the file is encoded in {encoding}; save it as UTF-8",
                 path(name)
             );
-            assert_eq!(told(name), message);
+            assert_eq!(message_of(name), message);
         }
-        assert!(told("none.toml").starts_with(&format!("{}: cannot be read: ", path("none.toml"))));
+        assert!(message_of("none.toml").starts_with(&format!("{}: cannot be read: ", path("none.toml"))));
         File::create(folder.path().join("huge.toml"))
             .unwrap()
             .set_len(MAX_FILE_BYTES + 1)
             .unwrap();
         assert_eq!(
-            told("huge.toml"),
+            message_of("huge.toml"),
             format!("{}: cannot be read: it is larger than 64 MiB", path("huge.toml"))
         );
     }

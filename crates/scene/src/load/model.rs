@@ -17,20 +17,20 @@ use crate::{
     MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed, is_gltf,
 };
 
-/// The longer side of the image in pixels, and samples of a pixel, by default.
+/// Default length of the longer side of the image in pixels, and default number of samples per pixel.
 pub(super) const SIDE: u32 = 720;
 const SAMPLES: u32 = 32;
-/// Radiance of the background: the grey in the middle of what a display shows.
+/// Radiance of the background: middle gray.
 const BACKGROUND: DVec3 = DVec3::splat(0.18);
 
 /// Maximum number of vertices that are framed one by one.
 const MAX_POINTS: usize = 1 << 20;
 
-/// The endings of mesh files, and the axis that points up in most files of each format. None of the formats defines one: OBJ and PLY files
-/// are mostly made for viewers, where it is y, and STL files for 3D printers, where it is z.
+/// Extensions of mesh files, and the up axis of most files of each format. None of the formats defines one: OBJ and PLY
+/// files are mostly made for viewers with +y up, and STL files for 3D printers with +z up.
 const MESHES: [(&str, Up); 3] = [("obj", Up::Y), ("ply", Up::Y), ("stl", Up::Z)];
 
-/// Endings of files that cannot be read, and what to do.
+/// Extensions of unsupported files, and the advice about them.
 const UNSUPPORTED: [(&[&str], &str); 4] = [
     (
         &[
@@ -49,12 +49,13 @@ const UNSUPPORTED: [(&[&str], &str); 4] = [
     (&["bin"], "a buffer of a glTF file; render the .gltf file that names it"),
 ];
 
-/// Returns whether a file of this name is a mesh file: it ends in `.obj`, `.ply` or `.stl`.
+/// Returns true if the extension is that of a mesh file: `.obj`, `.ply` or `.stl`.
 pub fn is_mesh(name: &Path) -> bool {
     up(name).is_some()
 }
 
-/// Returns whether a file of this name is a model that is rendered without a scene: a glTF file or a mesh file.
+/// Returns true if the extension is that of a model, a glTF file or a mesh file, which is rendered without a scene
+/// file.
 pub fn is_model(name: &Path) -> bool {
     is_gltf(name) || is_mesh(name)
 }
@@ -68,7 +69,7 @@ fn up(name: &Path) -> Option<Up> {
     known.map(|(_, up)| up)
 }
 
-/// Rejects files with the ending of a format that cannot be a scene.
+/// Rejects files with the extension of a format that cannot be a scene.
 pub(super) fn check_format(path: &Path) -> Result<(), SceneError> {
     let is_of = |endings: &[&str]| endings.iter().any(|ending| has_ending(path, ending));
     let Some((_, what)) = UNSUPPORTED.into_iter().find(|(endings, _)| is_of(endings)) else {
@@ -158,7 +159,8 @@ pub(super) fn scene(
     description
 }
 
-/// Returns the light of models that have none. The camera sees gray instead of the studio, unless an environment is selected.
+/// Returns the light of models that have none. The camera sees gray instead of the studio, unless an environment is
+/// selected.
 pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, SceneError> {
     if overrides
         .integrator
@@ -183,7 +185,7 @@ fn points(mesh: &Arc<Mesh>) -> Vec<DVec3> {
     }
 }
 
-/// Returns the error of a described mesh file, about the file where its shape is meant.
+/// Converts a problem of the scene that describes a mesh file into an error of that file.
 pub(super) fn error_of(path: &Path, problem: Problem) -> SceneError {
     SceneError::Mesh(MeshError::File {
         path: path.to_owned(),

@@ -38,7 +38,8 @@ pub struct Overrides {
     pub asset_root: Option<PathBuf>,
     /// Frame of an animated camera; `None` is the camera of the file outside of its path, or the first key of the path.
     pub frame: Option<f64>,
-    /// The environment, for [`Integrator::Path`]. Its visibility to the camera is not changed. A file with an absolute path may be anywhere.
+    /// The environment, for [`Integrator::Path`]. Its visibility to the camera is not changed. A file with an absolute
+    /// path may be anywhere.
     pub environment: Option<EnvironmentDescription>,
     /// The background.
     pub background: Option<Background>,
@@ -46,8 +47,8 @@ pub struct Overrides {
     pub view_transform: Option<ViewTransform>,
     /// The exposure in stops, -100 to 100.
     pub exposure: Option<f64>,
-    /// Number of frames of an orbit around the point that the camera looks at, 1 to 100,000, instead of the path of the camera.
-    /// [`Overrides::frame`] selects one of them, from 1.
+    /// Number of frames of an orbit around the point that the camera looks at, 1 to 100,000, instead of the path of the
+    /// camera. [`Overrides::frame`] selects one of them, from 1.
     pub turntable: Option<u32>,
     /// If true, damage to a file of the scene is an error; otherwise it is a warning and a placeholder is rendered.
     pub strict: bool,
@@ -155,7 +156,8 @@ fn set_count(samples: &mut SamplesDescription, count: Option<u32>, integrator: I
 }
 
 impl Overrides {
-    /// Returns the locations of the files of a scene in `folder`. They must be below `root`, or below the overridden root.
+    /// Returns the locations of the files of a scene in `folder`. They must be below `root`, or below the overridden
+    /// root.
     pub fn assets(&self, folder: &Path, root: &Path) -> Assets {
         let mut assets = Assets::beside(folder);
         if let Some(root) = self.asset_root.as_deref().or((root != folder).then_some(root)) {
@@ -265,11 +267,11 @@ light_samples = { pattern = 'random', count = 5 }
             assert_eq!(render.max_depth, depth);
         }
         assert_eq!(load(path, None).unwrap().max_depth, 8);
-        let told = |integrator, depth| load(integrator, Some(depth)).unwrap_err().to_string();
-        assert_eq!(told(None, 0), "max_depth: 0 must be from 1 to 64");
-        assert_eq!(told(phong, 65), "max_depth: 65 must be from 1 to 64");
-        assert_eq!(told(path, 1025), "max_depth: 1025 must be from 0 to 1024");
-        // The pattern of the samples is the integrator's, if none is said.
+        let message = |integrator, depth| load(integrator, Some(depth)).unwrap_err().to_string();
+        assert_eq!(message(None, 0), "max_depth: 0 must be from 1 to 64");
+        assert_eq!(message(phong, 65), "max_depth: 65 must be from 1 to 64");
+        assert_eq!(message(path, 1025), "max_depth: 1025 must be from 0 to 1024");
+        // Without a pattern of their own, samples use the default pattern of the integrator.
         let samples = |integrator| {
             let overrides = Overrides {
                 integrator,
@@ -285,7 +287,7 @@ light_samples = { pattern = 'random', count = 5 }
     #[test]
     fn bad_overrides_are_told_by_their_names() {
         let none = Overrides::default;
-        for (overrides, told) in [
+        for (overrides, expected) in [
             (
                 Overrides {
                     size: Some((0, 1)),
@@ -317,7 +319,7 @@ light_samples = { pattern = 'random', count = 5 }
         ] {
             let error = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap_err();
             assert!(matches!(error, SceneError::Override(_)), "{error}");
-            assert_eq!(error.to_string(), told);
+            assert_eq!(error.to_string(), expected);
         }
     }
 }

@@ -6,15 +6,16 @@ use std::sync::{Arc, PoisonError, RwLock, Weak};
 
 use super::Mesh;
 
-/// Values computed from the mesh that contains the cache, one of each type. It takes no part in comparisons, and a clone of the mesh starts
-/// without it.
+/// Values computed from the mesh that contains the cache, one per type. Comparisons ignore the cache, and clones of the
+/// mesh have an empty one.
 #[derive(Debug, Default)]
 pub(super) struct Cache(RwLock<Values>);
 
 #[derive(Debug, Default)]
 struct Values {
-    /// The mesh that they were computed from. While this weak reference exists `Arc::get_mut` fails, and a mesh that is moved out of its `Arc`
-    /// to be edited is at another address afterwards; so the values are current where the addresses agree.
+    /// The mesh that they were computed from. While this weak reference exists `Arc::get_mut` fails, and a mesh that is
+    /// moved out of its `Arc` to be edited is at another address afterwards; so the values are current where the
+    /// addresses agree.
     mesh: Weak<Mesh>,
     by_type: HashMap<TypeId, Arc<dyn Any + Send + Sync>>,
 }
@@ -29,8 +30,8 @@ impl Values {
 }
 
 impl Cache {
-    /// Returns the value of this mesh, in which the cache is. No lock is held while it is computed, because the threads that compute it may
-    /// need it as well.
+    /// Returns the value of this mesh, in which the cache is. No lock is held while it is computed, because the threads
+    /// that compute it may need it as well.
     pub fn get_or_init<T: Any + Send + Sync>(&self, mesh: &Arc<Mesh>, compute: impl FnOnce() -> T) -> Arc<T> {
         if let Some(value) = self.0.read().unwrap_or_else(PoisonError::into_inner).get(mesh) {
             return value;

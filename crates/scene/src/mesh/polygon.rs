@@ -1,8 +1,8 @@
 //! Triangulation of polygons.
 //!
-//! Readers store each polygon as a fan from its first corner. A fan that leaves the polygon is replaced by ear clipping in the polygon's
-//! plane, whose normal is Newell's: the sum of the fan's cross products (Tampieri, "Newell's Method for Computing the Plane Equation of a
-//! Polygon", Graphics Gems III, 1992).
+//! Readers store each polygon as a fan from its first corner. A fan that leaves the polygon is replaced by ear clipping
+//! in the polygon's plane, whose normal is Newell's: the sum of the fan's cross products (Tampieri, "Newell's Method
+//! for Computing the Plane Equation of a Polygon", Graphics Gems III, 1992).
 
 use earcut::Earcut;
 use glam::DVec3;
@@ -12,7 +12,8 @@ use super::raw_mesh::{RawMesh, counted};
 
 /// Largest area of fan triangles outside of the polygon, relative to its area, at which the fan is kept.
 const AREA_TOLERANCE: f64 = 1e-6;
-/// Largest deviation of corners from a plane, relative to the distance of the farthest corner, of a polygon that counts as planar.
+/// Largest deviation of corners from a plane, relative to the distance of the farthest corner, of a polygon that counts
+/// as planar.
 const PLANE_TOLERANCE: f64 = 0.05;
 /// Largest length of the normal, relative to the fan's cross products, of a polygon whose parts cancel.
 const CANCELLATION: f64 = 1e-6;
@@ -112,7 +113,7 @@ fn form(fan: &[[u32; 3]], positions: &[DVec3]) -> Form {
     }
 }
 
-/// Makes all triangles of a fan refer to its corner without a position: the whole face is left out.
+/// Makes all triangles of a fan refer to its corner without a position, so that the whole face is removed.
 fn mark_damaged(fan: &mut [[u32; 3]], positions: &[DVec3]) {
     let is_bad = |vertex: &u32| !positions[*vertex as usize].is_finite();
     if let Some(bad) = fan.iter().flatten().copied().find(is_bad) {
@@ -130,8 +131,8 @@ struct Clipper {
 }
 
 impl Clipper {
-    /// Replaces a fan by the triangles of its polygon. Returns false if the polygon intersects itself; then the triangles do not cover exactly
-    /// its area.
+    /// Replaces a fan by the triangles of its polygon. Returns false if the polygon intersects itself; then the
+    /// triangles do not cover exactly its area.
     fn clip(&mut self, fan: &mut [[u32; 3]], normal: DVec3, positions: &[DVec3]) -> bool {
         self.corners.clear();
         self.corners.extend([fan[0][0], fan[0][1]]);

@@ -14,7 +14,8 @@ use crate::problem::At;
 use crate::{CameraDescription, Description};
 
 impl Description {
-    /// Parses a text after a change of the table at the first two segments of a path; `before` is the state before. Returns `None` if the whole text must be parsed.
+    /// Parses a text after a change of the table at the first two segments of a path; `before` is the state before.
+    /// Returns `None` if the whole text must be parsed.
     pub(crate) fn parse_change(
         text: &str,
         origin: &str,
@@ -96,7 +97,7 @@ fn read_changed_part(
         return Ok(Some(Err(problem.into())));
     }
     let mut after = before.clone();
-    let there = match (part.kind, step) {
+    let replaced = match (part.kind, step) {
         (Kind::Textures, Segment::Key(name)) => replace(after.textures.get_mut(name), table, tagged),
         (Kind::Materials, Segment::Key(name)) => replace(after.materials.get_mut(name), table, tagged),
         (Kind::Meshes, Segment::Key(name)) => replace(after.meshes.get_mut(name), table, read),
@@ -105,7 +106,7 @@ fn read_changed_part(
         (Kind::Instances, Segment::Index(i)) => replace(after.instances.get_mut(*i), table, read),
         _ => None,
     };
-    let done = there.map(|read| {
+    let done = replaced.map(|read| {
         read.map_err(|problem| problem.at(step.clone()).at(part.kind.name()))
             .map(|()| after)
     });

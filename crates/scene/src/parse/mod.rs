@@ -216,7 +216,8 @@ fn read_camera(mut camera: Table) -> Read<CameraDescription> {
     read_tagged(camera, Some(CameraDescription::DEFAULT))
 }
 
-/// Parses a file part by part. Returns `None` if the parts depend on each other, so that the file must be parsed at once.
+/// Parses a file part by part. Returns `None` if the parts depend on each other, so that the file must be parsed at
+/// once.
 fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Description, Problems>>, SyntaxFault> {
     let rest = parts.read_rest();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();

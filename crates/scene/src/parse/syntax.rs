@@ -28,7 +28,8 @@ pub fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> Scene
     }
 }
 
-/// Returns the parser's message about the byte `at` with a hint, if the characters there are a common mistake, and the line.
+/// Returns the parser's message about the byte `at` with a hint, if the characters there are a common mistake, and the
+/// line.
 pub fn explained(text: &str, at: usize, message: &str) -> String {
     let at = text.floor_char_boundary(at);
     let line = text[line_start(text, at)..].lines().next().unwrap_or_default().trim();

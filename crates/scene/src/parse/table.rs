@@ -18,9 +18,9 @@ pub(super) fn tagged<T: Tagged>(table: Table) -> Read<T> {
 }
 
 pub(super) fn read<T: DeserializeOwned>(table: Table) -> Read<T> {
-    let is_said = |integrator: &Integrator| table.get("integrator").and_then(Value::as_str) == Some(integrator.name());
-    let said = Integrator::ALL.into_iter().find(is_said);
-    read_for(table, said.unwrap_or(Integrator::Phong))
+    let is_named = |integrator: &Integrator| table.get("integrator").and_then(Value::as_str) == Some(integrator.name());
+    let named = Integrator::ALL.into_iter().find(is_named);
+    read_for(table, named.unwrap_or(Integrator::Phong))
 }
 
 /// Parses a table. The ranges in messages depend on the integrator.
@@ -50,8 +50,8 @@ pub(super) fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) ->
     }
 }
 
-/// Parses a table, whose key `type` was removed if it is `tagged`. serde stops at the first error, so the value there is removed and the
-/// table parsed again, for the errors of the other keys.
+/// Parses a table, whose key `type` was removed if it is `tagged`. serde stops at the first error, so the value there
+/// is removed and the table parsed again, for the errors of the other keys.
 fn read_keys<T>(
     mut table: Table,
     tagged: bool,
@@ -128,7 +128,8 @@ fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
 
-/// Returns an error that lists the allowed names. serde only lists them for strings, so the value is replaced by one and parsed again.
+/// Returns an error that lists the allowed names. serde only lists them for strings, so the value is replaced by one
+/// and parsed again.
 fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
     if !error.inner().message().ends_with(NAMES_EXPECTED) {
         return error;
@@ -144,12 +145,12 @@ fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<Re
     if let Some(value) = value {
         *value = Value::from("?");
     }
-    let told = match with_text {
+    let listing = match with_text {
         Value::Table(table) => read(table),
         _ => None,
     };
-    let is_same = |told: &ReadError| told.path().to_string() == error.path().to_string();
-    told.filter(is_same).unwrap_or(error)
+    let is_same = |listing: &ReadError| listing.path().to_string() == error.path().to_string();
+    listing.filter(is_same).unwrap_or(error)
 }
 
 /// End of serde's message about a value that must be a string of an enum.

@@ -271,9 +271,9 @@ mod tests {
         assert_eq!((down.right, down.up), (DVec3::X, DVec3::Y));
         let up = camera([0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
         assert_eq!((up.right, up.up), (-DVec3::X, DVec3::Y));
-        let told = camera([0.0, 5.0, 0.0], [0.0, 1.0, 0.0]).unwrap_err().to_string();
+        let message = camera([0.0, 5.0, 0.0], [0.0, 1.0, 0.0]).unwrap_err().to_string();
         assert_eq!(
-            told,
+            message,
             "look_at: [0, 0, 0] makes the view parallel to up, [0, 1, 0]; choose another up"
         );
     }
@@ -316,11 +316,11 @@ mod tests {
         };
         assert_eq!(at(Some(1.5)).unwrap().camera.position, DVec3::new(0.0, -2.0, 0.0));
         assert_eq!(at(None).unwrap().camera.position, DVec3::new(0.0, -4.0, 0.0));
-        let told = "s.toml:6: camera.path: at frame 2, look_at: [0, 0, 0] must differ from the camera's position";
-        assert_eq!(at(Some(2.0)).unwrap_err().to_string(), told);
+        let expected = "s.toml:6: camera.path: at frame 2, look_at: [0, 0, 0] must differ from the camera's position";
+        assert_eq!(at(Some(2.0)).unwrap_err().to_string(), expected);
         for frame in [f64::NAN, f64::INFINITY] {
-            let told = at(Some(frame)).unwrap_err().to_string();
-            assert_eq!(told, format!("frame: {frame} must be finite"));
+            let message = at(Some(frame)).unwrap_err().to_string();
+            assert_eq!(message, format!("frame: {frame} must be finite"));
         }
         // A camera built in code has no line.
         let keys = [[0.0, -4.0, 0.0], [0.0, 4.0, 0.0]].map(|position| CameraKeyDescription {
@@ -332,14 +332,17 @@ mod tests {
         let built = Description::new(4, 4, camera).validate().unwrap();
         assert_eq!(built.camera.position, DVec3::X);
         assert_eq!(built.camera_at(-1.0).unwrap().position, DVec3::NEG_Y);
-        let told = built.camera_at(0.0).unwrap_err().to_string();
-        assert!(told.starts_with("frame.camera.path: at frame 0, look_at: "), "{told}");
+        let message = built.camera_at(0.0).unwrap_err().to_string();
+        assert!(
+            message.starts_with("frame.camera.path: at frame 0, look_at: "),
+            "{message}"
+        );
     }
 
     #[test]
     fn bad_keys_are_told_with_place_and_rule() {
         let start = "[camera.path]\nkeys = [\n{ frame = 1, position = [0, -4, 0] },\n";
-        for (path, told) in [
+        for (path, expected) in [
             (
                 "[camera.path]\nkeys = []".to_owned(),
                 "7: camera.path.keys: [] must have at least one key",
@@ -408,12 +411,16 @@ mod tests {
             ),
         ] {
             let message = scene(&format!("{STILL}{path}")).unwrap_err().to_string();
-            assert!(message.starts_with(&format!("s.toml:{told}")), "{message}\n{told}");
+            assert!(
+                message.starts_with(&format!("s.toml:{expected}")),
+                "{message}\n{expected}"
+            );
         }
         let parallel = "[camera]\ntype = 'orthographic'\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nheight = 1\n\
                         path.keys = [{ frame = 1, fov = 40 }]";
-        let told = "s.toml:7: camera.path.keys[0].fov: does not apply to a camera of this type, which has \"height\"";
-        assert_eq!(scene(parallel).unwrap_err().to_string(), told);
+        let expected =
+            "s.toml:7: camera.path.keys[0].fov: does not apply to a camera of this type, which has \"height\"";
+        assert_eq!(scene(parallel).unwrap_err().to_string(), expected);
         let closest = format!("{start}{{ frame = 1.000002, fov = 4 }}]");
         scene(&format!("{STILL}{closest}")).unwrap();
     }

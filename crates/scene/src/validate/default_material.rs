@@ -1,17 +1,17 @@
-//! The material of meshes that have none.
+//! The default material of meshes.
 
 use glam::DVec3;
 
 use super::super::{Color, Integrator, Material, Principled, Reflection, VertexColors};
 use super::principled::dielectric;
 
-/// The share of light that it reflects.
+/// Albedo.
 const GRAY: f64 = 0.8;
-/// Its exponent under `phong`, without effect as it has no highlight, and its roughness under `path`.
+/// Phong exponent, without effect because the specular factor is black, and roughness under `path`.
 const SHININESS: f64 = 16.0;
 const ROUGHNESS: f64 = 0.5;
 
-/// Returns the materials of meshes without and with colors of vertices. `phong` ignores these.
+/// Returns the materials of meshes without and with vertex colors, which `phong` ignores.
 pub(super) fn default_materials(integrator: Integrator) -> [Material; 2] {
     [false, true].map(|has_colors| Material {
         reflection: match integrator.follows_paths() {

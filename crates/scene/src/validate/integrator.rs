@@ -4,7 +4,8 @@ use super::super::key_path::{KeyPath, Segment};
 use super::super::{Description, Integrator, MaterialDescription, ShapeDescription};
 
 impl Description {
-    /// Returns the integrator: the one that `[render]` names, else [`Integrator::Path`] if any key of the scene needs it.
+    /// Returns the integrator: the one that `[render]` names, else [`Integrator::Path`] if any key of the scene needs
+    /// it.
     pub fn integrator(&self) -> Integrator {
         let needed = || needs_path(self).map_or(Integrator::Phong, |_| Integrator::Path);
         self.render.integrator.unwrap_or_else(needed)

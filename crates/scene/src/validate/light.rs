@@ -1,4 +1,4 @@
-//! From descriptions of lights to lights.
+//! Validation of lights.
 
 use glam::DVec3;
 
@@ -45,18 +45,18 @@ fn spot(light: &SpotLightDescription) -> Checked<Light> {
     })
 }
 
-/// The direction, or the way to the point that the light looks at.
+/// Returns the unit vector of the axis, from `direction` or `look_at`.
 fn direction(light: &SpotLightDescription, position: DVec3) -> Checked<DVec3> {
     match (light.direction, light.look_at) {
         (Some(direction), None) => unit(direction).at("direction"),
-        (None, Some(goal)) => {
-            let way = point(goal).at("look_at")? - position;
-            check(way.length() >= LENGTHS.0, || {
-                let (goal, least) = (show(goal), number(LENGTHS.0));
-                format!("{goal} must be at least {least} away from the light")
+        (None, Some(target)) => {
+            let axis = point(target).at("look_at")? - position;
+            check(axis.length() >= LENGTHS.0, || {
+                let (target, least) = (show(target), number(LENGTHS.0));
+                format!("{target} must be at least {least} away from the light")
             })
             .at("look_at")?;
-            Ok(way.normalize())
+            Ok(axis.normalize())
         }
         (Some(_), Some(_)) => Err(Problem::new("cannot be combined with look_at; remove one")).at("direction"),
         (None, None) => Err(Problem::predicate("is missing; set it or look_at")).at("direction"),

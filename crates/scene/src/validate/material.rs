@@ -163,13 +163,14 @@ fn absorption(absorption: DVec3) -> Checked<DVec3> {
 /// Returns the index of a conductor. Only one kind of key may set the reflectance.
 fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> {
     let other = |own: &str| {
-        let said = [
+        let given = [
             ("color", conductor.color.is_some()),
             ("metal", conductor.metal.is_some()),
             ("eta", conductor.eta.is_some()),
         ];
-        said.into_iter()
-            .find(|(key, said)| *said && *key != own)
+        given
+            .into_iter()
+            .find(|(key, given)| *given && *key != own)
             .map(|(key, _)| key)
     };
     if let Some(name) = &conductor.metal {

@@ -18,7 +18,8 @@ use super::texture::image_texture;
 use super::{Checked, Problem, number, show};
 use crate::mesh::{Mesh, MtlMaterial, file_beside};
 
-/// Default values: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995; the exponent of a scene's own materials.
+/// Default values: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995; the exponent of a scene's own
+/// materials.
 const DIFFUSE: f64 = 0.8;
 const NS: f64 = 16.0;
 
@@ -157,7 +158,8 @@ impl<'a> Looks<'a> {
         Some(material)
     }
 
-    /// Warns of a group without a material, or returns it as an error ([`Assets::tolerate`](super::super::Assets::tolerate)).
+    /// Warns of a group without a material, or returns it as an error
+    /// ([`Assets::tolerate`](super::super::Assets::tolerate)).
     pub fn without_material(&mut self, damage: Problem) -> Checked<()> {
         let note = self.images.assets.tolerate(damage, "a gray material is used instead")?;
         self.unmatched.insert(note);

@@ -62,8 +62,8 @@ fn any_source_of_light_suffices() {
 
 #[test]
 fn spheres_just_outside_of_the_view_are_reported_and_those_at_its_edge_are_not() {
-    // At depth 10 the view is 40 x 20 wide without the margin of the filter; a sphere that touches a slanted side is at most
-    // sqrt(3) away in the box test.
+    // At depth 10 the view is 40 x 20 wide without the margin of the filter; a sphere that touches a slanted side is at
+    // most sqrt(3) away in the box test.
     let seen = [
         [0.0, 0.0, 0.0],
         [19.0, 0.0, 0.0],

@@ -17,8 +17,8 @@ const BESIDE: usize = 64 << 20;
 /// Maximum pixels per byte of a JPEG: each block of 8 x 8 takes a bit at least, and covers up to 32 x 32 pixels.
 const MAX_JPEG_PIXELS_PER_BYTE: u64 = 8 * 32 * 32;
 
-/// Maximum bytes of an image's values, and the bytes allowed in addition per byte of its file: a small file can describe
-/// 65,536 x 65,536 zeros.
+/// Maximum bytes of an image's values, and the bytes allowed in addition per byte of its file: a small file can
+/// describe 65,536 x 65,536 zeros.
 const MAX_BYTES: (u64, u64) = (1 << 30, 256);
 
 /// Why a file cannot be read as an image.

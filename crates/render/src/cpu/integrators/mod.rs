@@ -1,4 +1,4 @@
-//! The integrators: what light is simulated. Each is the twin of the file of its name in `shaders/integrators/`.
+//! Integrators. Each is the twin of the file with its name in `shaders/integrators/`.
 
 pub mod path;
 pub mod phong;

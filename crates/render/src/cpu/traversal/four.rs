@@ -39,7 +39,7 @@ impl<S: Simd> Four<S> {
     }
 
     /// Returns the mask of hit triangles and the distances, as [`Line::triangle`] for each. Distances may be negative
-    /// by the padding of boxes.
+    /// by up to the padding of boxes.
     #[inline(always)]
     pub fn met_by(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
         let zero = f32x4::splat(simd, 0.0);

@@ -185,9 +185,9 @@ fn indices_are_whole_numbers() {
         let mut bytes = vec![0; size];
         bytes.extend(vec![0xff; size]);
         let description = json!({ "bufferView": 0, "componentType": component, "count": 2, "type": "SCALAR" });
-        let told = told(accessor(&bytes, description.clone()).indices(0));
-        assert!(told.starts_with("accessors[0]: element 1 is "), "{told}");
-        assert!(told.contains("restart"), "{told}");
+        let message = told(accessor(&bytes, description.clone()).indices(0));
+        assert!(message.starts_with("accessors[0]: element 1 is "), "{message}");
+        assert!(message.contains("restart"), "{message}");
         // One less is a valid index.
         bytes[size] = 0xfe;
         assert_eq!(accessor(&bytes, description).indices(0).unwrap().len(), 2);
@@ -234,8 +234,8 @@ fn sparse_elements_stand_in_for_others() {
         "accessors[0].sparse.indices: element 1 is 4, which is not there; there are 4"
     );
     for indices in [[1, 1], [3, 1]] {
-        let told = told(&indices, 2);
-        assert!(told.ends_with("must be greater than the one before it"), "{told}");
+        let message = told(&indices, 2);
+        assert!(message.ends_with("must be greater than the one before it"), "{message}");
     }
     assert_eq!(
         told(&[0, 1, 2, 3], 5),
@@ -284,8 +284,11 @@ fn no_length_offset_or_count_leaves_the_bytes() {
         assert!(told(with(&[("byteOffset", json!(offset))])).starts_with("accessors[0]: 2 elements"));
     }
     for count in huge {
-        let told = told(with(&[("count", json!(count)), ("byteOffset", json!(4))]));
-        assert!(told.starts_with(&format!("accessors[0]: {count} elements")), "{told}");
+        let message = told(with(&[("count", json!(count)), ("byteOffset", json!(4))]));
+        assert!(
+            message.starts_with(&format!("accessors[0]: {count} elements")),
+            "{message}"
+        );
     }
     assert_eq!(
         with(&[("count", json!(1)), ("byteOffset", json!(12))]).unwrap().len(),
@@ -304,9 +307,9 @@ fn no_length_offset_or_count_leaves_the_bytes() {
         document(&bytes, json!([view]), accessors).vectors::<3>(0)
     };
     for (offset, length) in [(0, 25), (1, 24), (25, 0), (u64::MAX, 1), (1, u64::MAX), (1 << 40, 4)] {
-        let told = told(view(json!({ "buffer": 0, "byteOffset": offset, "byteLength": length })));
+        let message = told(view(json!({ "buffer": 0, "byteOffset": offset, "byteLength": length })));
         assert_eq!(
-            told,
+            message,
             format!("bufferViews[0]: {length} bytes from byte {offset} on; buffers[0] has 24")
         );
     }

@@ -1,8 +1,8 @@
-//! Modes 1 and 2 of the bitstream: lists of triangles, and any indices (`KHR_meshopt_compression`, appendix A).
+//! Decoder of meshopt modes 1 (triangle lists) and 2 (index sequences) (`KHR_meshopt_compression`, appendix A).
 
 use super::{TOO_LONG, TOO_SHORT};
 
-/// Decodes `count` indices of triangles, of `size` bytes each.
+/// Decodes a triangle list of `count` indices with `size` bytes each.
 pub(super) fn triangles(stream: &[u8], count: usize, size: usize) -> Result<Vec<u8>, &'static str> {
     if stream.first() != Some(&0xe1) {
         return Err("the stream must begin with the byte 0xe1");
@@ -31,7 +31,7 @@ pub(super) fn triangles(stream: &[u8], count: usize, size: usize) -> Result<Vec<
     }
 }
 
-/// Decodes `count` indices, of `size` bytes each.
+/// Decodes a sequence of `count` indices with `size` bytes each.
 pub(super) fn indices(stream: &[u8], count: usize, size: usize) -> Result<Vec<u8>, &'static str> {
     if stream.first() != Some(&0xd1) {
         return Err("the stream must begin with the byte 0xd1");
@@ -55,12 +55,12 @@ pub(super) fn indices(stream: &[u8], count: usize, size: usize) -> Result<Vec<u8
     }
 }
 
-/// Numbers with a sign in the lowest bit.
+/// Decodes a zigzag-encoded integer, whose sign is in the lowest bit.
 fn unfolded(number: u32) -> u32 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }
 
-/// Bytes, and numbers of 7 bits a byte.
+/// A reader of bytes and of variable-length integers with 7 bits per byte.
 struct Numbers<'a> {
     data: &'a [u8],
 }
@@ -85,7 +85,7 @@ impl Numbers<'_> {
     }
 }
 
-/// The 16 that were pushed last.
+/// A FIFO of the last 16 entries.
 #[derive(Default)]
 struct Fifo<T> {
     entries: [T; 16],
@@ -98,7 +98,7 @@ impl<T: Copy> Fifo<T> {
         self.pushed += 1;
     }
 
-    /// 0 is the one that was pushed last; `index` is below 16.
+    /// Returns an entry by its age, 0 for the newest; `index` is below 16.
     fn get(&self, index: u8) -> Result<T, &'static str> {
         let index = usize::from(index);
         match index < self.pushed {
@@ -110,9 +110,9 @@ impl<T: Copy> Fifo<T> {
 
 struct Decoder<'a> {
     numbers: Numbers<'a>,
-    /// The smallest index that is expected to be new.
+    /// The next index that has not been used.
     next: u32,
-    /// The index that was said last.
+    /// The last index that was coded explicitly, as a delta.
     last: u32,
     edges: Fifo<[u32; 2]>,
     vertices: Fifo<u32>,
@@ -143,7 +143,7 @@ impl Decoder<'_> {
         Ok([a, b, c])
     }
 
-    /// A triangle that has no edge of those before.
+    /// Decodes a triangle that shares no edge of the FIFO.
     fn corners(&mut self, low: u8, table: &[u8; 16]) -> Result<[u32; 3], &'static str> {
         let how = match low {
             0..14 => table[usize::from(low)],

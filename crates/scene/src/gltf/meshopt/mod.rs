@@ -53,23 +53,23 @@ struct MeshoptExtension {
 
 /// Returns the compression of a view of `length` bytes.
 pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) -> Result<Option<Compressed>, GltfFault> {
-    let Some((name, said)) = NAMES.iter().find_map(|name| Some((*name, others.get(*name)?))) else {
+    let Some((name, extension)) = NAMES.iter().find_map(|name| Some((*name, others.get(*name)?))) else {
         return Ok(None);
     };
     let key = format!("{key}.extensions.{name}");
-    let said: MeshoptExtension = serde_path_to_error::deserialize(said)
+    let extension: MeshoptExtension = serde_path_to_error::deserialize(extension)
         .map_err(|error| GltfFault::key(format!("{key}.{}", error.path()), plain(error.inner())))?;
     let fault = |field: &str, value: &dyn std::fmt::Display, rule: &str| {
         Err(GltfFault::key(format!("{key}.{field}"), format!("{value} {rule}")))
     };
-    let stride = said.byte_stride;
-    let mode = match said.mode.as_str() {
+    let stride = extension.byte_stride;
+    let mode = match extension.mode.as_str() {
         "ATTRIBUTES" => Mode::Attributes,
         "TRIANGLES" => Mode::Triangles,
         "INDICES" => Mode::Indices,
         other => return fault("mode", &shown(other), "must be ATTRIBUTES, TRIANGLES or INDICES"),
     };
-    let filter = match said.filter.as_deref().unwrap_or("NONE") {
+    let filter = match extension.filter.as_deref().unwrap_or("NONE") {
         "NONE" => Filter::None,
         "OCTAHEDRAL" => Filter::Octahedral,
         "QUATERNION" => Filter::Quaternion,
@@ -97,21 +97,21 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
     if mode != Mode::Attributes && filter != Filter::None {
         return fault("filter", &"a filter", "must go with the mode ATTRIBUTES");
     }
-    if mode == Mode::Triangles && !said.count.is_multiple_of(3) {
-        return fault("count", &said.count, "must be a multiple of 3");
+    if mode == Mode::Triangles && !extension.count.is_multiple_of(3) {
+        return fault("count", &extension.count, "must be a multiple of 3");
     }
-    if said.count.checked_mul(stride) != Some(length) {
+    if extension.count.checked_mul(stride) != Some(length) {
         let rule = format!("elements of {stride} bytes must be the {length} bytes of the view");
-        return fault("count", &said.count, &rule);
+        return fault("count", &extension.count, &rule);
     }
-    let Ok(count) = usize::try_from(said.count) else {
-        return fault("count", &said.count, "must be a size that this machine can have");
+    let Ok(count) = usize::try_from(extension.count) else {
+        return fault("count", &extension.count, "must be a size that this machine can have");
     };
     Ok(Some(Compressed {
         name,
-        buffer: said.buffer as usize,
-        offset: said.byte_offset,
-        length: said.byte_length,
+        buffer: extension.buffer as usize,
+        offset: extension.byte_offset,
+        length: extension.byte_length,
         stride: stride as usize,
         count,
         mode,

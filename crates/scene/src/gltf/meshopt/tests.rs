@@ -18,10 +18,10 @@ struct Stream {
 }
 
 fn described(mode: &str, filter: &str, stride: u64, count: u64) -> Result<Compressed, String> {
-    let said = json!({
+    let extension = json!({
         "buffer": 0, "byteLength": 0, "byteStride": stride, "count": count, "mode": mode, "filter": filter,
     });
-    let others = json!({ "KHR_meshopt_compression": said });
+    let others = json!({ "KHR_meshopt_compression": extension });
     match compressed("v", others.as_object().unwrap(), stride.wrapping_mul(count)) {
         Ok(how) => Ok(how.unwrap()),
         Err(fault) => Err(fault.of("a".as_ref()).to_string()),
@@ -336,12 +336,12 @@ fn compressed_views_behave_like_others() {
         .find(|stream| stream.name == "shorts-12-100-0-v0")
         .unwrap();
     let view = |name: &str, changes: &[(&str, Value)]| {
-        let mut said = json!({
+        let mut extension = json!({
             "buffer": 0, "byteOffset": 4, "byteLength": stream.bytes.len(), "byteStride": 12, "count": 100,
             "mode": "ATTRIBUTES",
         });
         for (key, value) in changes {
-            said[*key] = value.clone();
+            extension[*key] = value.clone();
         }
         let mut binary = vec![1; 4];
         binary.extend(&stream.bytes);
@@ -353,7 +353,7 @@ fn compressed_views_behave_like_others() {
                 { "byteLength": 1200, "extensions": { name: { "fallback": true } } },
             ],
             "bufferViews": [
-                { "buffer": 1, "byteLength": 1200, "byteStride": 12, "extensions": { name: said } },
+                { "buffer": 1, "byteLength": 1200, "byteStride": 12, "extensions": { name: extension } },
             ],
             "accessors": [
                 { "bufferView": 0, "byteOffset": 2, "componentType": 5123, "count": 100, "type": "SCALAR" },

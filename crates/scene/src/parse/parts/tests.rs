@@ -37,7 +37,7 @@ fn assert_same(text: &str) {
 fn valid_files_parse_equally_by_parts() {
     let sub = "[materials.a.normal_map]\ntexture = 't'\n";
     let image = "[textures.t]\ntype = 'image'\nfile = 'a [[shapes]] b'\n";
-    let strange = "[[ shapes ]] # [[lights]]\n type = \"\"\"sphere\"\"\"\nmaterial = '[[shapes]]'\ncenter = [ # [x]\n0,\n\
+    let unusual = "[[ shapes ]] # [[lights]]\n type = \"\"\"sphere\"\"\"\nmaterial = '[[shapes]]'\ncenter = [ # [x]\n0,\n\
                    [[shapes]]\n][0:0]";
     let nested = "[[shapes]]\r\ntype = 'triangle'\r\nmaterial = 'a'\r\nvertices = [\r\n[0, 0, 0],\r\n  [1, 0, 0],\r\n[0, 1, 0]]\r\n";
     let text = "[materials.z]\ntype = 'phong'\n[materials.z.color]\ntexture = \"\"\"\n[[shapes]]\n\"\"\"\n";
@@ -51,7 +51,7 @@ fn valid_files_parse_equally_by_parts() {
             }
         }
     }
-    assert_same(&format!("{START}{strange}"));
+    assert_same(&format!("{START}{unusual}"));
     assert_same(&format!("\u{feff}{START}{SPHERE}{RED}"));
     assert_same(&format!("{START}shapes = []\n{RED}"));
     assert_same(&format!(

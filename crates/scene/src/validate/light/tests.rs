@@ -39,8 +39,8 @@ fn a_spot_has_a_direction_or_looks_at_a_point() {
             "lights[0].look_at: [1, 2, 3] must be at least 1e-9 away from the light",
         ),
     ] {
-        let told = spot(&format!("{angle}{keys}")).expect_err(keys);
-        assert!(told.contains(rule), "{told}");
+        let message = spot(&format!("{angle}{keys}")).expect_err(keys);
+        assert!(message.contains(rule), "{message}");
     }
 }
 
@@ -66,7 +66,7 @@ fn a_spot_has_angles_in_their_ranges() {
         ),
         ("cone_angle = 20\ninner_angle = -1", "inner_angle: -1 must be"),
     ] {
-        let told = with(keys).expect_err(keys);
-        assert!(told.contains(rule), "{told}");
+        let message = with(keys).expect_err(keys);
+        assert!(message.contains(rule), "{message}");
     }
 }

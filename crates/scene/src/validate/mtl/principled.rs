@@ -1,5 +1,5 @@
-//! Materials of MTL files under `path`: as `principled`, with the extensions for physically based rendering of Exocortex, "Extending the
-//! Wavefront MTL format for physically based rendering", which Blender writes too.
+//! Conversion of MTL materials to `principled` under `path`, with the extensions of Exocortex, "Extending the Wavefront
+//! MTL format for physically based rendering", which Blender also writes.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use super::super::{number, show};
 use super::{DIFFUSE, Looks, Traits, Warnings, beside};
 use crate::mesh::MtlMaterial;
 
-/// A factor of `Ks` that makes 0.5, which exporters write for common dielectrics, their reflectance.
+/// Factor from `Ks` to `specular`: exporters write 0.5 for common dielectrics, whose `specular` is 1.
 const SPECULAR: f64 = 2.0;
 
 impl Looks<'_> {
@@ -55,7 +55,7 @@ impl Looks<'_> {
         };
         let roughness = match (own.roughness, own.shininess) {
             (Some(roughness), _) => share(&mut warnings, "Pr", roughness),
-            // The width of a microfacet highlight by the exponent of a Blinn-Phong one.
+            // The roughness whose microfacet highlight is as wide as that of the Blinn-Phong exponent.
             (None, Some(exponent)) => (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25),
             (None, None) => 1.0,
         };

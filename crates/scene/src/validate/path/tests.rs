@@ -122,7 +122,7 @@ fn a_scene_of_paths_is_what_its_file_says() {
         let i = scene.material_names.iter().position(|known| known == name).unwrap();
         scene.materials[i].clone()
     };
-    let told = |reflection, emission| Material {
+    let expected = |reflection, emission| Material {
         reflection,
         emission,
         visible: true,
@@ -204,7 +204,7 @@ fn a_scene_of_paths_is_what_its_file_says() {
             plain(0.0, 4.0, 0.0),
         ),
     ] {
-        assert_eq!(material(name), told(reflection, emission), "{name}");
+        assert_eq!(material(name), expected(reflection, emission), "{name}");
     }
 }
 
@@ -222,12 +222,12 @@ fn metals_have_an_index_by_name_or_by_numbers() {
     let (color, plain, facets) = index(silver);
     assert_eq!((plain, facets), (None, Facets::default()));
     assert_eq!(color, Color::Plain(DVec3::new(0.9, 0.9, 0.8)));
-    let told = "eta = [1, 2, 3]\nk = [0, 5, 100]\nroughness = 0.5\nanisotropy = 1\nanisotropy_rotation = -90\n\
+    let keys = "eta = [1, 2, 3]\nk = [0, 5, 100]\nroughness = 0.5\nanisotropy = 1\nanisotropy_rotation = -90\n\
                 energy_compensation = false";
-    let (color, told, facets) = index(told);
-    let told = told.unwrap();
+    let (color, metal, facets) = index(keys);
+    let metal = metal.unwrap();
     assert_eq!(
-        (told.eta, told.k),
+        (metal.eta, metal.k),
         (DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 5.0, 100.0))
     );
     assert_eq!(color, Color::Plain(DVec3::ONE));
@@ -241,12 +241,12 @@ fn metals_have_an_index_by_name_or_by_numbers() {
         assert!(page.contains(&format!("`\"{name}\"`")), "{name}");
     }
     for (own, other) in [("eta", "k"), ("k", "eta")] {
-        let told = parse(&with(silver, &format!("{own} = [1, 1, 1]")))
+        let message = parse(&with(silver, &format!("{own} = [1, 1, 1]")))
             .unwrap_err()
             .to_string();
         assert!(
-            told.ends_with(&format!("materials.silver.{other} is missing; {own} needs it")),
-            "{told}"
+            message.ends_with(&format!("materials.silver.{other} is missing; {own} needs it")),
+            "{message}"
         );
     }
     let unknown = parse(&with(silver, "metal = 'bronze'")).unwrap_err().to_string();
@@ -274,7 +274,7 @@ fn what_is_absent_has_defaults() {
     let samples = |pattern, count| Samples { pattern, count };
     assert_eq!(render.pixel_samples, samples(Pattern::Sobol, 16));
     // The default pattern depends on the integrator.
-    for (integrator, said, pattern) in [
+    for (integrator, key, pattern) in [
         ("path", "", Pattern::Sobol),
         ("phong", "", Pattern::Grid),
         ("path", "pattern = 'grid',", Pattern::Grid),
@@ -282,7 +282,7 @@ fn what_is_absent_has_defaults() {
     ] {
         let text = format!(
             "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }}\n\
-             [render]\nintegrator = '{integrator}'\npixel_samples = {{ {said} count = 9 }}\n"
+             [render]\nintegrator = '{integrator}'\npixel_samples = {{ {key} count = 9 }}\n"
         );
         let render = parse(&text).unwrap().render;
         assert_eq!(render.pixel_samples, samples(pattern, 9), "{integrator}");
@@ -353,6 +353,6 @@ fn descriptions_made_in_code_are_read_back() {
         }
     );
     description.render.integrator = Some(Integrator::Phong);
-    let told = description.validate().unwrap_err().to_string();
-    assert_eq!(told, "render.rr_depth: needs integrator = \"path\"");
+    let message = description.validate().unwrap_err().to_string();
+    assert_eq!(message, "render.rr_depth: needs integrator = \"path\"");
 }

@@ -10,7 +10,7 @@ fn notes(text: &str) -> Vec<String> {
 
 #[test]
 fn what_paths_ignore_is_told() {
-    for (added, told) in [
+    for (added, expected) in [
         (
             "ambient = [0, 0.1, 0]",
             "render.ambient: no effect with integrator = \"path\", which computes indirect light",
@@ -23,7 +23,7 @@ fn what_paths_ignore_is_told() {
         ("light_samples = { pattern = 'sobol', count = 16 }", LIGHT_SAMPLES),
     ] {
         let text = GOOD.replace("[render]", &format!("[render]\n{added}"));
-        assert_eq!(notes(&text), [told]);
+        assert_eq!(notes(&text), [expected]);
         let render = parse(&text).unwrap().render;
         assert_eq!((render.ambient, render.shadows), (DVec3::ZERO, Shadows::Opaque));
     }
@@ -56,7 +56,7 @@ fn phong_materials_that_are_too_bright_are_told() {
     const RULE: &str =
         "materials: diffuse + specular are scaled down to 1 with integrator = \"path\", which conserves energy: ";
     let (diffuse, specular) = ("diffuse = [0.5, 0, 0]", "specular = [0.5, 0.5, 0.5]");
-    for (line, changed, told) in [
+    for (line, changed, expected) in [
         (diffuse, "diffuse = [0.7, 0.1, 0]", Some("\"red\" (1.2)")),
         (specular, "specular = [0.501, 0, 0]", Some("\"red\" (1.01)")),
         (specular, "specular = [0.5, 1, 1]", None),
@@ -67,16 +67,19 @@ fn phong_materials_that_are_too_bright_are_told() {
         (specular, "specular = { texture = 'spots' }", Some("\"red\" (3)")),
     ] {
         let text = with(line, changed);
-        let told: Vec<String> = told.map(|told| format!("{RULE}{told}")).into_iter().collect();
-        assert_eq!(notes(&text), told, "{changed}");
+        let expected: Vec<String> = expected
+            .map(|expected| format!("{RULE}{expected}"))
+            .into_iter()
+            .collect();
+        assert_eq!(notes(&text), expected, "{changed}");
     }
     // Many materials share a warning.
     let materials: String = (0..10)
         .map(|i| format!("[materials.m{i}]\ntype = 'phong'\ncolor = [0.{i}, 0.8, 0]\n"))
         .collect();
-    let told = notes(&GOOD.replace("[materials.clay]", &format!("{materials}[materials.clay]")));
+    let found = notes(&GOOD.replace("[materials.clay]", &format!("{materials}[materials.clay]")));
     let names: Vec<String> = (0..8).map(|i| format!("\"m{i}\" (1.6)")).collect();
-    assert_eq!(told, [format!("{RULE}{} and 2 more", names.join(", "))]);
+    assert_eq!(found, [format!("{RULE}{} and 2 more", names.join(", "))]);
 }
 
 #[test]
@@ -89,7 +92,7 @@ fn alpha_that_nothing_asks_is_told() {
     };
     const ALPHA: &str = "materials: alpha has no effect without alpha_mode = \"mask\" or \"blend\": \"leaf\"";
     const CUTOFF: &str = "materials: alpha_cutoff has no effect without alpha_mode = \"mask\": \"leaf\"";
-    for (keys, told) in [
+    for (keys, expected) in [
         ("alpha = 0.5", vec![ALPHA]),
         ("alpha = { texture = 'spots' }", vec![ALPHA]),
         (
@@ -102,13 +105,13 @@ fn alpha_that_nothing_asks_is_told() {
         ("alpha = 1\nalpha_cutoff = 0.5", vec![]),
         ("alpha_mode = 'blend'", vec![]),
     ] {
-        assert_eq!(leaf(keys), told, "{keys}");
+        assert_eq!(leaf(keys), expected, "{keys}");
     }
     let leaves: String = (0..9)
         .map(|i| format!("[materials.leaf{i}]\ntype = 'principled'\nalpha = 0.{i}\n"))
         .collect();
-    let told = notes(&with("[materials.clay]", &format!("{leaves}[materials.clay]")));
+    let found = notes(&with("[materials.clay]", &format!("{leaves}[materials.clay]")));
     let names: Vec<String> = (0..8).map(|i| format!("\"leaf{i}\"")).collect();
     let rule = ALPHA.trim_end_matches("\"leaf\"");
-    assert_eq!(told, [format!("{rule}{} and 1 more", names.join(", "))]);
+    assert_eq!(found, [format!("{rule}{} and 1 more", names.join(", "))]);
 }
