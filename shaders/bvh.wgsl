@@ -10,8 +10,8 @@ struct TraversalStack {
 }
 
 // Global, since software Vulkan zeroes variables of functions for each ray, which takes a fifth of the time.
-var<private> items_walk: TraversalStack;
-var<private> mesh_walk: TraversalStack;
+var<private> tlas_stack: TraversalStack;
+var<private> blas_stack: TraversalStack;
 
 fn traversal_begin(walk: ptr<private, TraversalStack>, octant: u32) {
     (*walk).octant = octant;
@@ -43,17 +43,17 @@ fn push_children(walk: ptr<private, TraversalStack>, node: Node, passed: u32) ->
 }
 
 fn item_pad(origin: vec3f) -> f32 {
-    return counts.room.x * (largest(origin) + counts.room.y);
+    return counts.item_padding.x * (largest(origin) + counts.item_padding.y);
 }
 
 // Returns the nearer of `before` and the nearest hit among the items.
-fn closest_in_tree(before: Hit, ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
+fn closest_in_bvh(before: Hit, ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     var hit = before;
     let s = slabs(ray.origin, ray.direction, item_pad(ray.origin));
-    traversal_begin(&items_walk, octant_of(ray.direction));
-    while items_walk.depth > 0u {
-        let node = load_node(5u * pop_node(&items_walk));
-        var leaves = push_children(&items_walk, node, children_hit(node, s, hit.t));
+    traversal_begin(&tlas_stack, octant_of(ray.direction));
+    while tlas_stack.depth > 0u {
+        let node = load_node(5u * pop_node(&tlas_stack));
+        var leaves = push_children(&tlas_stack, node, children_hit(node, s, hit.t));
         while leaves != 0u {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -93,7 +93,7 @@ fn standalone_hit(kind: u32, i: u32, ray: Ray, near: f32, origin_prim: vec2u, in
 }
 
 // Returns an upper bound, rounding included, of the distance beyond `start` of hits nearer than t.
-fn limit_from(start: f32, t: f32) -> f32 {
+fn remaining_t_max(start: f32, t: f32) -> f32 {
     return (t - start) + t * 4.7683716e-7;
 }
 
@@ -106,10 +106,10 @@ fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, origin_prim: 
     let origin = point_to_mesh(i, ray.origin) + direction * start;
     let s = slabs(origin, direction, mesh_pad(i, origin));
     let shear = shear_of(direction);
-    traversal_begin(&mesh_walk, octant_of(direction));
-    while mesh_walk.depth > 0u {
-        let node = load_node(i.nodes + 5u * pop_node(&mesh_walk));
-        var leaves = push_children(&mesh_walk, node, children_hit(node, s, limit_from(start, hit.t)));
+    traversal_begin(&blas_stack, octant_of(direction));
+    while blas_stack.depth > 0u {
+        let node = load_node(i.nodes + 5u * pop_node(&blas_stack));
+        var leaves = push_children(&blas_stack, node, children_hit(node, s, remaining_t_max(start, hit.t)));
         while leaves != 0u {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -178,10 +178,10 @@ fn occluded_pair(surface: Surface, to: LightSegments, light: Light, block: Sampl
     let directions = segments_to_two(to, block, samples);
     let pair = ray_pair(surface.ray_origin, directions[0], directions[1], pad);
     var occluded = 0u;
-    traversal_begin(&items_walk, octant_of(directions[0]));
-    while items_walk.depth > 0u && occluded != 3u {
-        let node = load_node(5u * pop_node(&items_walk));
-        var leaves = push_children(&items_walk, node, children_hit_by_pair(node, pair, occluded, light.t_max));
+    traversal_begin(&tlas_stack, octant_of(directions[0]));
+    while tlas_stack.depth > 0u && occluded != 3u {
+        let node = load_node(5u * pop_node(&tlas_stack));
+        var leaves = push_children(&tlas_stack, node, children_hit_by_pair(node, pair, occluded, light.t_max));
         while leaves != 0u && occluded != 3u {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -231,10 +231,10 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
     let first_shear = shear_of(directions[0]);
     let second_shear = shear_of(directions[1]);
     var occluded = 3u & ~may;
-    traversal_begin(&mesh_walk, octant_of(directions[0]));
-    while mesh_walk.depth > 0u && occluded != 3u {
-        let node = load_node(i.nodes + 5u * pop_node(&mesh_walk));
-        var leaves = push_children(&mesh_walk, node, children_hit_by_pair(node, pair, occluded, light.t_max));
+    traversal_begin(&blas_stack, octant_of(directions[0]));
+    while blas_stack.depth > 0u && occluded != 3u {
+        let node = load_node(i.nodes + 5u * pop_node(&blas_stack));
+        var leaves = push_children(&blas_stack, node, children_hit_by_pair(node, pair, occluded, light.t_max));
         while leaves != 0u && occluded != 3u {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -261,10 +261,10 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
 fn is_occluded_by_bvh(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     var occluded = before;
     let s = slabs(surface.ray_origin, to, item_pad(surface.ray_origin));
-    traversal_begin(&items_walk, octant_of(to));
-    while items_walk.depth > 0u && !occluded {
-        let node = load_node(5u * pop_node(&items_walk));
-        var leaves = push_children(&items_walk, node, children_hit(node, s, t_max));
+    traversal_begin(&tlas_stack, octant_of(to));
+    while tlas_stack.depth > 0u && !occluded {
+        let node = load_node(5u * pop_node(&tlas_stack));
+        var leaves = push_children(&tlas_stack, node, children_hit(node, s, t_max));
         while leaves != 0u && !occluded {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -297,10 +297,10 @@ fn is_occluded_by_mesh(number: u32, surface: Surface, to: vec3f, t_max: f32) -> 
     let s = slabs(origin, direction, mesh_pad(i, origin));
     let shear = shear_of(direction);
     var occluded = false;
-    traversal_begin(&mesh_walk, octant_of(direction));
-    while mesh_walk.depth > 0u && !occluded {
-        let node = load_node(i.nodes + 5u * pop_node(&mesh_walk));
-        var leaves = push_children(&mesh_walk, node, children_hit(node, s, t_max));
+    traversal_begin(&blas_stack, octant_of(direction));
+    while blas_stack.depth > 0u && !occluded {
+        let node = load_node(i.nodes + 5u * pop_node(&blas_stack));
+        var leaves = push_children(&blas_stack, node, children_hit(node, s, t_max));
         while leaves != 0u && !occluded {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;

@@ -19,7 +19,7 @@ fn select_emitter(bits: vec2u) -> Emitter {
     }
     let first = whole_below(bits.x, count);
     let emitter = load_emitter(first);
-    return load_emitter(select(emitter.other, first, unit_float(bits.y) < emitter.threshold));
+    return load_emitter(select(emitter.alias_index, first, unit_float(bits.y) < emitter.threshold));
 }
 
 // Samples the light that arrives at p from an emitter. `normal` is the normal of the surface, or 0 if light may arrive

@@ -6,7 +6,7 @@ fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     if TLAS_KINDS == 0u {
         return closest_primitive(ray, origin_prim.y, inside_prim.y);
     }
-    return closest_in_tree(closest_primitive(ray, standalone_prim(origin_prim), standalone_prim(inside_prim)), ray, origin_prim, inside_prim);
+    return closest_in_bvh(closest_primitive(ray, standalone_prim(origin_prim), standalone_prim(inside_prim)), ray, origin_prim, inside_prim);
 }
 
 // Returns the mask of a block's occluded samples. The surface's own primitive does not occlude samples above the

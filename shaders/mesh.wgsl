@@ -171,11 +171,11 @@ fn face_terminator_offset(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
 }
 
-// Returns the offset from a point up to the tangent plane of a vertex; 0 if the point is above it. `to_vertex` is the
+// Returns the offset from a point up to the tangent plane of a vertex; 0 if the point is above it. `from_vertex` is the
 // vector from the vertex to the point. A normal more than 37 degrees off the triangle normal `up` implies no surface
 // nearby, as at the corner of a cube: objects on the cube would lose their contact shadows.
-fn lift(n: vec3f, to_vertex: vec3f, up: vec3f) -> vec3f {
-    return n * select(0.0, max(-dot(n, to_vertex), 0.0), dot(n, up) > 0.8);
+fn lift(n: vec3f, from_vertex: vec3f, up: vec3f) -> vec3f {
+    return n * select(0.0, max(-dot(n, from_vertex), 0.0), dot(n, up) > 0.8);
 }
 
 // Returns true unless the triangle itself occludes the origin of shadow rays from direction `to`. Light from behind may

@@ -29,7 +29,7 @@ fn plain_reflection(surface: Surface, material: Material, wi: vec3f) -> Reflecti
 // Evaluates any material, within the allowed directions.
 fn reflection(prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, wi: vec3f) -> Reflection {
     var result = plain_reflection(surface, material, wi);
-    if (MATERIALS & FACET_KINDS) != 0u {
+    if (MATERIALS & MICROFACET_KINDS) != 0u {
         if has_facets(material) {
             let frame = Tangents(surface.du, surface.dv);
             let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
@@ -77,7 +77,7 @@ fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
         let bends = (material.kind == GLASS) | (material.kind == ROUGH_GLASS);
         return select(usable, surface.normal, bends & !refracts_inwards(surface, material, usable));
     }
-    if (MATERIALS & (FACET_KINDS | (1u << PRINCIPLED))) != 0u {
+    if (MATERIALS & (MICROFACET_KINDS | (1u << PRINCIPLED))) != 0u {
         if has_facets(material) | (material.kind == PRINCIPLED) {
             return usable_normal(surface, normal);
         }
@@ -91,7 +91,7 @@ fn albedo(material: Material) -> vec3f {
         let factors = phong_factors(material);
         return factors.diffuse + factors.specular;
     }
-    if (MATERIALS & FACET_KINDS) != 0u {
+    if (MATERIALS & MICROFACET_KINDS) != 0u {
         if has_facets(material) {
             return select(material.tint, metal_fresnel(material, 1.0), material.kind == METAL);
         }
@@ -107,7 +107,7 @@ fn has_inside(material: Material) -> bool {
 
 // Returns true if the material only reflects and refracts specularly here.
 fn is_delta(material: Material) -> bool {
-    if (DELTA_KINDS & FACET_KINDS) != 0u {
+    if (DELTA_KINDS & MICROFACET_KINDS) != 0u {
         return is_specular(material) | (has_facets(material) & is_polished(material));
     }
     return is_specular(material);
@@ -115,7 +115,7 @@ fn is_delta(material: Material) -> bool {
 
 // Returns true for microfacet materials, polished or not.
 fn has_facets(material: Material) -> bool {
-    return ((FACET_KINDS >> material.kind) & 1u) != 0u;
+    return ((MICROFACET_KINDS >> material.kind) & 1u) != 0u;
 }
 
 fn facet_frame(surface: Surface, material: Material) -> Tangents {
@@ -215,7 +215,7 @@ fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, w
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
         lit &= face_direction_allowed(prim, surface, wi);
     }
-    if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
+    if ((MATERIALS & TRANSMISSIVE_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
         let behind = (dot(surface.shading_normal, wi) < 0.0) & (dot(surface.smooth_normal, wi) < 0.0);
         lit |= is_transmissive(material) & behind & (dot(surface.normal, wi) < 0.0);
     }
@@ -224,7 +224,7 @@ fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, w
 
 // Returns true if the material transmits light other than by a delta.
 fn is_transmissive(material: Material) -> bool {
-    var passes = ((PASSING_KINDS >> material.kind) & 1u) != 0u;
+    var passes = ((TRANSMISSIVE_KINDS >> material.kind) & 1u) != 0u;
     if (LOBES & LOBE_TRANSMISSION) != 0u {
         passes |= (material.kind == PRINCIPLED) & (material.transmission > 0.0);
     }

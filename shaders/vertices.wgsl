@@ -36,7 +36,7 @@ fn load_further_uv(i: Instance, vertex: u32, uv_set: u32) -> vec2f {
 }
 
 // Returns the hit primitive with a set of texture coordinates in place of the first; 0 if the mesh does not have it.
-fn spot_in_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
+fn hit_primitive_in_uv_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
     var face = prim;
     if is_on_mesh(hit) {
         let i = load_instance(hit.instance - 1u);
@@ -61,7 +61,7 @@ fn uv_in_set(first: vec2f, prim: HitPrimitive, hit: Hit, uv_set: u32) -> vec2f {
     if uv_set == 0u {
         return first;
     }
-    return face_uv(spot_in_set(prim, hit, uv_set), hit.barycentric);
+    return face_uv(hit_primitive_in_uv_set(prim, hit, uv_set), hit.barycentric);
 }
 
 // Returns the footprint in a set; `first` is that in set 0.
@@ -72,7 +72,7 @@ fn footprint_in_set(first: Footprint, prim: HitPrimitive, hit: Hit, at: HitDiffe
     if uv_set == 0u {
         return first;
     }
-    let face = spot_in_set(prim, hit, uv_set);
+    let face = hit_primitive_in_uv_set(prim, hit, uv_set);
     let uv = face_uv(face, hit.barycentric);
     return Footprint(uv, face_uv_derivative(face, at.x.position), face_uv_derivative(face, at.y.position));
 }

@@ -51,7 +51,7 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let mut next = || {
         prepared
             .renderer
-            .work(|backend, _| bands.render_next(backend, &mut |_, _, _| Ok(Flow::GoOn), &mut || progress.made()))
+            .work(|backend, _| bands.render_next(backend, &mut |_, _, _| Ok(Flow::Continue), &mut || progress.made()))
     };
     while let Some(band) = next()? {
         put(&mut film, &band.film);
@@ -216,7 +216,7 @@ impl<'a> RenderSetup<'a> {
 }
 
 fn empty(region: Region, form: FilmLayout) -> Result<Film, RenderError> {
-    job::there_is_memory(region.pixels().saturating_mul(form.bytes() as u64))?;
+    job::check_memory(region.pixels().saturating_mul(form.bytes() as u64))?;
     Ok(Film::of(region, form))
 }
 

@@ -10,7 +10,7 @@ use wgray::scene::{
     ShapeDescription, SphereDescription,
 };
 
-use crate::pictures::{Way, both, first_hits, means, render};
+use crate::pictures::{RenderMode, both, first_hits, means, render};
 use crate::scenes::packed;
 
 /// Width and height of the images in pixels.
@@ -84,8 +84,8 @@ fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
 }
 
 /// Returns the maximum absolute error of the green channel over all pixels.
-fn worst(scene: &Description, way: Way, expected: impl Fn(u32) -> f64) -> f64 {
-    let picture = means(&render(&packed(scene), way));
+fn worst(scene: &Description, mode: RenderMode, expected: impl Fn(u32) -> f64) -> f64 {
+    let picture = means(&render(&packed(scene), mode));
     let difference = |(i, mean): (u32, &[f64; 3])| (mean[1] - expected(i)).abs();
     (0..)
         .zip(&picture)
@@ -142,13 +142,15 @@ fn light_of_a_rectangle_on_a_plane() {
             visible: true,
         }));
     let swapped = [size[1], size[0]];
-    for way in both() {
+    for mode in both() {
         let worst = |expected: &dyn Fn(DVec2) -> f64| {
-            worst(&scene, way, |pixel| 0.9 * 0.7 * expected(on_floor(from, height, pixel)))
+            worst(&scene, mode, |pixel| {
+                0.9 * 0.7 * expected(on_floor(from, height, pixel))
+            })
         };
         let error = worst(&|at| mean_cosine(size, h, at));
-        println!("{way:?}: light of a rectangle within {error:.1e}");
-        assert!(error < 1e-4, "{way:?}: {error}");
+        println!("{mode:?}: light of a rectangle within {error:.1e}");
+        assert!(error < 1e-4, "{mode:?}: {error}");
         assert!(!(worst(&|_| 1.0) < 1e-2), "a missing cosine");
         assert!(!(worst(&|at| mean_cosine(swapped, h, at)) < 1e-2), "swapped axes");
         let pixel = height / f64::from(SIDE);
@@ -180,8 +182,8 @@ fn shadow_of_a_sphere() {
     let half_angle = (radius / axis.length()).asin();
     // Signed angle between a point of the plane and the surface of the shadow cone, positive inside.
     let inside = |at: DVec2| half_angle - (at.extend(0.0) - light).angle_between(axis);
-    for way in both() {
-        let picture = means(&render(&packed(&scene), way));
+    for mode in both() {
+        let picture = means(&render(&packed(&scene), mode));
         let lit = |pixel: u32| picture[pixel as usize][1] > 0.0;
         let wrong = |shift: DVec2, margin: f64| {
             let pixels = (0..SIDE * SIDE).filter(|pixel| inside(on_floor(from, height, *pixel)).abs() > margin);
@@ -189,7 +191,7 @@ fn shadow_of_a_sphere() {
                 .filter(|pixel| lit(*pixel) == (inside(on_floor(from, height, *pixel) + shift) > 0.0))
                 .count()
         };
-        assert_eq!(wrong(DVec2::ZERO, 1e-5), 0, "{way:?}");
+        assert_eq!(wrong(DVec2::ZERO, 1e-5), 0, "{mode:?}");
         let pixel = height / f64::from(SIDE);
         assert!(wrong(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel");
         assert!(wrong(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel");
@@ -198,8 +200,8 @@ fn shadow_of_a_sphere() {
         let long = light.z * ((lean + half_angle).tan() - (lean - half_angle).tan()) / 2.0;
         let short = long * (1.0 - (lean.sin() / half_angle.cos()).powi(2)).sqrt();
         let dark = (0..SIDE * SIDE).filter(|pixel| !lit(*pixel)).count() as f64 * pixel * pixel;
-        println!("{way:?}: the shadow's area is {dark:.4}, of {:.4}", PI * long * short);
-        assert!((dark / (PI * long * short) - 1.0).abs() < 0.01, "{way:?}: {dark}");
+        println!("{mode:?}: the shadow's area is {dark:.4}, of {:.4}", PI * long * short);
+        assert!((dark / (PI * long * short) - 1.0).abs() < 0.01, "{mode:?}: {dark}");
         assert!(
             !((dark / (PI * long * long) - 1.0).abs() < 0.05),
             "a circle is found out"
@@ -260,8 +262,8 @@ fn outlines_of_ellipsoids() {
         let pixel = height / 256.0;
         // Offset from the image center in pixels, to the right and down.
         let middle = DVec2::new(center.dot(right), -center.dot(up)) / pixel;
-        for way in both() {
-            let hits = first_hits(&packed(&scene), way);
+        for mode in both() {
+            let hits = first_hits(&packed(&scene), mode);
             let covered: Vec<DVec2> = (0u32..)
                 .zip(&hits)
                 .filter(|(_, hit)| hit.shape == 0)
@@ -271,11 +273,11 @@ fn outlines_of_ellipsoids() {
             let centroid = covered.iter().sum::<DVec2>() / covered.len() as f64;
             assert!(
                 (seen / area - 1.0).abs() < 0.005,
-                "{way:?} {center} from {view}: {seen} of {area}"
+                "{mode:?} {center} from {view}: {seen} of {area}"
             );
             assert!(
                 (centroid - middle).length() < 0.1,
-                "{way:?} {center} from {view}: {centroid} for {middle}"
+                "{mode:?} {center} from {view}: {centroid} for {middle}"
             );
             assert!(!((centroid + DVec2::X - middle).length() < 0.1), "a shifted pixel");
             // Minimum depth: the depth of the center minus the half-extent along the view direction.
@@ -293,7 +295,7 @@ fn outlines_of_ellipsoids() {
                 .fold(1e9, f64::min);
             assert!(
                 (0.0..1e-3).contains(&(nearest - expected + 1e-6)),
-                "{way:?}: {nearest} for {expected}"
+                "{mode:?}: {nearest} for {expected}"
             );
         }
     }
@@ -314,15 +316,15 @@ fn directional_light_on_a_plane() {
         let cosine = -direction.z / direction.length();
         // The view direction v is the normal, hence r.v equals n.l.
         let expected = |exponent: f64| 0.4 * cosine + 0.6 * cosine.powf(exponent);
-        for way in both() {
-            let error = worst(&scene, way, |_| expected(exponent));
-            assert!(error < 1e-6, "{way:?}, shininess {exponent}: {error}");
-            assert!(!(worst(&scene, way, |_| expected(other)) < 1e-4), "another shininess");
+        for mode in both() {
+            let error = worst(&scene, mode, |_| expected(exponent));
+            assert!(error < 1e-6, "{mode:?}, shininess {exponent}: {error}");
+            assert!(!(worst(&scene, mode, |_| expected(other)) < 1e-4), "another shininess");
         }
         // From below, the plane is black: the normal faces the viewer, so that the light is behind the surface.
         scene.camera = empty(-DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).camera;
-        for way in both() {
-            assert_eq!(worst(&scene, way, |_| 0.0), 0.0, "{way:?}");
+        for mode in both() {
+            assert_eq!(worst(&scene, mode, |_| 0.0), 0.0, "{mode:?}");
         }
     }
 }

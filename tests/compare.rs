@@ -100,9 +100,9 @@ fn an_image_equals_itself_and_the_second_image_is_the_reference() {
         assert_eq!((found.rmse, found.rel_mse, found.psnr), (0.0, 0.0, f64::INFINITY));
         is_near(compare::ssim(&a, &a).unwrap(), 1.0, 1e-12);
         assert_eq!(flip(&a, &a), 0.0);
-        let (there, back) = (color(&a, &b), color(&b, &a));
-        assert_eq!(there.rmse, back.rmse);
-        assert_ne!(there.rel_mse, back.rel_mse);
+        let (forward, backward) = (color(&a, &b), color(&b, &a));
+        assert_eq!(forward.rmse, backward.rmse);
+        assert_ne!(forward.rel_mse, backward.rel_mse);
     }
 }
 

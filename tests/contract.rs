@@ -11,7 +11,7 @@ use wgray_render::cpu::Cpu;
 use wgray_render::film::Film;
 use wgray_render::records::{FirstHit, Packed};
 
-use crate::pictures::{backend, exact_ways};
+use crate::pictures::{backend, exact_modes};
 use crate::{patterns, scenes};
 
 const SIZE: (u32, u32) = (20, 12);
@@ -341,7 +341,7 @@ fn broken<'a>(packed: &'a Packed, make: &Make<'a>) -> Vec<String> {
 #[test]
 fn every_backend_fulfills_the_contract() {
     for packed in &subjects() {
-        for way in exact_ways() {
+        for way in exact_modes() {
             let problems = broken(packed, &|| backend(packed, way));
             assert_eq!(problems, Vec::<String>::new(), "{way:?}, {:?}", packed.film_layout());
         }

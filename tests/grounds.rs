@@ -9,7 +9,7 @@ use wgray_render::cpu::surface::surface_at;
 use wgray_render::records::{NO_INDEX, NO_PRIMITIVE};
 
 use crate::oracle::{Flaw, Oracle};
-use crate::pictures::{differing, exact_ways, means, reference, render};
+use crate::pictures::{differing, exact_modes, means, reference, render};
 use crate::random::Random;
 use crate::scenes::packed;
 
@@ -67,7 +67,7 @@ const LIGHT: [f64; 3] = [2.0, -2.5, 4.0];
 fn same_on_all_paths(d: &Description) {
     let packed = packed(d);
     let cpu = reference(&packed);
-    for way in exact_ways() {
+    for way in exact_modes() {
         assert_eq!(differing(&render(&packed, way), &cpu), 0, "{way:?}");
     }
 }
@@ -137,7 +137,7 @@ fn a_grain_on_the_largest_ground_has_its_contact_shadow() {
 }
 
 #[test]
-fn specular_rays_do_not_intersect_their_origin_again() {
+fn mirrors_and_glass_of_all_radii_match_the_oracle() {
     for material in ["mirror", "glass"] {
         check(RADII, 14, |s, radius| {
             let ground = s.sphere(material, [0.0, 0.0, -radius], radius);

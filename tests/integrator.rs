@@ -1,5 +1,6 @@
 //! An integrator is a single file that only uses shared functions. This test replaces `phong` by another integrator and
-//! its twin: half the diffuse color if a random ray above the surface leaves the scene, plus unoccluded direct light.
+//! its twin: the diffuse color times the sum of the unoccluded light and, if a random ray near the normal leaves the
+//! scene, 0.5.
 
 use glam::{UVec2, Vec3, Vec4};
 use wgray_render::cpu::camera::camera_ray;
@@ -12,7 +13,7 @@ use wgray_render::cpu::sampling::{decision_bits, sample_key, sample_square};
 use wgray_render::cpu::shadow::SampleBlock;
 use wgray_render::records::{NO_INDEX, NO_PRIMITIVE, Packed, RANDOM};
 
-use crate::pictures::{Way, differing, exact_ways, reference, render_with};
+use crate::pictures::{RenderMode, differing, exact_modes, reference, render_with};
 use crate::{scenes, sources};
 
 const FILE: &str = "integrators/phong.wgsl";
@@ -41,7 +42,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
 }
 ";
 
-/// The twin of [`WGSL`]'s `radiance`.
+/// The twin of `radiance` in [`WGSL`].
 fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     let hit = closest_hit(scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
     if hit.primitive == NO_INDEX {
@@ -93,15 +94,15 @@ fn an_integrator_is_a_single_file() {
             *sum += radiance(&packed, ray, pixel, sample).extend(1.0);
         }
     }
-    for way in exact_ways().into_iter().filter(|way| *way != Way::Cpu) {
-        let found = render_with(&packed, way, &shaders);
-        assert_eq!(differing(&found, &expected), 0, "{way:?}");
-        let phong = render_with(&packed, way, sources::shaders());
-        assert!(differing(&phong, &expected) > 1000, "{way:?}: it is not used");
+    for mode in exact_modes().into_iter().filter(|mode| *mode != RenderMode::Cpu) {
+        let found = render_with(&packed, mode, &shaders);
+        assert_eq!(differing(&found, &expected), 0, "{mode:?}");
+        let phong = render_with(&packed, mode, sources::shaders());
+        assert!(differing(&phong, &expected) > 1000, "{mode:?}: it is not used");
         let other_numbers = sources::shaders_with(FILE, &WGSL.replace("77u", "78u"));
         assert!(
-            differing(&render_with(&packed, way, &other_numbers), &expected) > 1000,
-            "{way:?}"
+            differing(&render_with(&packed, mode, &other_numbers), &expected) > 1000,
+            "{mode:?}"
         );
     }
 }

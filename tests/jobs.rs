@@ -17,7 +17,7 @@ use wgray_render::job::{
 use wgray_render::records::Packed;
 
 use crate::contract::{bits, subjects};
-use crate::pictures::{self, Way, whole};
+use crate::pictures::{self, RenderMode, whole};
 use crate::scenes;
 
 /// A checkpoint store in memory, written at every opportunity.
@@ -70,7 +70,7 @@ fn some_calls(
     packed: &Packed,
     backend: &mut dyn Backend,
     store: &mut dyn CheckpointStore,
-    cut: &WorkSplit,
+    split: &WorkSplit,
     at_once: bool,
     calls: usize,
 ) -> Option<Film> {
@@ -78,7 +78,7 @@ fn some_calls(
     let mut bands = Bands::new(
         region,
         packed.sampling.pixel_samples,
-        cut,
+        split,
         order,
         backend.largest_film(),
         store,
@@ -114,25 +114,25 @@ fn some_calls(
 fn in_pieces(
     packed: &Packed,
     store: &mut dyn CheckpointStore,
-    cut: &WorkSplit,
+    split: &WorkSplit,
     at_once: bool,
     calls: usize,
 ) -> Option<Film> {
     (0..1000).find_map(|round| {
         // Each round uses another backend.
         let mut backend: Box<dyn Backend> = match round % 3 {
-            0 => pictures::backend(packed, Way::Buffers),
+            0 => pictures::backend(packed, RenderMode::Buffers),
             1 => Box::new(Cpu::new(packed)),
-            _ => pictures::backend(packed, Way::Baked),
+            _ => pictures::backend(packed, RenderMode::Baked),
         };
-        some_calls(packed, &mut *backend, store, cut, at_once, calls)
+        some_calls(packed, &mut *backend, store, split, at_once, calls)
     })
 }
 
-fn cuts() -> [WorkSplit; 3] {
-    let cut = WorkSplit::default();
+fn splits() -> [WorkSplit; 3] {
+    let split = WorkSplit::default();
     [
-        cut,
+        split,
         WorkSplit {
             band_pixels: 70,
             samples_per_dispatch: Some(7),
@@ -141,7 +141,7 @@ fn cuts() -> [WorkSplit; 3] {
         WorkSplit {
             band_pixels: 100,
             samples_per_dispatch: Some(1),
-            ..cut
+            ..split
         },
     ]
 }
@@ -155,13 +155,13 @@ fn interrupted_and_resumed_work_gives_the_same_film() {
             whole(&packed),
             &WorkSplit::default(),
         ));
-        for (cut, calls) in cuts().into_iter().zip([1, 23, 57]) {
+        for (split, calls) in splits().into_iter().zip([1, 23, 57]) {
             for at_once in [false, true] {
                 let mut shelf = Shelf::default();
-                let film = in_pieces(&packed, &mut shelf, &cut, at_once, calls).expect("an end");
+                let film = in_pieces(&packed, &mut shelf, &split, at_once, calls).expect("an end");
                 assert!(
                     bits(&film) == expected,
-                    "{cut:?}, all at once: {at_once}, {:?}",
+                    "{split:?}, all at once: {at_once}, {:?}",
                     packed.film_layout()
                 );
             }
@@ -183,15 +183,15 @@ fn a_store_that_loses_progress_is_found() {
         forgetful: true,
         ..Shelf::default()
     };
-    let [_, cut, _] = cuts();
-    let film = in_pieces(&packed, &mut shelf, &cut, false, 23);
+    let [_, split, _] = splits();
+    let film = in_pieces(&packed, &mut shelf, &split, false, 23);
     assert!(film.is_none_or(|film| bits(&film) != expected));
 }
 
 #[test]
 fn at_the_time_limit_every_pixel_has_a_sample() {
     for packed in subjects() {
-        let cut = WorkSplit {
+        let split = WorkSplit {
             band_pixels: 70,
             samples_per_dispatch: Some(1),
             rows_per_dispatch: Some(1),
@@ -202,7 +202,7 @@ fn at_the_time_limit_every_pixel_has_a_sample() {
         let bands = Bands::new(
             region,
             packed.sampling.pixel_samples,
-            &cut,
+            &split,
             Order::Pixels,
             most,
             &mut shelf,
@@ -255,8 +255,8 @@ fn the_last_pass_is_a_complete_image() {
             bits(&of_samples(&packed, 3)) != bits(&of_samples(&packed, 4)),
             "the control"
         );
-        for way in pictures::exact_ways() {
-            for cut in cuts() {
+        for way in pictures::exact_modes() {
+            for cut in splits() {
                 let mut backend = pictures::backend(&packed, way);
                 let (region, most) = (whole(&packed), backend.largest_film());
                 let mut no_checkpoint = NoCheckpoint;
@@ -326,7 +326,7 @@ fn open(
             assert!(rounds < 200, "another process writes it");
             true
         }),
-        tell: Box::new(move |what| sender.send(what.to_owned()).expect("a listener")),
+        report: Box::new(move |what| sender.send(what.to_owned()).expect("a listener")),
     };
     let checkpoint = Checkpoint::open(opening, identity.clone(), packed.film_layout())?;
     Ok((checkpoint, warnings.try_iter().collect()))
@@ -337,7 +337,7 @@ fn folder_with_checkpoint(packed: &Packed, identity: &Identity) -> (tempfile::Te
     let path = folder.path().join("c");
     let (mut checkpoint, warnings) = open(&path, packed, identity).expect("a checkpoint");
     assert!(warnings.is_empty(), "{warnings:?}");
-    let [_, cut, _] = cuts();
+    let [_, cut, _] = splits();
     let film = some_calls(packed, &mut Cpu::new(packed), &mut checkpoint, &cut, false, usize::MAX);
     (folder, path, film.expect("a film"))
 }
@@ -387,7 +387,7 @@ fn pieces_before_the_damage_are_used() {
                         } = checkpoint.load(piece.number).expect("a piece");
                         assert_eq!(bits(&film.clone().part(region)), bits(&found.part(region)));
                     }
-                    let [_, cut, _] = cuts();
+                    let [_, cut, _] = splits();
                     let again = some_calls(
                         &packed,
                         &mut Cpu::new(&packed),

@@ -9,7 +9,7 @@ use wgray_render::gpu::{Gpu, Options as GpuOptions};
 use wgray_render::job::WorkSplit;
 use wgray_render::records::Packed;
 
-use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, whole};
+use crate::pictures::{RenderMode, backend, crop, differing, exact_modes, film, first_hits, reference, render, whole};
 use crate::scenes::parse;
 use crate::{adapter, sources};
 
@@ -103,7 +103,7 @@ fn other_layers(a: &Film, b: &Film) -> usize {
 
 #[test]
 fn layers_do_not_depend_on_backend_or_work_split() {
-    let cut = |band_pixels, samples_per_dispatch, rows_per_dispatch| WorkSplit {
+    let split = |band_pixels, samples_per_dispatch, rows_per_dispatch| WorkSplit {
         band_pixels,
         samples_per_dispatch,
         rows_per_dispatch,
@@ -111,20 +111,20 @@ fn layers_do_not_depend_on_backend_or_work_split() {
     for (name, packed) in subjects() {
         let expected = reference(&packed);
         assert!(expected.has_layers(), "{name}");
-        for way in exact_ways() {
-            let mut backend = backend(&packed, way);
-            for cut in [
-                cut(u64::MAX, None, None),
-                cut(24 * 5, Some(3), Some(2)),
-                cut(1, Some(1), None),
+        for mode in exact_modes() {
+            let mut backend = backend(&packed, mode);
+            for split in [
+                split(u64::MAX, None, None),
+                split(24 * 5, Some(3), Some(2)),
+                split(1, Some(1), None),
             ] {
-                let found = film(&mut *backend, &packed, whole(&packed), &cut);
-                assert_eq!(differing(&found, &expected), 0, "{name}, {way:?}, {cut:?}");
+                let found = film(&mut *backend, &packed, whole(&packed), &split);
+                assert_eq!(differing(&found, &expected), 0, "{name}, {mode:?}, {split:?}");
             }
             for (x0, y0, x1, y1) in [(0, 0, 1, 1), (3, 2, 20, 11), (23, 15, 24, 16)] {
                 let part = Region { x0, y0, x1, y1 };
                 let found = film(&mut *backend, &packed, part, &WorkSplit::default());
-                assert_eq!(differing(&found, &crop(&expected, part)), 0, "{name}, {way:?}, {part}");
+                assert_eq!(differing(&found, &crop(&expected, part)), 0, "{name}, {mode:?}, {part}");
             }
         }
         let mut other = packed.clone();
@@ -142,13 +142,13 @@ fn layers_do_not_change_the_image() {
         let plain = packed.clone().without_layers();
         let expected = reference(&plain);
         assert_eq!(plain.film_layout().layers, expected.has_layers(), "{name}");
-        for way in exact_ways() {
-            let found = render(&packed, way);
+        for mode in exact_modes() {
+            let found = render(&packed, mode);
             let found = Film {
                 layers: Film::new(found.region).layers,
                 ..found
             };
-            assert_eq!(differing(&found, &expected), 0, "{name}, {way:?}");
+            assert_eq!(differing(&found, &expected), 0, "{name}, {mode:?}");
         }
     }
     let [plain, alpha] = [SCENE, &with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
@@ -230,8 +230,8 @@ tangent = [1, 0, 0]
 /// Returns the film, which must be equal for all exact configurations.
 fn on_all(packed: &Packed) -> Film {
     let expected = reference(packed);
-    for way in exact_ways() {
-        assert_eq!(differing(&render(packed, way), &expected), 0, "{way:?}");
+    for mode in exact_modes() {
+        assert_eq!(differing(&render(packed, mode), &expected), 0, "{mode:?}");
     }
     expected
 }
@@ -254,7 +254,7 @@ fn layers_of_a_flat_shape() {
 #[test]
 fn mean_normals_of_flat_surfaces_equal_the_first_hits() {
     let packed = parse(SCENE).with_layers();
-    let (film, hits) = (reference(&packed), first_hits(&packed, Way::Cpu));
+    let (film, hits) = (reference(&packed), first_hits(&packed, RenderMode::Cpu));
     let (mut flat, mut bent) = (0, 0);
     for (i, hit) in hits.iter().enumerate() {
         let mean = Vec3::from(film.layer(Layer::Normal, i));
@@ -284,7 +284,7 @@ fn mean_normals_include_normal_maps() {
         "[textures.n]\ntype = 'image'\nfile = 'n.exr'\n[materials.m]\nnormal_map = { texture = 'n' }",
     );
     let packed = crate::textures::scene(&text, folder.path()).with_layers();
-    let (film, hits) = (on_all(&packed), first_hits(&packed, Way::Cpu));
+    let (film, hits) = (on_all(&packed), first_hits(&packed, RenderMode::Cpu));
     let mean = Vec3::from(film.layer(Layer::Normal, 1));
     assert!((mean - Vec3::new(0.6, -0.8, 0.0)).length() < 1e-5, "{mean}");
     assert_eq!(

@@ -7,7 +7,7 @@ use wgray_render::cpu::lens::{lens_ray, lens_sample};
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::records::Packed;
 
-use crate::pictures::{both, differing, exact_ways, means, render};
+use crate::pictures::{both, differing, exact_modes, means, render};
 use crate::scenes::{self, parse};
 
 /// Width and height of the image in pixels; `FOV` is in degrees.
@@ -120,11 +120,11 @@ fn the_focus_plane_is_sharp() {
     for way in both() {
         let with = means(&render(&spot(5.0, lens, 256), way));
         let without = means(&render(&spot(5.0, "", 256), way));
-        let off = means(&render(&spot(5.5, lens, 256), way));
+        let defocused = means(&render(&spot(5.5, lens, 256), way));
         // The pixel samples are equal, up to rounding at the edge of the disk.
-        let apart = |a: &[[f64; 3]]| a.iter().zip(&without).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>();
-        assert!(apart(&with) < 0.05, "{way:?}: {}", apart(&with));
-        assert!(apart(&off) > 1.0, "{way:?}: {}", apart(&off));
+        let difference = |a: &[[f64; 3]]| a.iter().zip(&without).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>();
+        assert!(difference(&with) < 0.05, "{way:?}: {}", difference(&with));
+        assert!(difference(&defocused) > 1.0, "{way:?}: {}", difference(&defocused));
     }
 }
 
@@ -232,8 +232,8 @@ fn lens_rays_converge_in_the_focus_plane() {
         for p in [Vec2::X, Vec2::new(-0.3, 0.9), Vec2::ZERO] {
             let ray = lens_ray(&packed.camera, at, p);
             let start = ray.origin - packed.camera.position;
-            let met = start + ray.direction * (4.0 / ray.direction.y);
-            assert!(met.distance(middle * (4.0 / middle.y)) < 2e-6, "{at} {p}: {met}");
+            let point = start + ray.direction * (4.0 / ray.direction.y);
+            assert!(point.distance(middle * (4.0 / middle.y)) < 2e-6, "{at} {p}: {point}");
             assert!((start - Vec3::new(0.2 * p.x, 0.0, 0.2 * p.y)).length() < 1e-6);
         }
     }
@@ -246,7 +246,7 @@ fn limits_of_the_ranges_render_equally() {
         for focus in ["1e-9", "1e-3", "1e9"] {
             let packed = spot(12.0, &format!("aperture = {aperture}\nfocus_distance = {focus}"), 16);
             assert_eq!(packed.specialization.lens == 0, aperture == "0");
-            let films: Vec<_> = exact_ways().into_iter().map(|way| render(&packed, way)).collect();
+            let films: Vec<_> = exact_modes().into_iter().map(|way| render(&packed, way)).collect();
             for film in &films {
                 assert!(film.sums.iter().all(|sum| sum.is_finite()), "{aperture} {focus}");
                 assert_eq!(differing(film, &films[0]), 0, "{aperture} {focus}");

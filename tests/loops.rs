@@ -8,7 +8,7 @@ use wgray_render::gpu::compose::Shaders;
 use wgray_render::job::{self, WorkSplit};
 use wgray_render::records::Packed;
 
-use crate::pictures::{Way, backend_with, differing, exact_ways, reference, render, whole};
+use crate::pictures::{RenderMode, backend_with, differing, exact_modes, reference, render, whole};
 use crate::sources::{self, edited, edited_shaders, with};
 use crate::{adapter, patterns, scenes};
 
@@ -55,8 +55,8 @@ fn planes(count: u32) -> Description {
     d
 }
 
-fn attempt(packed: &Packed, way: Way, shaders: &Shaders) -> Result<Film, RenderError> {
-    let mut backend = backend_with(packed, way, shaders);
+fn attempt(packed: &Packed, mode: RenderMode, shaders: &Shaders) -> Result<Film, RenderError> {
+    let mut backend = backend_with(packed, mode, shaders);
     let mut film = Film::new(whole(packed));
     let mut take = |rendered| {
         film = rendered;
@@ -100,7 +100,7 @@ fn driver_cuts_loops() -> bool {
     const ROUNDS: u32 = 1_000_000;
     let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 1));
     let unwatched = without_check(&looping(ROUNDS));
-    let film = attempt(&packed, Way::Buffers, &unwatched).expect("nothing that watches");
+    let film = attempt(&packed, RenderMode::Buffers, &unwatched).expect("nothing that watches");
     !has_rounds(&film, &reference(&packed), ROUNDS)
 }
 
@@ -138,14 +138,14 @@ fn long_renders_are_complete() {
     ] {
         let packed = scenes::packed(&description);
         let cpu = reference(&packed);
-        for way in exact_ways().into_iter().skip(1) {
-            assert_eq!(differing(&render(&packed, way), &cpu), 0, "{name}, {way:?}");
+        for mode in exact_modes().into_iter().skip(1) {
+            assert_eq!(differing(&render(&packed, mode), &cpu), 0, "{name}, {mode:?}");
         }
     }
     // Software division and square roots may contain loops.
     if adapter::device().is_some_and(adapter::bit_exact) {
         let packed = scenes::packed(&small("cornell.toml", (2, 2), 256, 64));
-        assert_eq!(differing(&render(&packed, Way::Rounded), &reference(&packed)), 0);
+        assert_eq!(differing(&render(&packed, RenderMode::Rounded), &reference(&packed)), 0);
     }
 }
 
@@ -155,30 +155,38 @@ fn too_long_samples_are_errors_or_correct() {
         return;
     }
     let cuts = driver_cuts_loops();
-    for (name, description, way) in [
-        ("light samples", small("cornell.toml", (2, 2), 1, 65_536), Way::Baked),
-        ("light samples", small("cornell.toml", (2, 2), 1, 65_536), Way::Buffers),
-        ("planes", planes(70_000), Way::Buffers),
+    for (name, description, mode) in [
+        (
+            "light samples",
+            small("cornell.toml", (2, 2), 1, 65_536),
+            RenderMode::Baked,
+        ),
+        (
+            "light samples",
+            small("cornell.toml", (2, 2), 1, 65_536),
+            RenderMode::Buffers,
+        ),
+        ("planes", planes(70_000), RenderMode::Buffers),
     ] {
         let packed = scenes::packed(&description);
-        match attempt(&packed, way, sources::shaders()) {
+        match attempt(&packed, mode, sources::shaders()) {
             Ok(film) => {
-                assert!(!cuts, "{name}, {way:?}: the driver truncates a loop");
-                assert_eq!(differing(&film, &reference(&packed)), 0, "{name}, {way:?}");
+                assert!(!cuts, "{name}, {mode:?}: the driver truncates a loop");
+                assert_eq!(differing(&film, &reference(&packed)), 0, "{name}, {mode:?}");
             }
             Err(RenderError::LoopTruncated { .. }) => assert!(
                 cuts,
-                "{name}, {way:?}: truncation reported by a driver that does not truncate"
+                "{name}, {mode:?}: truncation reported by a driver that does not truncate"
             ),
-            Err(error) => panic!("{name}, {way:?}: {error}"),
+            Err(error) => panic!("{name}, {mode:?}: {error}"),
         }
     }
     let packed = scenes::packed(&planes(70_000));
-    let mut backend = backend_with(&packed, Way::Buffers, sources::shaders());
+    let mut backend = backend_with(&packed, RenderMode::Buffers, sources::shaders());
     match job::first_hits(&mut *backend, whole(&packed)) {
         Ok(hits) => {
             assert!(!cuts, "the driver truncates the loop over the planes of the first hits");
-            let cpu = crate::pictures::first_hits(&packed, Way::Cpu);
+            let cpu = crate::pictures::first_hits(&packed, RenderMode::Cpu);
             assert_eq!(
                 bytemuck::cast_slice::<_, u8>(&hits),
                 bytemuck::cast_slice::<_, u8>(&cpu)
@@ -197,7 +205,7 @@ fn long_loops_of_edited_shaders_are_errors_or_correct() {
     let plain = reference(&packed);
     let cuts = driver_cuts_loops();
     for (rounds, too_long) in [(4, false), (60_000, false), (66_000, true), (1_000_000, true)] {
-        match attempt(&packed, Way::Buffers, &looping(rounds)) {
+        match attempt(&packed, RenderMode::Buffers, &looping(rounds)) {
             Ok(film) => {
                 assert!(!(cuts && too_long), "{rounds} rounds: truncation not detected");
                 assert!(has_rounds(&film, &plain, rounds), "{rounds} rounds: wrong image");
@@ -229,6 +237,6 @@ fn without_the_check_truncated_images_are_wrong() {
         return;
     }
     let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 65_536));
-    let film = attempt(&packed, Way::Baked, &without_check(sources::shaders())).expect("nothing that watches");
+    let film = attempt(&packed, RenderMode::Baked, &without_check(sources::shaders())).expect("nothing that watches");
     assert!(differing(&film, &reference(&packed)) > 0);
 }

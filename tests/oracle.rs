@@ -319,7 +319,7 @@ impl<'a> Oracle<'a> {
         for light in &self.scene.lights {
             let samples = self.samples(light, point);
             for (to_light, distance) in &samples {
-                // Also light above the triangle, but below the shading normal, is left out.
+                // Light above the triangle but below the shading horizon is excluded, too.
                 if shading.dot(*to_light) <= 0.0 {
                     continue;
                 }

@@ -14,7 +14,7 @@ use crate::{adapter, sources};
 
 /// A backend configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum RenderMode {
     Cpu,
     /// Exact SPIR-V, the scene as constants.
     Baked,
@@ -27,42 +27,42 @@ pub enum Way {
 }
 
 /// Returns one configuration per backend; only the CPU without a device.
-pub fn both() -> Vec<Way> {
-    let mut ways = vec![Way::Cpu];
-    ways.extend(adapter::device().map(|_| Way::Baked));
-    ways
+pub fn both() -> Vec<RenderMode> {
+    let mut modes = vec![RenderMode::Cpu];
+    modes.extend(adapter::device().map(|_| RenderMode::Baked));
+    modes
 }
 
 /// Returns the bit-identical configurations.
-pub fn exact_ways() -> Vec<Way> {
+pub fn exact_modes() -> Vec<RenderMode> {
     let exact = adapter::device().is_some_and(adapter::bit_exact);
     if exact {
-        vec![Way::Cpu, Way::Baked, Way::Buffers]
+        vec![RenderMode::Cpu, RenderMode::Baked, RenderMode::Buffers]
     } else {
-        vec![Way::Cpu]
+        vec![RenderMode::Cpu]
     }
 }
 
-/// Creates a backend. Panics if `way` needs a device and none is available.
-pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
-    backend_with(packed, way, sources::shaders())
+/// Creates a backend. Panics if `mode` needs a device and none is available.
+pub fn backend<'a>(packed: &'a Packed, mode: RenderMode) -> Box<dyn Backend + 'a> {
+    backend_with(packed, mode, sources::shaders())
 }
 
-pub fn backend_with<'a>(packed: &'a Packed, way: Way, shaders: &Shaders) -> Box<dyn Backend + 'a> {
-    if way == Way::Cpu {
+pub fn backend_with<'a>(packed: &'a Packed, mode: RenderMode, shaders: &Shaders) -> Box<dyn Backend + 'a> {
+    if mode == RenderMode::Cpu {
         return Box::new(Cpu::new(packed));
     }
     let device = adapter::device().expect("a device");
     let options = Options {
-        exact: match way {
-            Way::Plain => None,
-            Way::Rounded => device.info.exact.then_some(Rounding::Software),
+        exact: match mode {
+            RenderMode::Plain => None,
+            RenderMode::Rounded => device.info.exact.then_some(Rounding::Software),
             _ => device.info.exact.then_some(Rounding::Device),
         },
-        baked: way == Way::Baked,
+        baked: mode == RenderMode::Baked,
     };
     let gpu = Gpu::new(device, packed, shaders, options);
-    Box::new(gpu.unwrap_or_else(|error| panic!("{way:?}: {error}")))
+    Box::new(gpu.unwrap_or_else(|error| panic!("{mode:?}: {error}")))
 }
 
 pub fn whole(packed: &Packed) -> Region {
@@ -98,13 +98,18 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Wo
     all
 }
 
-pub fn render(packed: &Packed, way: Way) -> Film {
-    film(&mut *backend(packed, way), packed, whole(packed), &WorkSplit::default())
+pub fn render(packed: &Packed, mode: RenderMode) -> Film {
+    film(
+        &mut *backend(packed, mode),
+        packed,
+        whole(packed),
+        &WorkSplit::default(),
+    )
 }
 
-pub fn render_with(packed: &Packed, way: Way, shaders: &Shaders) -> Film {
+pub fn render_with(packed: &Packed, mode: RenderMode, shaders: &Shaders) -> Film {
     film(
-        &mut *backend_with(packed, way, shaders),
+        &mut *backend_with(packed, mode, shaders),
         packed,
         whole(packed),
         &WorkSplit::default(),
@@ -112,12 +117,12 @@ pub fn render_with(packed: &Packed, way: Way, shaders: &Shaders) -> Film {
 }
 
 pub fn reference(packed: &Packed) -> Film {
-    render(packed, Way::Cpu)
+    render(packed, RenderMode::Cpu)
 }
 
-pub fn first_hits(packed: &Packed, way: Way) -> Vec<FirstHit> {
-    let hits = wgray_render::job::first_hits(&mut *backend(packed, way), whole(packed));
-    hits.unwrap_or_else(|error| panic!("{way:?}: {error}"))
+pub fn first_hits(packed: &Packed, mode: RenderMode) -> Vec<FirstHit> {
+    let hits = wgray_render::job::first_hits(&mut *backend(packed, mode), whole(packed));
+    hits.unwrap_or_else(|error| panic!("{mode:?}: {error}"))
 }
 
 /// Counts the records that are not bit-identical: pixels, moments and layers.

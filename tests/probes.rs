@@ -724,7 +724,7 @@ fn inputs_cover_both_outcomes_of_predicates() {
     }
 }
 
-/// One ulp in a constant is detected.
+/// Checks that a change of one ulp in a constant is detected.
 #[test]
 fn a_difference_of_one_ulp_is_found() {
     let Some(device) = adapter::device() else { return };

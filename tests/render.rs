@@ -14,18 +14,18 @@ use wgray_render::records::{FirstHit, Packed};
 use crate::adapter::{self, KNOWN_DIFFERENCES, allowed, bit_exact, judge};
 use crate::nearly::{EDGES, Nearly};
 use crate::pictures::{
-    Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, render_with, whole,
+    RenderMode, backend, crop, differing, exact_modes, film, first_hits, reference, render, render_with, whole,
 };
 use crate::{patterns, scenes, sources};
 
 /// Returns an error if a GPU image exceeds the guaranteed tolerance.
-pub fn compare(way: Way, packed: &Packed, gpu: &Film, cpu: &Film) -> Result<(), String> {
+pub fn compare(mode: RenderMode, packed: &Packed, gpu: &Film, cpu: &Film) -> Result<(), String> {
     assert_eq!((gpu.region, gpu.sums.len()), (cpu.region, cpu.sums.len()));
     let device = adapter::device().expect("the device that rendered the image");
     if !bit_exact(device) {
         return Nearly::of(packed, gpu, cpu).judge();
     }
-    if way == Way::Plain {
+    if mode == RenderMode::Plain {
         return Nearly::by_plain_wgsl(gpu, cpu).judge();
     }
     let known = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "picture");
@@ -96,20 +96,23 @@ fn pictures_of_all_scenes_are_the_same() {
     if adapter::device().is_none() {
         return;
     }
-    let small = small_scenes()
-        .into_iter()
-        .map(|scene| (scene, [Way::Baked, Way::Buffers, Way::Plain].as_slice()));
+    let small = small_scenes().into_iter().map(|scene| {
+        (
+            scene,
+            [RenderMode::Baked, RenderMode::Buffers, RenderMode::Plain].as_slice(),
+        )
+    });
     let varied = variations()
         .into_iter()
-        .map(|scene| (scene, [Way::Baked, Way::Buffers].as_slice()));
+        .map(|scene| (scene, [RenderMode::Baked, RenderMode::Buffers].as_slice()));
     let (mut pixels, mut images, mut plain) = (0, 0, Nearly::default());
     for ((name, packed), ways) in small.chain(varied) {
         let cpu = reference(&packed);
-        for &way in ways {
-            let gpu = render(&packed, way);
-            let problem = compare(way, &packed, &gpu, &cpu);
-            assert!(problem.is_ok(), "{name}, {way:?}: {}", problem.unwrap_err());
-            if way == Way::Plain {
+        for &mode in ways {
+            let gpu = render(&packed, mode);
+            let problem = compare(mode, &packed, &gpu, &cpu);
+            assert!(problem.is_ok(), "{name}, {mode:?}: {}", problem.unwrap_err());
+            if mode == RenderMode::Plain {
                 plain.add(Nearly::by_plain_wgsl(&gpu, &cpu));
             } else {
                 (pixels, images) = (pixels + cpu.sums.len(), images + 1);
@@ -125,15 +128,15 @@ fn first_hits_of_all_scenes_agree() {
         return;
     }
     for (name, packed) in small_scenes() {
-        let cpu = first_hits(&packed, Way::Cpu);
-        for way in [Way::Baked, Way::Buffers] {
-            let problem = compare_hits(&first_hits(&packed, way), &cpu);
-            assert!(problem.is_ok(), "{name}, {way:?}: {}", problem.unwrap_err());
+        let cpu = first_hits(&packed, RenderMode::Cpu);
+        for mode in [RenderMode::Baked, RenderMode::Buffers] {
+            let problem = compare_hits(&first_hits(&packed, mode), &cpu);
+            assert!(problem.is_ok(), "{name}, {mode:?}: {}", problem.unwrap_err());
         }
     }
 }
 
-/// One ulp of a number, or one bit of a pixel, is detected.
+/// Checks that a change of one ulp in a number, or of one bit in a pixel, is detected.
 #[test]
 fn a_different_image_is_found() {
     let Some(device) = adapter::device() else { return };
@@ -143,7 +146,7 @@ fn a_different_image_is_found() {
         .expect("the scene");
     let cpu = reference(&packed);
     let nearly = |film: &Film| Nearly::by_plain_wgsl(film, &cpu).judge();
-    assert!(compare(Way::Baked, &packed, &cpu, &cpu).is_ok());
+    assert!(compare(RenderMode::Baked, &packed, &cpu, &cpu).is_ok());
     for (file, from, to) in [
         ("light.wgsl", "(2.0 * at.x - 1.0)", "(2.0000002 * at.x - 1.0)"),
         (
@@ -154,10 +157,10 @@ fn a_different_image_is_found() {
         ("math.wgsl", "v * (1.0 / sqrt(dot(v, v)))", "v / sqrt(dot(v, v))"),
     ] {
         let shaders = sources::edited_shaders(file, from, to);
-        let film = render_with(&packed, Way::Baked, &shaders);
+        let film = render_with(&packed, RenderMode::Baked, &shaders);
         if bit_exact(device) {
             assert!(
-                compare(Way::Baked, &packed, &film, &cpu).is_err(),
+                compare(RenderMode::Baked, &packed, &film, &cpu).is_err(),
                 "'{to}' in place of '{from}'"
             );
         }
@@ -167,7 +170,7 @@ fn a_different_image_is_found() {
     let mut other = cpu.clone();
     other.sums[77].y = f32::from_bits(other.sums[77].y.to_bits() + 1);
     assert!(
-        !bit_exact(device) || compare(Way::Baked, &packed, &other, &cpu).is_err(),
+        !bit_exact(device) || compare(RenderMode::Baked, &packed, &other, &cpu).is_err(),
         "one bit passes"
     );
     let mut other = cpu.clone();
@@ -182,7 +185,7 @@ fn a_different_image_is_found() {
     let mut other = cpu.clone();
     other.sums[5].x = f32::NAN;
     assert!(nearly(&other).is_err(), "NaN passes");
-    let hits = first_hits(&packed, Way::Cpu);
+    let hits = first_hits(&packed, RenderMode::Cpu);
     let mut other = hits.clone();
     other.iter_mut().take(20).for_each(|hit| hit.shape ^= 1);
     assert!(compare_hits(&other, &hits).is_err(), "another shape index passes");
@@ -198,16 +201,16 @@ fn a_larger_image_agrees() {
     description.render.pixel_samples.count = 4;
     let packed = scenes::packed(&description);
     let cpu = reference(&packed);
-    for way in [Way::Baked, Way::Plain] {
-        let gpu = render(&packed, way);
+    for mode in [RenderMode::Baked, RenderMode::Plain] {
+        let gpu = render(&packed, mode);
         println!(
-            "cornell.toml, 401 x 397, {way:?}: {} of {} pixels differ; {}",
+            "cornell.toml, 401 x 397, {mode:?}: {} of {} pixels differ; {}",
             differing(&gpu, &cpu),
             cpu.sums.len(),
             Nearly::by_plain_wgsl(&gpu, &cpu)
         );
-        let problem = compare(way, &packed, &gpu, &cpu);
-        assert!(problem.is_ok(), "{way:?}: {}", problem.unwrap_err());
+        let problem = compare(mode, &packed, &gpu, &cpu);
+        assert!(problem.is_ok(), "{mode:?}: {}", problem.unwrap_err());
     }
 }
 
@@ -233,23 +236,23 @@ fn images_do_not_depend_on_the_work_split() {
     for pattern in [Pattern::Grid, Pattern::Random] {
         let packed = scenes::packed(&with(&description, (45, 37), 3, pattern, (9, 4)));
         let expected = reference(&packed);
-        for way in exact_ways() {
-            let mut backend = backend(&packed, way);
-            let cut = |band_pixels, samples_per_dispatch, rows_per_dispatch| WorkSplit {
+        for mode in exact_modes() {
+            let mut backend = backend(&packed, mode);
+            let split = |band_pixels, samples_per_dispatch, rows_per_dispatch| WorkSplit {
                 band_pixels,
                 samples_per_dispatch,
                 rows_per_dispatch,
             };
-            for cut in [
-                cut(45 * 10, Some(1), Some(3)),
-                cut(1, Some(4), None), // a band has at least one row
-                cut(45 * 36, None, Some(1)),
-                cut(u64::MAX, None, Some(40)),
+            for split in [
+                split(45 * 10, Some(1), Some(3)),
+                split(1, Some(4), None), // a band has at least one row
+                split(45 * 36, None, Some(1)),
+                split(u64::MAX, None, Some(40)),
             ] {
                 assert_eq!(
-                    differing(&film(&mut *backend, &packed, whole(&packed), &cut), &expected),
+                    differing(&film(&mut *backend, &packed, whole(&packed), &split), &expected),
                     0,
-                    "{way:?}, {cut:?}"
+                    "{mode:?}, {split:?}"
                 );
             }
             // Any shape and order, each interrupted and continued.
@@ -267,13 +270,13 @@ fn images_do_not_depend_on_the_work_split() {
             assert_eq!(
                 differing(&pieces(&mut *backend, whole(&packed), &order), &expected),
                 0,
-                "{way:?}, tiles"
+                "{mode:?}, tiles"
             );
             order.sort_by_key(|(_, range)| range.start);
             assert_eq!(
                 differing(&pieces(&mut *backend, whole(&packed), &order), &expected),
                 0,
-                "{way:?}, samples"
+                "{mode:?}, samples"
             );
             // Another order of samples rounds differently.
             let film = pieces(
@@ -281,7 +284,7 @@ fn images_do_not_depend_on_the_work_split() {
                 whole(&packed),
                 &[(whole(&packed), 5..9), (whole(&packed), 0..5)],
             );
-            assert!(differing(&film, &expected) > 0, "{way:?}: the comparison cannot fail");
+            assert!(differing(&film, &expected) > 0, "{mode:?}: the comparison cannot fail");
         }
     }
 }
@@ -296,8 +299,8 @@ fn a_crop_is_a_part_of_the_whole() {
         (4, 4),
     ));
     let expected = reference(&packed);
-    for way in exact_ways() {
-        let mut backend = backend(&packed, way);
+    for mode in exact_modes() {
+        let mut backend = backend(&packed, mode);
         for part in [
             tile(0, 0, 1, 1),
             tile(3, 7, 60, 29),
@@ -306,7 +309,7 @@ fn a_crop_is_a_part_of_the_whole() {
             tile(11, 5, 30, 37),
         ] {
             let found = film(&mut *backend, &packed, part, &WorkSplit::default());
-            assert_eq!(differing(&found, &crop(&expected, part)), 0, "{way:?}, {part:?}");
+            assert_eq!(differing(&found, &crop(&expected, part)), 0, "{mode:?}, {part:?}");
         }
     }
     let moved = Film {

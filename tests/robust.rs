@@ -85,11 +85,11 @@ fn near_an_edge(description: &Description, pixel: usize) -> bool {
     };
     let here = value(description);
     let far = |moved: Description| (value(&moved) - here).abs().max_element() > 1e-3;
-    let ways = [DVec3::X, DVec3::Y, DVec3::Z].map(|way| way * ROUNDING);
-    let moves = ways.into_iter().chain(ways.map(|way| -way));
+    let offsets = [DVec3::X, DVec3::Y, DVec3::Z].map(|offset| offset * ROUNDING);
+    let moves = offsets.into_iter().chain(offsets.map(|offset| -offset));
     moves
         .into_iter()
-        .any(|way| far(light_moved(description, way)) || far(camera_moved(description, way)))
+        .any(|offset| far(light_moved(description, offset)) || far(camera_moved(description, offset)))
 }
 
 fn light_moved(description: &Description, way: DVec3) -> Description {
@@ -118,7 +118,7 @@ fn camera_moved(description: &Description, way: DVec3) -> Description {
 /// The segment from pixel (15, 193) to the first light sample passes an edge of the tetrahedron at 4e-7, so the scale
 /// decides its occlusion.
 #[test]
-fn the_unit_of_length_changes_only_the_last_digits_of_edges() {
+fn scaling_changes_pixels_only_near_edges() {
     let (scene, expected) = (cornell(), reference(&packed(&cornell())));
     for scale in [0.001, 0.3, 7.7, 1000.0] {
         let found = reference(&packed(&transformed(&scene, scale, DVec3::ZERO)));
@@ -134,13 +134,13 @@ fn the_unit_of_length_changes_only_the_last_digits_of_edges() {
 /// Checks offsets up to 1000 times the scene's size and more: coordinates are relative to a point near the look-at
 /// point.
 #[test]
-fn the_position_of_the_origin_is_invisible() {
+fn translation_does_not_change_the_image() {
     for offset in [100.0, -2000.0, 1e6] {
         let (found, expected) = (transformed(&cornell(), 1.0, DVec3::splat(offset)), cornell());
         let (found, expected) = (reference(&packed(&found)), reference(&packed(&expected)));
         assert_eq!(found, expected, "moved by {offset}");
     }
-    // Not multiples of the grid of that origin.
+    // Offsets that are not multiples of the grid of possible origins.
     for offset in [1999.3, -77_777.7] {
         let found = visible(offset, 0.0);
         assert!(found.is_empty(), "moved by {offset}: pixels {found:?}");

@@ -8,7 +8,7 @@ use wgray_render::gpu::compose::{ROUNDING, Shaders, Source};
 use crate::adapter::{self, bit_exact};
 use crate::kernel::functions;
 use crate::nearly::Nearly;
-use crate::pictures::{Way, differing, reference, render_with};
+use crate::pictures::{RenderMode, differing, reference, render_with};
 use crate::random::Random;
 use crate::render::small_scenes;
 use crate::sources::{edited, parse, shaders, shaders_with};
@@ -187,7 +187,7 @@ fn images_keep_their_guarantees_on_an_imprecise_device() {
     let corrected = shaders_with(ROUNDING, &over_a_poor_device());
     for (name, packed) in small_scenes() {
         let cpu = reference(&packed);
-        let found = render_with(&packed, Way::Rounded, poor_shaders());
+        let found = render_with(&packed, RenderMode::Rounded, poor_shaders());
         let (differ, nearly) = (differing(&found, &cpu), Nearly::of(&packed, &found, &cpu));
         println!(
             "{name} on a poor device: {differ} of {} pixels differ by a bit at least; {nearly}",
@@ -200,7 +200,7 @@ fn images_keep_their_guarantees_on_an_imprecise_device() {
             nearly.judge().unwrap_err()
         );
         for (device, shaders) in [("a corrected one", &corrected), ("this one", shaders())] {
-            let found = render_with(&packed, Way::Rounded, shaders);
+            let found = render_with(&packed, RenderMode::Rounded, shaders);
             assert_eq!(differing(&found, &cpu), 0, "{name} on {device}");
         }
     }

@@ -39,7 +39,7 @@ fn load(scene: &Table, folder: &Path) -> Result<(), String> {
     checked.map(|_| ()).map_err(|problem| problem.to_string())
 }
 
-/// Together these have every key.
+/// Scenes that together use every key.
 const EVERY: [&str; 4] = [
     r#"
 [image]
@@ -458,7 +458,7 @@ fn at<'a>(scene: &'a mut Value, place: &[Step]) -> &'a mut Value {
     })
 }
 
-/// Puts other values at one place.
+/// Returns the scene with other values at one place.
 fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
     let floats = [-1e10, -400.0, -0.5, -1e-12, 0.0, 1e-12, 0.5, 1.5, 1e7, 1e10];
     let wholes = [-1, 0, 2, 17, 101, 1025, 65_537, 5_000_000_000_i64];
@@ -507,7 +507,7 @@ fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
 fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
     match (fits(scene), load(scene, folder)) {
         (false, Ok(())) => Some(format!("only the schema rejects {scene}")),
-        // To JSON, 1.0 is an integer.
+        // JSON Schema treats 1.0 as an integer.
         (true, Err(message))
             if message.contains(".0 must be ")
                 && ["whole number", "a name or a number"]

@@ -138,7 +138,7 @@ fn positions_are_on_the_unit_square() {
     }
 }
 
-/// Each single position, and all of a pixel together, are uniform.
+/// Checks that each position, and all positions of a pixel together, are uniform.
 #[test]
 fn random_patterns_are_uniform_over_pixels() {
     let mut tested = 0;
@@ -217,7 +217,7 @@ fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
     (0..truth.len()).map(pixel).collect()
 }
 
-/// Mean and mean square are at most those of a normal distribution.
+/// Checks that mean and mean square of the deviations are at most those of a normal distribution.
 fn unbiased(deviations: &[f64]) -> Result<(), String> {
     let n = deviations.len() as f64;
     let mean = deviations.iter().sum::<f64>() / n;

@@ -11,7 +11,7 @@ use wgray_render::film::Film;
 use wgray_render::pack::pack;
 use wgray_render::records::{FirstHit, Packed};
 
-use crate::pictures::{Way, first_hits, reference};
+use crate::pictures::{RenderMode, first_hits, reference};
 use crate::random_scenes::any_scene;
 use crate::render::{small_scenes, variations};
 use crate::sources;
@@ -66,7 +66,10 @@ fn line(name: &str, packed: &Packed) -> String {
     let layers = layers.concat();
     let film = crc32fast::hash(cast_slice(&[sums, moments, layers].concat()));
     let hits = crc32fast::hash(cast_slice(
-        &first_hits(packed, Way::Cpu).iter().map(old_words).collect::<Vec<_>>(),
+        &first_hits(packed, RenderMode::Cpu)
+            .iter()
+            .map(old_words)
+            .collect::<Vec<_>>(),
     ));
     format!("{film:08x} {hits:08x} {name}\n")
 }

@@ -114,7 +114,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
             if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
                 surface.ray_origin += surface.terminator_offset;
             }
-            if (MATERIALS & FACET_KINDS) != 0u {
+            if (MATERIALS & MICROFACET_KINDS) != 0u {
                 if has_facets(material) {
                     let frame = facet_frame(surface, material);
                     surface.du = frame.u;
@@ -285,7 +285,7 @@ fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, mate
     var from_side = surface;
     var to = light.to;
     var absorption = state.absorption;
-    if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
+    if ((MATERIALS & TRANSMISSIVE_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
         if is_transmissive(material) & (dot(surface.normal, to) < 0.0) {
             from_side = flipped(surface);
             to = light.to + select(vec3f(0.0), surface.ray_origin - from_side.ray_origin, light.t_max < 2.0);
@@ -323,7 +323,7 @@ fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material
     let throughput = before.path.throughput * factor;
     state.path = Path(Ray(surface.ray_origin, wi), Differential(), throughput, before.path.depth + 1u, 0u, surface.exclude_front, surface.exclude_back);
     state.pdf = reflected.pdf;
-    if (MATERIALS & FACET_KINDS) != 0u {
+    if (MATERIALS & MICROFACET_KINDS) != 0u {
         if has_facets(material) {
             let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
             state = apply_lobe_sample(before, prim, surface, material, facet_sample(material, wo, u, random));
@@ -351,7 +351,7 @@ fn apply_lobe_sample(before: PathState, prim: HitPrimitive, surface: Surface, ma
     let wi = normalize(vector_from_lobe(frame, surface.shading_normal, found.wi));
     let weight = select(vec3f(0.0), found.weight, direction_allowed(prim, surface, material, wi));
     var from_side = surface;
-    if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
+    if ((MATERIALS & TRANSMISSIVE_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
         if found.wi.z < 0.0 {
             from_side = flipped(surface);
             state.eta2 = before.eta2 * found.eta * found.eta;

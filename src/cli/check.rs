@@ -89,7 +89,7 @@ fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &S
     let scene = super::load(path, overrides)?;
     let invisible = scene.visibility_warnings().into_iter().map(Note::from);
     for note in scene.notes.iter().cloned().chain(invisible) {
-        log::say(Level::Warning, &super::located(path, &note));
+        log::print(Level::Warning, &super::located(path, &note));
     }
     let frames = check_path(&scene)?;
     let packed = pack(&scene);

@@ -69,7 +69,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let loaded = Scene::load_described(&args.scene, &overrides);
     let (scene, description) = loaded.map_err(|error| plain(error.into()))?;
     for note in &scene.notes {
-        log::say(Level::Warning, &super::located(&args.scene, note));
+        log::print(Level::Warning, &super::located(&args.scene, note));
     }
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
     keep_inputs("--output", &output, &inputs, "choose another name")?;
@@ -104,7 +104,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let (name, folder) = (args.output.display(), folder.display());
         let option = quoted(&from_here(&needed).to_string_lossy());
         let text = format!("{name}: refers to files outside of {folder}; pass --asset-root {option} to render it");
-        log::say(Level::Note, &text);
+        log::print(Level::Note, &text);
     }
     Ok(ExitCode::SUCCESS)
 }

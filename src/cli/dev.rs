@@ -143,7 +143,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             "{address} is not a loopback address: anyone who can reach it can view the scene and edit values of the scene \
              file"
         );
-        log::say(Level::Warning, &warning);
+        log::print(Level::Warning, &warning);
     }
     listener.serve(&session)?;
     Ok(ExitCode::SUCCESS)
@@ -309,7 +309,7 @@ impl Terminal {
                     .marked_line()
                     .map(|excerpt| ("excerpt".to_owned(), excerpt.into())),
             );
-            log::tell(Level::Error, &format!("{location}{}", problem.message), facts);
+            log::print_with(Level::Error, &format!("{location}{}", problem.message), facts);
             return;
         }
         let head = format!(
@@ -338,7 +338,7 @@ impl Terminal {
     fn line(self, color: &str, text: &str) {
         if log::is_json() {
             let level = if color == RED { Level::Error } else { Level::Info };
-            return log::say(level, text);
+            return log::print(level, text);
         }
         say(&format!("{} {}\n", clock(), self.painted(color, text)));
     }

@@ -84,12 +84,12 @@ pub fn asked(arguments: impl Iterator<Item = std::ffi::OsString>) -> Format {
 }
 
 /// Prints a message.
-pub fn say(level: Level, message: &str) {
-    tell(level, message, Facts::new());
+pub fn print(level: Level, message: &str) {
+    print_with(level, message, Facts::new());
 }
 
 /// Prints a message with additional JSON fields.
-pub fn tell(level: Level, message: &str, facts: Facts) {
+pub fn print_with(level: Level, message: &str, facts: Facts) {
     if !is_json() {
         write(&escape_control(&format!("{}{message}", level.prefix())));
         return;
@@ -117,7 +117,7 @@ pub fn tell(level: Level, message: &str, facts: Facts) {
 }
 
 /// Prints text that continues the previous message; a JSON message has it in its fields instead.
-pub fn explain(text: &str) {
+pub fn print_continuation(text: &str) {
     if !is_json() {
         write(&escape_control_in_lines(text));
     }
@@ -133,7 +133,7 @@ pub fn catch_panics() {
     if is_json() {
         std::panic::set_hook(Box::new(|panic| {
             let facts = Facts::from_iter([("exit_code".to_owned(), Value::from(101))]);
-            tell(Level::Error, &panic.to_string(), facts);
+            print_with(Level::Error, &panic.to_string(), facts);
         }));
     }
 }
@@ -190,7 +190,7 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Objects {
             tracing::Level::INFO => Level::Info,
             _ => Level::Debug,
         };
-        tell(level, &message, all.0);
+        print_with(level, &message, all.0);
     }
 }
 

@@ -64,7 +64,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let Files::Pictures(targets) = begun.files else {
         return Ok(ExitCode::SUCCESS); // unreachable: merge does not write parts
     };
-    let options = args.pictures.save_options(parts.told());
+    let options = args.pictures.save_options(parts.metadata());
     let written = image::save(targets, &layout, &options, &mut |sink| {
         parts.read(&mut |band| match stop.signal() {
             None => sink(band),
@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         (Err(error), _) => Err(error.into()),
         (Ok(saved), _) => {
             if !args.quiet {
-                args.pictures.warn(&saved, &mut |line| log::say(Level::Warning, line));
+                args.pictures.warn(&saved, &mut |line| log::print(Level::Warning, line));
             }
             Ok(ExitCode::SUCCESS)
         }

@@ -155,7 +155,7 @@ pub fn main() -> ExitCode {
             let code = retry.map_or_else(|| exit_code(&error), |(code, _)| code);
             report(&error, code);
             if retry.is_some_and(|(_, quiet)| !quiet) {
-                log::say(Level::Note, &format!("exit code {code} requests another attempt"));
+                log::print(Level::Note, &format!("exit code {code} requests another attempt"));
             }
             ExitCode::from(code)
         }
@@ -196,7 +196,7 @@ fn explain(error: &clap::Error) -> ExitCode {
     let message = message.strip_prefix("error: ").unwrap_or(message);
     let facts = [("exit_code", Value::from(2)), ("help", Value::from(help.trim()))];
     let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
-    log::tell(Level::Error, &message, facts_of(facts));
+    log::print_with(Level::Error, &message, facts_of(facts));
     ExitCode::from(2)
 }
 
@@ -281,10 +281,10 @@ fn report(error: &anyhow::Error, code: u8) {
             let all = numbers.map(|(name, number)| (name, number.map(Value::from)));
             let known = all.into_iter().chain(texts);
             facts.extend(known.filter_map(|(name, value)| Some((name.to_owned(), value?))));
-            log::tell(Level::Error, &error.to_string(), facts);
+            log::print_with(Level::Error, &error.to_string(), facts);
         }
         if let Some(more) = more {
-            log::tell(Level::Error, &more, facts_of([("exit_code", code)]));
+            log::print_with(Level::Error, &more, facts_of([("exit_code", code)]));
         }
         return;
     }
@@ -295,7 +295,7 @@ fn report(error: &anyhow::Error, code: u8) {
             _ => "",
         };
         let facts = facts_of([("exit_code", code.clone())]);
-        log::tell(Level::Error, &format!("{error:#}{hint}"), facts);
+        log::print_with(Level::Error, &format!("{error:#}{hint}"), facts);
     }
     for error in shader {
         let mut facts = facts_of([("exit_code", code.clone())]);
@@ -313,9 +313,9 @@ fn report(error: &anyhow::Error, code: u8) {
         if let Some(excerpt) = &error.excerpt {
             facts.insert("excerpt".to_owned(), excerpt.as_str().into());
         }
-        log::tell(Level::Error, &error.to_string(), facts);
+        log::print_with(Level::Error, &error.to_string(), facts);
         if let Some(excerpt) = &error.excerpt {
-            log::explain(excerpt);
+            log::print_continuation(excerpt);
         }
     }
 }
@@ -333,7 +333,7 @@ fn ended(printed: io::Result<()>, code: ExitCode) -> ExitCode {
     match printed.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             let facts = facts_of([("exit_code", NOT_WRITTEN.into())]);
-            log::tell(
+            log::print_with(
                 Level::Error,
                 &format!("standard output: cannot be written: {error}"),
                 facts,

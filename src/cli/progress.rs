@@ -99,7 +99,7 @@ impl Progress {
             Display::Openjd => {
                 let hundredths = (fraction * 100.0) as u32;
                 if hundredths > self.printed.0 {
-                    log::say(Level::Progress, &format!("openjd_progress: {hundredths}"));
+                    log::print(Level::Progress, &format!("openjd_progress: {hundredths}"));
                     self.printed.0 = hundredths;
                 }
             }
@@ -123,7 +123,7 @@ impl Progress {
             ("seconds", seconds.into()),
         ]);
         facts.extend(self.frame.map(|frame| ("frame".to_owned(), frame.into())));
-        log::tell(Level::Progress, &line, facts);
+        log::print_with(Level::Progress, &line, facts);
     }
 }
 

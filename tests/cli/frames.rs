@@ -72,7 +72,7 @@ fn a_frame_equals_a_still_image_of_its_camera() {
         for name in ["alone.exr", "3.exr"] {
             assert_eq!(bits(&place, name), bits(&place, "still.exr"), "{name}");
         }
-        // Without `--frames`, the camera of the file outside of its path.
+        // Without `--frames`, the camera's own keys apply; here they equal those of frame 5.
         quietly(&place, &["moving.toml", "-o", "itself.exr"]);
         assert_eq!(bits(&place, "itself.exr"), bits(&place, "out.005.exr"));
     }

@@ -61,7 +61,7 @@ fn a_model_renders_without_a_scene() {
             "{line}"
         );
     }
-    // Both file forms give the same image. Its margin of 5 % is less than a pixel.
+    // Both file forms give the same image. The margin of 5 % around the model is less than a pixel.
     quietly(
         &place,
         &["box.glb", "--background", "none", "-o", "box.png", "-o", "box.exr"],

@@ -135,10 +135,10 @@ fn info_selects_the_same_device_as_a_render() {
         ]);
         assert_eq!(ran.code, 0, "{}", ran.stderr);
         let stats: Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
-        assert_eq!(foreseen["device"]["name"], stats["device"], "{scene}");
+        assert_eq!(planned["device"]["name"], stats["device"], "{scene}");
         assert!(
-            foreseen["device"]["why"].as_str().is_some_and(|why| why.len() > 10),
-            "{foreseen}"
+            planned["device"]["why"].as_str().is_some_and(|why| why.len() > 10),
+            "{planned}"
         );
     }
     let on_gpu = info(&place, &["small.toml", "--device", "gpu"]);

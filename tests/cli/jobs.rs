@@ -221,13 +221,13 @@ fn a_second_writer_waits_and_resumes() {
 fn a_farm_ends_one_that_waits(place: &TestFolder, options: &[&str]) {
     let waiting = start(place, &[options, &["-o", "third.exr", "--requeue-exit", "75"]].concat());
     let id = waiting.id().to_string();
-    let heeds = || {
+    let catches_sigterm = || {
         let status = std::fs::read_to_string(format!("/proc/{id}/status")).expect("a process");
         let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
         let caught = u64::from_str_radix(caught.expect("signals").trim(), 16).expect("a number");
         caught >> (libc::SIGTERM - 1) & 1 == 1
     };
-    while !heeds() {
+    while !catches_sigterm() {
         std::thread::sleep(Duration::from_millis(1));
     }
     let status = std::process::Command::new("kill").args(["-TERM", &id]).status();
@@ -482,8 +482,8 @@ fn a_full_disk_keeps_the_checkpoint() {
     assert!(place.read("out.exr") == expected);
 }
 
-/// Renders to a full and to a read-only file system, in a separate mount namespace. Where mount namespaces are not
-/// permitted, the test above with its file size limit and a read-only folder replace it.
+/// Renders to a full and to a read-only file system, in a separate mount namespace. Where that is not permitted, only
+/// the file size limit above and a read-only folder are tested.
 #[cfg(target_os = "linux")]
 #[test]
 fn full_and_read_only_file_systems() {

@@ -26,13 +26,13 @@ fn every_command_has_a_page() {
     wanted.push("wgray.1".to_owned());
     wanted.sort();
     let folder = place.folder().join("pages/man1");
-    let mut there: Vec<String> = std::fs::read_dir(&folder)
+    let mut found: Vec<String> = std::fs::read_dir(&folder)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
-    there.sort();
-    assert_eq!(there, wanted);
-    for name in there {
+    found.sort();
+    assert_eq!(found, wanted);
+    for name in found {
         let page = std::fs::read_to_string(folder.join(&name)).unwrap();
         for part in [
             ".TH WGRAY",

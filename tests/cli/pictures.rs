@@ -379,8 +379,8 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
     let over_black = read_exr(&place.path("a.exr")).unwrap().colors;
     for (found, color) in jpeg.pixels().zip(over_black) {
         let expected = ViewSettings::default().rgb8(color);
-        let apart = found.0.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max();
-        assert!(apart <= Some(12), "{found:?} {expected:?}");
+        let difference = found.0.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max();
+        assert!(difference <= Some(12), "{found:?} {expected:?}");
     }
 }
 
@@ -488,9 +488,9 @@ fn images_have_metadata() {
     ] {
         assert_eq!(software, png["Software"], "{name}");
         for (key, value) in &png {
-            let there = lines.lines().any(|line| line == format!("{key}: {value}"));
+            let is_listed = lines.lines().any(|line| line == format!("{key}: {value}"));
             let of_display = ["view_transform", "exposure"].contains(&key.as_str()) && name == "a.exr";
-            assert_eq!(there, key != "Software" && !of_display, "{name}: {key}");
+            assert_eq!(is_listed, key != "Software" && !of_display, "{name}: {key}");
         }
     }
 }

@@ -190,8 +190,8 @@ fn a_turntable_is_one_full_turn() {
         &["ball.toml", "--turntable", "4", "--frames", "3", "-o", "alone.exr"],
     );
     let names = ["t.01.exr", "t.02.exr", "t.03.exr", "t.04.exr"];
-    let there = place.files_but(|name| !name.starts_with("t."));
-    assert_eq!(there, names);
+    let found = place.files_but(|name| !name.starts_with("t."));
+    assert_eq!(found, names);
     // The first frame is the still image. After a quarter turn the camera is at +x of its target, after a half at +y.
     assert_eq!(place.read("t.01.exr"), place.read("still.exr"));
     assert_eq!(place.read("t.03.exr"), place.read("alone.exr"));
@@ -202,11 +202,11 @@ fn a_turntable_is_one_full_turn() {
         );
         quietly(&place, &["at.toml", "-o", "at.exr"]);
         let pixels = |name: &str| image::open(place.path(name)).unwrap().into_rgb32f().into_raw();
-        let apart = pixels("at.exr")
+        let differences = pixels("at.exr")
             .into_iter()
             .zip(pixels(name))
             .map(|(a, b)| (a - b).abs());
-        apart.fold(0.0, f32::max)
+        differences.fold(0.0, f32::max)
     };
     assert!(at("[4.5, -0.5, 1]", "t.02.exr") < 1e-3);
     assert!(at("[1, 4, 1]", "t.03.exr") < 1e-3);

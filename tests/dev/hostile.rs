@@ -153,17 +153,17 @@ fn a_path_of_a_megabyte_is_rejected_with_a_short_message() {
         "\u{1b}".repeat(1 << 20),
         format!("materials.\"{}\".shininess", "é".repeat(1 << 19)),
     ] {
-        let heard = running.state().heard;
+        let executed = running.state().executed;
         running.session.send(Command::Set(Set {
             path,
             value: json!("x".repeat(1 << 20)),
             gesture: None,
         }));
         running.wait("the command to be followed", |running| {
-            (running.state().heard > heard).then_some(())
+            (running.state().executed > executed).then_some(())
         });
         let notice = running.state().notice.clone().unwrap();
-        assert!(notice.bad && notice.command == running.state().heard);
+        assert!(notice.bad && notice.command == running.state().executed);
         assert!(
             notice.text.chars().count() < 1000 && !notice.text.contains('\u{1b}'),
             "{}",

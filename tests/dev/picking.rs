@@ -59,17 +59,17 @@ fn line(text: &str, of: &str) -> usize {
 
 /// Sets a value and returns the error, if any.
 fn set(running: &Running, path: &str, value: serde_json::Value) -> Option<String> {
-    let heard = running.state().heard;
+    let executed = running.state().executed;
     running.session.send(Command::Set(Set {
         path: path.to_owned(),
         value,
         gesture: None,
     }));
     running.wait("the command to be followed", |running| {
-        (running.state().heard > heard).then_some(())
+        (running.state().executed > executed).then_some(())
     });
     let state = running.state();
-    let notice = state.notice.clone().filter(|notice| notice.command == state.heard);
+    let notice = state.notice.clone().filter(|notice| notice.command == state.executed);
     notice.filter(|notice| notice.bad).map(|notice| notice.text)
 }
 

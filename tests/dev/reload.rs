@@ -44,9 +44,9 @@ fn a_partly_written_scene_is_not_an_error() {
         let start = Instant::now();
         files.write("scene.toml", half);
         let mut was_silent = true;
-        let mut look = || was_silent &= running.state().problems.is_empty();
+        let mut check = || was_silent &= running.state().problems.is_empty();
         while start.elapsed() < Duration::from_millis(50) {
-            look();
+            check();
             std::thread::sleep(Duration::from_millis(1));
         }
         files.write(
@@ -54,7 +54,7 @@ fn a_partly_written_scene_is_not_an_error() {
             &SCENE.replace("radius = 0.5", &format!("radius = 0.{}", 3 + i)),
         );
         while start.elapsed() < Duration::from_millis(300) {
-            look();
+            check();
             std::thread::sleep(Duration::from_millis(1));
         }
         was_silent

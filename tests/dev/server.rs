@@ -156,7 +156,7 @@ fn the_server_answers_its_own_pages_only() {
 }
 
 #[test]
-fn images_are_sent_to_same_origin_requests_and_accepted_from_the_page_only() {
+fn images_are_not_sent_to_foreign_origins_and_accepted_from_the_page_only() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);

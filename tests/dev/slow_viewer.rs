@@ -91,14 +91,14 @@ fn a_slow_connection_does_not_delay_camera_moves() {
         }
     }
     let start = Instant::now();
-    let heard = session.state().heard;
+    let executed = session.state().executed;
     loop {
         match viewer.receive().unwrap() {
             Received::Frame(header, size) => {
                 largest = largest.max(size); // frames are finer when the camera is at rest
                 viewer.acknowledge(&header);
             }
-            Received::Text(message) if message["state"]["heard"].as_u64() >= Some(heard) => break,
+            Received::Text(message) if message["state"]["executed"].as_u64() >= Some(executed) => break,
             Received::Text(_) => {}
         }
     }

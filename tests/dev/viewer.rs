@@ -146,8 +146,8 @@ impl Viewer {
                 assert_eq!(notice["bad"], json!(true), "{text}: {notice}");
                 return notice["text"].as_str().unwrap().to_owned();
             }
-            let heard = message["state"]["heard"].as_u64();
-            assert!(number.is_none() || heard < number, "{text} was followed");
+            let executed = message["state"]["executed"].as_u64();
+            assert!(number.is_none() || executed < number, "{text} was followed");
         }
     }
 }

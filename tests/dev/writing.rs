@@ -17,10 +17,10 @@ fn set(running: &Running, path: &str, value: Value, gesture: Option<u64>) {
 
 #[track_caller]
 fn follow(running: &Running, command: Command) {
-    let heard = running.state().heard;
+    let executed = running.state().executed;
     running.session.send(command);
     running.wait("the command to be followed", |running| {
-        (running.state().heard > heard).then_some(())
+        (running.state().executed > executed).then_some(())
     });
 }
 
@@ -29,7 +29,7 @@ fn follow(running: &Running, command: Command) {
 fn refused(running: &Running) -> String {
     let state = running.state();
     let notice = state.notice.clone().unwrap();
-    assert!(notice.bad && notice.command == state.heard, "{notice:?}");
+    assert!(notice.bad && notice.command == state.executed, "{notice:?}");
     notice.text
 }
 
@@ -239,7 +239,7 @@ fn changes_of_another_program_are_not_undone() {
     follow(&running, Command::UndoWrite);
     let refused = refused(&running);
     assert!(refused.contains("changed by another program"), "{refused}");
-    // The next change keeps that of the editor.
+    // The next change of the page keeps the change of the other program.
     set(&running, "camera.fov", json!(55), None);
     assert_eq!(files.read("scene.toml"), edited.replace("fov = 50", "fov = 55"));
     follow(&running, Command::UndoWrite);

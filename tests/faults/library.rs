@@ -34,14 +34,14 @@ fn in_a_process_of_its_own() {
         device: Device::Gpu,
         ..Options::default()
     };
-    let mut looks = 0;
+    let mut callbacks = 0;
     let grown = wgray::render_progressive(&scene, &options, &mut |progress| {
         progress.picture()?;
-        looks += 1;
+        callbacks += 1;
         Ok(ControlFlow::Continue(()))
     });
     assert_eq!(grown.expect("an image").pixels(), expected.pixels());
-    assert!(looks > 0);
+    assert!(callbacks > 0);
 }
 
 #[test]

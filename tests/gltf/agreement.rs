@@ -5,7 +5,7 @@ use wgray_render::pack::pack;
 
 use super::build::{Builder, Packing, QUAD, QUAD_UVS};
 use super::read::scene_with;
-use crate::pictures::{Way, differing, exact_ways, reference, render};
+use crate::pictures::{RenderMode, differing, exact_modes, reference, render};
 
 #[test]
 fn a_file_has_the_same_bits_on_cpu_and_gpu() {
@@ -69,8 +69,8 @@ fn a_file_has_the_same_bits_on_cpu_and_gpu() {
     (scene.width, scene.height) = (24, 24);
     let packed = pack(&scene);
     let known = reference(&packed);
-    for way in exact_ways().into_iter().filter(|way| *way == Way::Baked) {
-        assert_eq!(differing(&render(&packed, way), &known), 0, "{way:?}");
+    for mode in exact_modes().into_iter().filter(|mode| *mode == RenderMode::Baked) {
+        assert_eq!(differing(&render(&packed, mode), &known), 0, "{mode:?}");
     }
     // Control: another strength of the normal map.
     builder.get("materials")[material]["normalTexture"]["scale"] = json!(0.6);

@@ -394,7 +394,7 @@ fn morph_targets_are_applied_before_skinning() {
 }
 
 #[test]
-fn pointers_to_unsupported_properties_are_ignored() {
+fn animation_pointers_are_ignored() {
     let mut builder = moving("translation", "STEP", &[0.0], &[[1.0, 0.0, 0.0]]);
     builder.uses("KHR_animation_pointer");
     let animation = &mut builder.get("animations")[0];

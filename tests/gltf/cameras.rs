@@ -75,7 +75,7 @@ fn the_files_camera_is_where_its_node_is() {
         assert_eq!((scene.width, scene.height), (720, if wide { 360 } else { 720 }));
         let camera = scene.camera;
         assert_near(to_file(camera.position).to_array(), [1.0, 2.0, 5.0]);
-        // It looks along -z of its node, without the scale.
+        // The camera looks along -z of its node; the node's scale is ignored.
         let forward = DQuat::from_rotation_y(0.5) * -DVec3::Z;
         assert_near(to_file(camera.forward).to_array(), forward.to_array());
         assert_near(to_file(camera.up).to_array(), [0.0, 1.0, 0.0]);

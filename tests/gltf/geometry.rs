@@ -32,7 +32,7 @@ fn a_buffer_in_the_file_beside_it_and_in_a_data_uri_is_the_same() {
                 assert_eq!((uv.x, uv.y), ((corner.x + 1.0) / 2.0, (1.0 - corner.y) / 2.0));
             }
         }
-        // The watched files.
+        // The files of the scene include a separate buffer.
         let beside = usize::from(packing == Packing::Beside);
         assert_eq!(scene.files.len(), 1 + beside, "{:?}", scene.files);
     }
@@ -248,7 +248,7 @@ fn sparse_accessors_replace_what_is_there_or_zeros() {
         accessor["min"] = json!(end(f64::min));
         accessor["max"] = json!(end(f64::max));
         let position = builder.add("accessors", accessor);
-        // Without a base two corners are zero: only one triangle has three different corners.
+        // Without a base accessor two corners are at the origin, so that only one triangle remains.
         let order: &[u32] = if based { &QUAD_INDICES } else { &[0, 1, 3] };
         let indices = builder.indices(order);
         let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });

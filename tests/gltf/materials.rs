@@ -237,11 +237,11 @@ fn veil(mode: &str, cutoff: Option<f64>) -> Scene {
 
 #[test]
 fn alpha_does_what_its_mode_says() {
-    let (there, behind) = ([0.25, 0.5, 0.75], [1.0; 3]);
-    assert_all(&veil("OPAQUE", None), there);
+    let (surface, behind) = ([0.25, 0.5, 0.75], [1.0; 3]);
+    assert_all(&veil("OPAQUE", None), surface);
     assert_all(&veil("MASK", None), behind);
-    assert_all(&veil("MASK", Some(0.375)), there);
-    assert_all(&veil("MASK", Some(0.0)), there);
+    assert_all(&veil("MASK", Some(0.375)), surface);
+    assert_all(&veil("MASK", Some(0.0)), surface);
     assert_all(&veil("MASK", Some(2.0)), behind);
     // `BLEND` is stochastic.
     let mut scene = veil("BLEND", None);
@@ -249,7 +249,7 @@ fn alpha_does_what_its_mode_says() {
     let pixels = super::read::pixels(&scene);
     for k in 0..3 {
         let mean = pixels.iter().map(|pixel| f64::from(pixel[k])).sum::<f64>() / pixels.len() as f64;
-        let known = 0.4 * there[k] + 0.6;
+        let known = 0.4 * surface[k] + 0.6;
         assert!((mean - known).abs() < 0.005, "{mean}, not {known}");
     }
 }

@@ -66,7 +66,7 @@ fn mirrored_things_keep_their_outside() {
 }
 
 #[test]
-fn degenerate_nodes_are_left_out() {
+fn nodes_of_scale_zero_are_left_out() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh, "scale": [0, 0, 0] }));
@@ -75,14 +75,14 @@ fn degenerate_nodes_are_left_out() {
 }
 
 #[test]
-fn flattened_meshes_are_kept() {
+fn meshes_flattened_along_their_normal_are_kept() {
     let flattened = |scale: [f64; 3]| {
         let mut builder = Builder::new();
         let mesh = builder.quad(None);
         builder.root_node(json!({ "mesh": mesh, "translation": [0, 0, 2], "scale": scale }));
         scene(&builder, "flattened")
     };
-    // Along its normal, and below the minimum scale of an instance.
+    // Flattened along its normal, or below the minimum scale of an instance.
     for (scale, by) in [([1.0, 1.0, 0.0], 1.0), ([1e-7; 3], 1e-7), ([-1e-7; 3], -1e-7)] {
         let scene = flattened(scale);
         assert_corners(&scene, &quad_by(|p| p * by + 2.0 * DVec3::Z));
@@ -92,7 +92,7 @@ fn flattened_meshes_are_kept() {
             scene.notes
         );
     }
-    // Without one of its own axes, as when an animation hides it.
+    // Without an area, as when an animation hides the mesh.
     for scale in [[1.0, 0.0, 1.0], [0.0; 3], [1e-12; 3]] {
         let scene = flattened(scale);
         assert!(scene.shapes.is_empty());

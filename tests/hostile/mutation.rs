@@ -90,12 +90,12 @@ fn mutated(kind: &Kind, random: &Random) -> Vec<u8> {
 
 #[test]
 fn changed_files_are_read_or_told() {
-    // Few by default, with fixed seeds.
+    // The default is small; the seeds are fixed.
     let count: usize = std::env::var("WGRAY_TEST_HOSTILE").map_or(8, |count| count.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (number, kind) in all(folder).into_iter().enumerate() {
-        // All scenes are one kind.
+        // All scenes together count as one kind.
         let count = if kind.ending == "toml" {
             count.div_ceil(SCENES.len())
         } else {

@@ -34,7 +34,7 @@ fn volume(mesh: &Mesh) -> f64 {
 }
 
 #[test]
-fn the_knot_is_what_the_program_prints() {
+fn the_knot_file_matches_the_example() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/meshes/knot.obj");
     assert!(
         fs::read_to_string(path).unwrap() == make_mesh::knot(),
@@ -72,7 +72,7 @@ fn the_knot_is_closed_and_rests_on_the_floor() {
 }
 
 #[test]
-fn large_meshes_are_sound_and_as_large_as_asked() {
+fn large_meshes_are_valid_and_of_the_requested_size() {
     let folder = tempfile::tempdir().unwrap();
     for count in [1000, 30_000] {
         let mut rocks = Vec::new();

@@ -311,7 +311,7 @@ fn material_files_may_have_paths_of_other_machines() {
         assert_eq!(mesh.notes, Vec::<String>::new(), "{named}");
         assert_eq!(mesh.libraries[0].materials[0].name, expected, "{named}");
     }
-    // A plain name is not searched for.
+    // A plain file name is only looked up in the folder of the mesh.
     std::fs::write(&path, format!("mtllib c.mtl\n{SQUARE}f 1 2 3\n")).unwrap();
     let mesh = Mesh::load(&path, None).unwrap();
     assert!(

@@ -5,7 +5,7 @@ use wgray_render::cpu::camera::camera_ray;
 use wgray_render::records::Packed;
 
 use super::forms::{Form, scene};
-use crate::pictures::{Way, first_hits, reference, render};
+use crate::pictures::{RenderMode, first_hits, reference, render};
 
 const CENTER: DVec3 = DVec3::new(0.0, 0.0, 1.3);
 const LIGHT: DVec3 = DVec3::new(0.3, 0.2, -1.0);
@@ -71,7 +71,7 @@ struct Found {
 /// Classifies all pixels; `inner` is the inscribed radius.
 fn found(form: &Form, inner: f64, normals: &str) -> Found {
     let packed = above_floor(form, normals, OUTSIDE);
-    let hits = first_hits(&packed, Way::Cpu);
+    let hits = first_hits(&packed, RenderMode::Cpu);
     let radiances: Vec<[f32; 3]> = reference(&packed).means().collect();
     let to_light = -LIGHT.normalize();
     // Maximum angle between geometric and analytic normals.
@@ -157,12 +157,12 @@ fn no_light_enters_a_closed_mesh() {
         let form = Form::icosphere(detail);
         for camera in ["[0.2, -0.5, 1.6]", "[-0.3, 0.1, 0.8]", "[0, 0.6, 1.2]"] {
             let packed = above_floor(&form, "smooth", camera);
-            for way in [Way::Cpu, Way::Baked] {
-                let lit = render(&packed, way)
+            for mode in [RenderMode::Cpu, RenderMode::Baked] {
+                let lit = render(&packed, mode)
                     .means()
                     .filter(|radiance| radiance[0] > 0.0)
                     .count();
-                assert_eq!(lit, 0, "{detail} {camera} {way:?}");
+                assert_eq!(lit, 0, "{detail} {camera} {mode:?}");
             }
         }
         let outside = above_floor(&form, "smooth", OUTSIDE);

@@ -78,12 +78,12 @@ fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> 
     let mut worst = [0.0; 2];
     for slot in 0..packed.bvh.meshes[0].triangles.len() {
         for b in PLACES {
-            let spot = fetch_hit_primitive(packed, hit(packed, slot, b));
-            let uv = face_uv(&spot, b);
+            let prim = fetch_hit_primitive(packed, hit(packed, slot, b));
+            let uv = face_uv(&prim, b);
             let Some(exact) = surface(f64::from(uv.x), f64::from(uv.y)) else {
                 continue;
             };
-            for (worst, found) in worst.iter_mut().zip([face_frame(&spot, b), face_tangents(&spot)]) {
+            for (worst, found) in worst.iter_mut().zip([face_frame(&prim, b), face_tangents(&prim)]) {
                 for (found, exact) in [found.u, found.v].into_iter().zip(exact) {
                     let angle = found.as_dvec3().angle_between(to_world * exact).to_degrees();
                     *worst = f64::max(*worst, angle);
@@ -104,7 +104,7 @@ fn derivatives(at: impl Fn(f64, f64) -> DVec3, u: f64, v: f64) -> [DVec3; 2] {
 }
 
 #[test]
-fn tangents_are_those_of_the_surface() {
+fn tangents_match_the_surface() {
     let sphere = |u: f64, v: f64| {
         let (angle, height) = (TAU * u, TAU / 2.0 * (v - 0.5));
         DVec3::new(height.cos() * angle.cos(), height.cos() * angle.sin(), height.sin())
@@ -136,16 +136,16 @@ fn tangents_are_those_of_the_surface() {
 /// Returns the mapped normals with interpolated and with per-triangle tangents.
 fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     let hit = hit(packed, slot, b);
-    let spot = fetch_hit_primitive(packed, hit);
-    let q = &spot.primitive;
+    let prim = fetch_hit_primitive(packed, hit);
+    let q = &prim.primitive;
     let ray = Ray {
         origin: q.anchor + q.z * 3.0,
         direction: -q.z,
     };
-    let surface = surface_of(packed, &spot, hit, ray);
-    let material = material_of(packed, &spot);
-    let found = evaluate_material(packed, &spot, hit, material, surface, HitDifferential::default(), 1).normal;
-    let Tangents { u, v } = face_tangents(&spot);
+    let surface = surface_of(packed, &prim, hit, ray);
+    let material = material_of(packed, &prim);
+    let found = evaluate_material(packed, &prim, hit, material, surface, HitDifferential::default(), 1).normal;
+    let Tangents { u, v } = face_tangents(&prim);
     let by_triangle = wgray_render::cpu::surface::Surface {
         du: u,
         dv: v,
@@ -256,12 +256,12 @@ fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
     assert_eq!(mesh.tangents.len(), mesh.vertices.len());
     for slot in 0..mesh.triangles.len() {
         for b in PLACES {
-            let spot = fetch_hit_primitive(&packed, hit(&packed, slot, b));
-            let at = spot.primitive.anchor + spot.edge_1 * b.x + spot.edge_2 * b.y;
-            let middle = spot.primitive.anchor + (spot.edge_1 + spot.edge_2) / 3.0;
+            let prim = fetch_hit_primitive(&packed, hit(&packed, slot, b));
+            let at = prim.primitive.anchor + prim.edge_1 * b.x + prim.edge_2 * b.y;
+            let middle = prim.primitive.anchor + (prim.edge_1 + prim.edge_2) / 3.0;
             // u is along x on the right, against x on the left; v is along y.
             let right = Vec3::new(at.z, 0.0, -at.x).normalize() * middle.x.signum();
-            let found = face_frame(&spot, b);
+            let found = face_frame(&prim, b);
             assert!(found.u.angle_between(right) < 0.01, "{at}: {} {right}", found.u);
             assert!(found.v.angle_between(Vec3::Y) < 0.01, "{at}: {}", found.v);
             let normal = normals(&packed, slot, b)[0];
@@ -274,7 +274,7 @@ fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
 
 /// Tangents are averaged across a seam only if the repeating texture continues there.
 #[test]
-fn pieces_of_a_texture_keep_their_directions() {
+fn tangents_are_averaged_only_across_continuous_textures() {
     // Two sheets that meet at x = 1; the right one has a rotated and translated texture.
     let directions = |turn: f64, shift: f64| {
         let sheet = |left: f64| Sheet::of(2, 2, |u, v| [DVec3::new(left + u, v, 0.0), DVec3::Z]);
@@ -321,15 +321,15 @@ fn only_smooth_meshes_with_normal_maps_have_tangents() {
     for packed in [flat, scene(&text, folder.path())] {
         assert!(packed.bvh.meshes[0].tangents.is_empty());
         assert_eq!(packed.bvh.instances[0].tangents, NO_INDEX);
-        let spot: HitPrimitive = fetch_hit_primitive(&packed, hit(&packed, 0, Vec2::ZERO));
-        assert_eq!(spot.tangents_0, Tangents::default());
-        assert_eq!(face_frame(&spot, Vec2::ZERO), face_tangents(&spot));
+        let prim: HitPrimitive = fetch_hit_primitive(&packed, hit(&packed, 0, Vec2::ZERO));
+        assert_eq!(prim.tangents_0, Tangents::default());
+        assert_eq!(face_frame(&prim, Vec2::ZERO), face_tangents(&prim));
     }
 }
 
 /// Degenerate, canceling and extreme texture coordinates give unit normals.
 #[test]
-fn odd_texture_coordinates_give_usable_tangents() {
+fn degenerate_texture_coordinates_give_unit_normals() {
     let size = |factor: f64| move |[u, v]: [f64; 2]| [u * factor, v * factor];
     let maps: [&dyn Fn([f64; 2]) -> [f64; 2]; 8] = [
         &|_| [0.5, 0.5],

@@ -34,7 +34,7 @@ fn corners(scene: &Packed, i: &Instance, slot: usize) -> [Vec3; 3] {
 }
 
 fn room(scene: &Packed, origin: Vec3) -> f32 {
-    scene.counts.room.x * (largest(origin) + scene.counts.room.y)
+    scene.counts.item_padding.x * (largest(origin) + scene.counts.item_padding.y)
 }
 
 /// Returns the closest hit by brute force, without culling by distance.

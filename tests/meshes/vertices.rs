@@ -11,7 +11,7 @@ use wgray_render::pack::pack;
 use wgray_render::records::Packed;
 
 use super::load;
-use crate::pictures::{Way, both, differing, exact_ways, first_hits, means, reference, render};
+use crate::pictures::{RenderMode, both, differing, exact_modes, first_hits, means, reference, render};
 use crate::textures::{write_exr, write_png};
 
 /// A square from (-1, -1) to (1, 1), with texture coordinates from 0 to 1.
@@ -92,29 +92,29 @@ fn colors_of_vertices_are_interpolated() {
     for (material, factor, error) in [(emission, 2.0, 0.02), (base, 1.0, 0.02)] {
         let packed = scene(folder.path(), 64, &format!("{DOWN}{material}{SHAPE}"), colored);
         let plain = scene(folder.path(), 64, &format!("{DOWN}{material}{SHAPE}"), |_| ());
-        for way in both() {
-            for (i, found) in means(&render(&packed, way)).iter().enumerate() {
+        for mode in both() {
+            for (i, found) in means(&render(&packed, mode)).iter().enumerate() {
                 let (x, y) = place(i);
                 let expected = color_at(x, y);
                 for k in 0..3 {
                     let expected = factor * expected[k];
                     assert!(
                         (found[k] - expected).abs() < error,
-                        "{way:?} {x} {y}: {found:?} {expected}"
+                        "{mode:?} {x} {y}: {found:?} {expected}"
                     );
                 }
-                assert!((found[2] - 0.25 * factor).abs() < 1e-5, "{way:?}: {found:?}");
+                assert!((found[2] - 0.25 * factor).abs() < 1e-5, "{mode:?}: {found:?}");
             }
             // Without vertex colors the emission is white.
-            for found in means(&render(&plain, way)) {
-                assert!(found.iter().all(|x| (x - factor).abs() < 1e-5), "{way:?}: {found:?}");
+            for found in means(&render(&plain, mode)) {
+                assert!(found.iter().all(|x| (x - factor).abs() < 1e-5), "{mode:?}: {found:?}");
             }
         }
     }
 }
 
 #[test]
-fn reflectances_of_colors_above_one_are_clamped() {
+fn base_colors_above_one_are_clamped_and_emission_is_not() {
     let folder = tempfile::tempdir().unwrap();
     let bright = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(4.0, 0.5, 1e6, 1.0); mesh.positions.len()];
     let material = |keys: &str| {
@@ -134,11 +134,11 @@ fn reflectances_of_colors_above_one_are_clamped() {
         &material("vertex_colors = 'emission', base_color = [0, 0, 0], emission = [1, 1, 1]"),
         bright,
     );
-    for way in both() {
+    for mode in both() {
         for (packed, expected) in [(&base, [1.0, 0.25, 1.0]), (&emission, [4.0, 0.5, 1e6])] {
-            for found in means(&render(packed, way)) {
+            for found in means(&render(packed, mode)) {
                 let near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-4);
-                assert!(near, "{way:?}: {found:?} {expected:?}");
+                assert!(near, "{mode:?}: {found:?} {expected:?}");
             }
         }
     }
@@ -157,40 +157,40 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
         let blended = scene(folder.path(), 256, &text(colors, "blend", 0.8), colored);
         let masked = scene(folder.path(), 4, &text(colors, "mask", 0.8), colored);
         let opaque = scene(folder.path(), 4, &text(colors, "opaque", 1.0), colored);
-        for way in both() {
-            let found = means(&render(&blended, way));
-            let seen = first_hits(&blended, way);
-            let cut = means(&render(&masked, way));
+        for mode in both() {
+            let found = means(&render(&blended, mode));
+            let seen = first_hits(&blended, mode);
+            let cut = means(&render(&masked, mode));
             for i in 0..400 {
                 let (x, y) = place(i);
                 let alpha = 0.8 * color_at(x, y)[3];
                 assert!(
                     (found[i][0] - (1.0 - alpha)).abs() < 0.16,
-                    "{way:?} {x} {y}: {:?} {alpha}",
+                    "{mode:?} {x} {y}: {:?} {alpha}",
                     found[i]
                 );
                 if (alpha - 0.5).abs() > 0.01 {
-                    assert_eq!(seen[i].depth > 0.0, alpha > 0.5, "{way:?} {x} {y} {alpha}");
+                    assert_eq!(seen[i].depth > 0.0, alpha > 0.5, "{mode:?} {x} {y} {alpha}");
                 }
                 if (alpha - 0.4).abs() > 0.08 {
                     assert_eq!(
                         cut[i][0],
                         if alpha > 0.4 { 0.0 } else { 1.0 },
-                        "{way:?} {x} {y} {alpha}"
+                        "{mode:?} {x} {y} {alpha}"
                     );
                 }
             }
             let mean = found.iter().map(|pixel| pixel[0]).sum::<f64>() / 400.0;
             // The mean alpha of two triangles; both contain the ends of the diagonal.
             let alpha = 0.8 * (2.0 * (1.0 + 0.5) + 0.0 + 1.0) / 6.0;
-            assert!((mean - (1.0 - alpha)).abs() < 0.01, "{way:?}: {mean} {alpha}");
-            assert!(means(&render(&opaque, way)).iter().all(|pixel| pixel[0] == 0.0));
+            assert!((mean - (1.0 - alpha)).abs() < 0.01, "{mode:?}: {mean} {alpha}");
+            assert!(means(&render(&opaque, mode)).iter().all(|pixel| pixel[0] == 0.0));
         }
     }
 }
 
 #[test]
-fn emission_from_vertex_colors_lights_a_floor() {
+fn emission_from_vertex_colors_lights_like_plain_emission() {
     // A floor lit by constant emission, or by equal emission from vertex colors; with equal samples.
     let folder = tempfile::tempdir().unwrap();
     let text = |keys: &str| {
@@ -224,11 +224,11 @@ fn emission_from_vertex_colors_lights_a_floor() {
         );
         let expected = reference(&own);
         assert!(means(&expected).iter().all(|pixel| pixel[0] > 0.1));
-        for way in exact_ways() {
-            let found = means(&render(&of_vertices, way));
+        for mode in exact_modes() {
+            let found = means(&render(&of_vertices, mode));
             for (found, expected) in found.iter().zip(means(&expected)) {
                 let near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-5);
-                assert!(near, "{way:?}: {found:?} {expected:?}");
+                assert!(near, "{mode:?}: {found:?} {expected:?}");
             }
         }
     }
@@ -297,10 +297,10 @@ fn textures_use_their_set_of_coordinates() {
             assert!(near, "{keys} {filter} {set}");
         }
         // Kernels with a BVH take seconds to compile.
-        if filter != "nearest" && exact_ways().len() > 1 {
+        if filter != "nearest" && exact_modes().len() > 1 {
             let packed = &by_set[3];
             assert_eq!(
-                differing(&render(packed, Way::Baked), &reference(packed)),
+                differing(&render(packed, RenderMode::Baked), &reference(packed)),
                 0,
                 "{keys} {filter}"
             );
@@ -324,12 +324,12 @@ fn a_missing_set_of_coordinates_is_a_single_point() {
     );
     for edit in [with_sets, |_: &mut Mesh| ()] {
         let packed = scene(folder.path(), 1, &text, edit);
-        for way in both() {
+        for mode in both() {
             assert!(
-                means(&render(&packed, way))
+                means(&render(&packed, mode))
                     .iter()
                     .all(|pixel| *pixel == [0.0, 3.0, 1.0]),
-                "{way:?}"
+                "{mode:?}"
             );
         }
     }
@@ -371,12 +371,12 @@ fn factors_are_multiplied_by_the_texels() {
         ),
     ] {
         let packed = scene(folder.path(), 64, &text(keys), |_| ());
-        for way in both() {
-            let found = means(&render(&packed, way));
+        for mode in both() {
+            let found = means(&render(&packed, mode));
             let mean: [f64; 3] = std::array::from_fn(|k| found.iter().map(|pixel| pixel[k]).sum::<f64>() / 400.0);
             assert!(
                 (0..3).all(|k| (mean[k] - expected[k]).abs() <= error),
-                "{keys} {way:?}: {mean:?}"
+                "{keys} {mode:?}: {mean:?}"
             );
         }
     }
@@ -483,24 +483,27 @@ fn only_camera_rays_skip_back_faces() {
         let other = find(if seen { "visible = false" } else { "double_sided = true" });
         // Kernels with a BVH take seconds to compile.
         let ways = match transform == turned {
-            true => exact_ways().into_iter().filter(|way| *way != Way::Buffers).collect(),
-            false => vec![Way::Cpu],
+            true => exact_modes()
+                .into_iter()
+                .filter(|mode| *mode != RenderMode::Buffers)
+                .collect(),
+            false => vec![RenderMode::Cpu],
         };
-        for way in ways {
-            let picture = render(&packed, way);
+        for mode in ways {
+            let picture = render(&packed, mode);
             assert_eq!(
                 differing(&picture, &reference(&expected)),
                 0,
-                "{height} {transform} {way:?}"
+                "{height} {transform} {mode:?}"
             );
             // Below the wall the floor is always visible.
             assert!(
                 height < 1.0 || differing(&picture, &reference(&other)) > 300,
-                "{height} {transform} {way:?}"
+                "{height} {transform} {mode:?}"
             );
-            let hits: Vec<u32> = first_hits(&packed, way).iter().map(|hit| hit.shape).collect();
+            let hits: Vec<u32> = first_hits(&packed, mode).iter().map(|hit| hit.shape).collect();
             let shape = if seen && height > 1.0 { 0 } else { 1 };
-            assert_eq!(hits, vec![shape; 400], "{height} {transform} {way:?}");
+            assert_eq!(hits, vec![shape; 400], "{height} {transform} {mode:?}");
         }
     }
 }
@@ -529,11 +532,11 @@ fn a_mesh_keeps_its_own_tangents() {
         let packed = scene(folder.path(), 1, &text, with(tangent));
         // Lambertian with an albedo of 1, at an irradiance of 3.
         let expected = 3.0 / std::f64::consts::PI * (0.6 * x + 0.8 * n.z).max(0.0);
-        for way in both() {
-            for pixel in means(&render(&packed, way)) {
+        for mode in both() {
+            for pixel in means(&render(&packed, mode)) {
                 assert!(
                     (pixel[0] - expected).abs() < 1e-4,
-                    "{tangent} {way:?}: {pixel:?} {expected}"
+                    "{tangent} {mode:?}: {pixel:?} {expected}"
                 );
             }
         }
@@ -631,11 +634,11 @@ fn anisotropy_directions_come_from_an_image() {
         assert!(near(&found, &expected), "{degrees} {more}");
         assert!(!near(&found, &plain(degrees + 90.0)), "{degrees} {more}");
         if more != 0.0 {
-            for way in exact_ways().into_iter().filter(|way| *way == Way::Baked) {
+            for mode in exact_modes().into_iter().filter(|mode| *mode == RenderMode::Baked) {
                 assert_eq!(
-                    differing(&render(&packed, way), &reference(&packed)),
+                    differing(&render(&packed, mode), &reference(&packed)),
                     0,
-                    "{degrees} {way:?}"
+                    "{degrees} {mode:?}"
                 );
             }
         }

@@ -236,7 +236,8 @@ fn standalone_triangles_are_not_watertight() {
     assert_eq!([false, true].map(|inside| passing(&mesh, 64_000, inside)), [0, 0]);
 }
 
-/// Not convex: rays at an edge whose triangles face them must hit there or before, rays from inside anywhere.
+/// Checks a mesh that is not convex: rays at an edge whose triangles face them must hit there or before, rays from
+/// inside anywhere.
 #[test]
 fn no_ray_passes_through_the_knot() {
     let knot = std::fs::read_to_string(sources::path("scenes/meshes/knot.obj")).expect("the knot");
@@ -252,10 +253,10 @@ fn no_ray_passes_through_the_knot() {
         assert_eq!((outside.1, inside.1), (0, 0), "{place:?}");
     }
     // Control: every 50th triangle is removed.
-    let mut gone = 0;
+    let mut removed = 0;
     let few = knot.lines().filter(|line| {
-        gone += u32::from(line.starts_with("f "));
-        !(line.starts_with("f ") && gone % 50 == 0)
+        removed += u32::from(line.starts_with("f "));
+        !(line.starts_with("f ") && removed % 50 == 0)
     });
     let packed = placed(&few.collect::<Vec<_>>().join("\n"), "");
     let whole = Solid::new(&placed(&knot, ""));

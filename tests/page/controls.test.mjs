@@ -49,8 +49,8 @@ test("the wheel over a focused number box scrolls the panel and changes no value
       assert.ok(await box.evaluate((box) => box === document.activeElement));
       const [value, from] = [await box.inputValue(), await top()];
       await box.hover();
-      const way = from > 300 ? -100 : 100;
-      for (let i = 0; i < 3; i++) await page.mouse.wheel(0, way);
+      const delta = from > 300 ? -100 : 100;
+      for (let i = 0; i < 3; i++) await page.mouse.wheel(0, delta);
       await page.waitForFunction((from) => Math.abs(document.querySelector("aside").scrollTop + scrollY - from) > 100, from);
       assert.equal(await box.inputValue(), value);
       await page.locator("#pause").focus();

@@ -67,7 +67,7 @@ test("the divider of a wipe is dragged in the image", async () => {
   await page.mouse.move(x + 40, y, { steps: 4 });
   await page.mouse.up();
   await page.locator("#moved").waitFor();
-  // By the keyboard too.
+  // The keyboard moves the divider, too.
   await page.locator("#wipe").focus();
   await page.keyboard.press("Home");
   assert.equal(await page.locator("#wipe").inputValue(), "0");
@@ -130,8 +130,8 @@ test("a dolly passes the look-at point instead of sticking to it, and ends far o
   const start = await camera(page);
   const near = await dolly("PageUp", 60);
   const nearer = await dolly("PageUp", 10);
-  const way = Math.hypot(...point(nearer, "position").map((v, i) => v - point(near, "position")[i]));
-  assert.ok(way > 0.02, `10 notches move it by ${way}`);
+  const moved = Math.hypot(...point(nearer, "position").map((v, i) => v - point(near, "position")[i]));
+  assert.ok(moved > 0.02, `10 notches move it by ${moved}`);
   await page.keyboard.press("r");
   await page.locator("#reset:disabled").waitFor();
   const far = await dolly("PageDown", 100);

@@ -131,7 +131,7 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
   // Ten pixels are one step, a tenth of the position's magnitude; with Shift, a hundred pixels are.
   await page.mouse.move(left, top);
   await page.mouse.down();
-  for (const way of [5, 20, 60, 100]) await page.mouse.move(left + way, top);
+  for (const dx of [5, 20, 60, 100]) await page.mouse.move(left + dx, top);
   await page.keyboard.down("Shift");
   await page.mouse.move(left + 150, top);
   await page.keyboard.up("Shift");
@@ -170,7 +170,7 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
     await settled(page);
   }
   assert.equal(studio.read("scene.toml"), SCENE);
-  // So is a held key right after a click.
+  // A key held right after a click is one undo step, too.
   await x.evaluate(async (box) => {
     const fire = (Kind, type, more) => box.dispatchEvent(new Kind(type, { bubbles: true, ...more }));
     fire(PointerEvent, "pointerdown", { button: 1 });

@@ -213,7 +213,7 @@ export async function finished(page, after = 0) {
 // returns the number of executed commands.
 export async function settled(page, commands = 0) {
   await page.waitForFunction((commands) => window.isSettled(commands), commands);
-  return page.evaluate(() => Number(document.getElementById("panels").dataset.heard));
+  return page.evaluate(() => Number(document.getElementById("panels").dataset.executed));
 }
 
 export function revision(page) {

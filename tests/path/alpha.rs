@@ -5,7 +5,7 @@ use wgray_render::pack::pack;
 use wgray_render::records::Packed;
 
 use super::{mean, scene};
-use crate::pictures::{both, differing, exact_ways, first_hits, means, reference, render};
+use crate::pictures::{both, differing, exact_modes, first_hits, means, reference, render};
 
 /// Camera above the square of side 2 around the origin.
 const DOWN: &str =
@@ -166,7 +166,7 @@ fn a_mask_casts_its_shadow() {
     for mode in ["mask", "blend"] {
         let packed = leaf(place.path(), mode, above);
         let expected = reference(&packed);
-        for way in exact_ways() {
+        for way in exact_modes() {
             assert_eq!(differing(&render(&packed, way), &expected), 0, "{mode} {way:?}");
         }
     }

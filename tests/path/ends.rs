@@ -1,7 +1,7 @@
 //! Limits of the path integrator: empty, dark, huge and tiny scenes; no bounces and many; all results are finite.
 
 use super::{mean, scene};
-use crate::pictures::{both, differing, exact_ways, reference, render};
+use crate::pictures::{both, differing, exact_modes, reference, render};
 
 const CAMERA: &str = "camera = { position = [0, -4, 0.5], look_at = [0, 0, 0], fov = 40 }\n";
 
@@ -98,7 +98,7 @@ fn touching_and_grazing_lights_give_finite_values() {
     for sum in &expected.sums {
         assert!(sum.is_finite() && sum.min_element() >= 0.0, "{sum}");
     }
-    for way in exact_ways() {
+    for way in exact_modes() {
         assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
     }
 }

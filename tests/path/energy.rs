@@ -253,9 +253,9 @@ fn fully_transmissive_principled_equals_dielectric() {
                                     rough_dielectric_pdf(&other, wo, wi),
                                 )
                             };
-                            let off = (here - there).abs() / there;
+                            let error = (here - there).abs() / there;
                             let density = (principled_pdf(&m, wo, wi, ALL) - pdf).abs() / pdf;
-                            assert!(off < 0.01 && density < 0.01, "{name}, {wi}: {off} {density}");
+                            assert!(error < 0.01 && density < 0.01, "{name}, {wi}: {error} {density}");
                         }
                         let n = (!thin).then(|| f64::from(1.0 / m.eta));
                         let whole = furnace(m.alpha, n, thin, wo, |wi| principled_eval(&m, wo, wi, ALL).x);

@@ -11,7 +11,7 @@ use wgray_render::pack::pack;
 use wgray_render::records::{ENVIRONMENT, Packed};
 
 use super::mean;
-use crate::pictures::{Way, both, differing, exact_ways, render, render_with};
+use crate::pictures::{RenderMode, both, differing, exact_modes, render, render_with};
 use crate::random::Random;
 use crate::{adapter, sources};
 
@@ -141,8 +141,8 @@ fn irradiance_matches_a_sum_over_all_directions() {
             ("\nrotate = [0, 90, 0]", DVec3::NEG_X),
         ] {
             let expected = irradiance(image, *points, normal) / PI;
-            for way in both() {
-                let found = DVec3::from_array(mean(&render(&around(image, turn, (256, 1), GROUND), way)));
+            for mode in both() {
+                let found = DVec3::from_array(mean(&render(&around(image, turn, (256, 1), GROUND), mode)));
                 if expected == DVec3::ZERO {
                     assert_eq!(found, expected, "the bright texel is below the ground");
                     continue;
@@ -151,7 +151,7 @@ fn irradiance_matches_a_sum_over_all_directions() {
                 let size = (image.width, image.height);
                 assert!(
                     (ratio - DVec3::ONE).abs().max_element() < 0.01,
-                    "{size:?}{turn}, {way:?}: {found} for {expected}"
+                    "{size:?}{turn}, {mode:?}: {found} for {expected}"
                 );
             }
         }
@@ -180,27 +180,27 @@ fn the_map_has_the_documented_orientation() {
         (DVec3::Z, [0.0, 0.0, 1.0]),
         (DVec3::NEG_Z, [1.0, 1.0, 0.0]),
     ];
-    let seen = |direction: DVec3, turn: &str, way: Way| {
+    let seen = |direction: DVec3, turn: &str, mode: RenderMode| {
         let up = if direction.z == 0.0 { DVec3::Z } else { DVec3::X };
         let (DVec3 { x, y, z }, u) = (direction, up);
         let camera = format!(
             "camera = {{ position = [0, 0, 0], look_at = [{x}, {y}, {z}], up = [{}, {}, {}], fov = 20 }}\n",
             u.x, u.y, u.z
         );
-        mean(&render(&around(&picture, turn, (4, 0), &camera), way))
+        mean(&render(&around(&picture, turn, (4, 0), &camera), mode))
     };
-    for way in both() {
+    for mode in both() {
         for (i, (direction, color)) in colors.into_iter().enumerate() {
-            assert_eq!(seen(direction, "", way), color, "{direction}, {way:?}");
+            assert_eq!(seen(direction, "", mode), color, "{direction}, {mode:?}");
             // Counterclockwise from above: +x moves to +y.
             if i < 4 {
                 let before = colors[(i + 3) % 4].1;
-                assert_eq!(seen(direction, "\nrotate = 90", way), before, "{direction}, {way:?}");
+                assert_eq!(seen(direction, "\nrotate = 90", mode), before, "{direction}, {mode:?}");
             }
         }
         let about_x = "\nrotate = { axis = [1, 0, 0], degrees = 90 }";
-        assert_eq!(seen(DVec3::Z, about_x, way), colors[1].1, "+y goes up");
-        assert_eq!(seen(DVec3::Z, "\nrotate = [90, 0, 0]", way), colors[1].1, "+y goes up");
+        assert_eq!(seen(DVec3::Z, about_x, mode), colors[1].1, "+y goes up");
+        assert_eq!(seen(DVec3::Z, "\nrotate = [90, 0, 0]", mode), colors[1].1, "+y goes up");
     }
 }
 
@@ -212,11 +212,11 @@ fn a_white_map_equals_a_constant_color() {
                 [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [-0.6, 0, 0]\nradius = 0.5\n\
                 [[shapes]]\ntype = 'sphere'\nmaterial = 'g'\ncenter = [0.6, 0, 0]\nradius = 0.5\n";
     let white = image(8, 4, |_, _| [0.5, 1.0, 1.5]);
-    for way in both() {
-        let colour = mean(&render(&described("color = [1, 2, 3]", None, (1024, 6), ball), way));
-        let found = mean(&render(&around(&white, "\nscale = 2", (1024, 6), ball), way));
+    for mode in both() {
+        let colour = mean(&render(&described("color = [1, 2, 3]", None, (1024, 6), ball), mode));
+        let found = mean(&render(&around(&white, "\nscale = 2", (1024, 6), ball), mode));
         for (found, colour) in found.into_iter().zip(colour) {
-            assert!((found / colour - 1.0).abs() < 2e-3, "{way:?}: {found} for {colour}");
+            assert!((found / colour - 1.0).abs() < 2e-3, "{mode:?}: {found} for {colour}");
         }
     }
 }
@@ -231,7 +231,7 @@ const EMITTERS: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5],
     [[shapes]]\ntype = 'sphere'\nmaterial = 'source'\ncenter = [-0.5, 0, 0.3]\nradius = 0.2\n";
 
 #[test]
-fn light_and_bsdf_sampling_of_the_map_have_equal_means() {
+fn light_and_bsdf_sampling_of_the_map_agree() {
     if adapter::device().is_none() {
         return;
     }
@@ -259,7 +259,7 @@ fn light_and_bsdf_sampling_of_the_map_have_equal_means() {
         image(2, 1, |x, _| [x as f32, 1.0, 2.0]),
     ] {
         let packed = around(&image, "\nvisible = false", (4096, 2), &text);
-        let found = |shaders| mean(&render_with(&packed, Way::Baked, shaders));
+        let found = |shaders| mean(&render_with(&packed, RenderMode::Baked, shaders));
         let both = found(sources::shaders());
         let [light, materials, wrong] = [&light_alone, &material_alone, &wrong].map(found);
         for i in 0..3 {
@@ -279,19 +279,19 @@ fn the_light_of_map_and_lights_adds_up() {
                  [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.5, 1.5]\nsize = [0.5, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [3, 3, 3]\n";
     let text = format!("{EMITTERS}{lights}");
     let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
-    for way in both() {
-        let sum = |packed: Packed| mean(&render(&packed, way));
+    for mode in both() {
+        let sum = |packed: Packed| mean(&render(&packed, mode));
         // The rectangle light occludes in all three images.
         let hidden = lights.split("[[lights]]").last().unwrap_or_default();
         let plate = format!("[[lights]]{}", hidden.replace("color = [3, 3, 3]", "color = [0, 0, 0]"));
         let of_image = sum(around(&image, "", (1024, 3), &format!("{dark}{plate}")));
-        let of_lamps = sum(described("color = [0, 0, 0]", None, (1024, 3), &text));
+        let of_lights = sum(described("color = [0, 0, 0]", None, (1024, 3), &text));
         let all = sum(around(&image, "", (1024, 3), &text));
         for i in 0..3 {
-            let expected = of_image[i] + of_lamps[i];
+            let expected = of_image[i] + of_lights[i];
             assert!(
                 (all[i] / expected - 1.0).abs() < 0.01,
-                "{way:?}: {all:?} for {of_image:?} + {of_lamps:?}"
+                "{mode:?}: {all:?} for {of_image:?} + {of_lights:?}"
             );
         }
     }
@@ -310,17 +310,17 @@ fn the_floor_occludes_light_from_below() {
     let ball = "camera = { position = [0, -4, 1], look_at = [0, 0, 0.6], fov = 30 }\n\
                 materials.m = { type = 'diffuse', color = [1, 1, 1] }\n\
                 [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0.6]\nradius = 0.5\n";
-    for way in both() {
+    for mode in both() {
         let seen = |floor: &str| {
             mean(&render(
                 &around(&below, "\nvisible = false", (64, 1), &format!("{ball}{floor}")),
-                way,
+                mode,
             ))
         };
         for floor in floors {
-            assert!(seen(&format!("[[shapes]]\n{floor}\n"))[0] < 1e-3, "{floor}, {way:?}");
+            assert!(seen(&format!("[[shapes]]\n{floor}\n"))[0] < 1e-3, "{floor}, {mode:?}");
         }
-        assert!(seen("")[0] > 0.1, "the control, {way:?}");
+        assert!(seen("")[0] > 0.1, "the control, {mode:?}");
     }
 }
 
@@ -331,19 +331,19 @@ fn an_invisible_map_emits_and_is_reflected() {
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
     let white = image(4, 2, |_, _| [1.0; 3]);
     for environment in ["file = 'around'", "color = [1, 1, 1]"] {
-        for way in both() {
+        for mode in both() {
             let picture = |visible: bool| {
                 let keys = format!("{environment}\nvisible = {visible}");
-                render(&described(&keys, Some(&white), (16, 4), balls), way)
+                render(&described(&keys, Some(&white), (16, 4), balls), mode)
             };
             let (seen, hidden) = (picture(true), picture(false));
             let at = |film: &wgray_render::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
-            assert_eq!(at(&seen, 0), [1.0; 3], "{environment}, {way:?}");
-            assert_eq!(at(&hidden, 0), [0.0; 3], "{environment}, {way:?}");
+            assert_eq!(at(&seen, 0), [1.0; 3], "{environment}, {mode:?}");
+            assert_eq!(at(&hidden, 0), [0.0; 3], "{environment}, {mode:?}");
             let middle = 8 * 16 + 8;
             for film in [&seen, &hidden] {
                 let [x, ..] = at(film, middle);
-                assert!((x - 1.0).abs() < 1e-5, "{environment}, {way:?}: {x}");
+                assert!((x - 1.0).abs() < 1e-5, "{environment}, {mode:?}: {x}");
             }
         }
     }
@@ -357,17 +357,17 @@ fn only_the_camera_sees_the_background() {
     let white = image(4, 2, |_, _| [1.0; 3]);
     for environment in ["file = 'around'", "color = [1, 1, 1]", "color = [0, 0, 0]"] {
         let lit = if environment.contains("[0") { 0.0 } else { 1.0 };
-        let ways = exact_ways().into_iter();
+        let ways = exact_modes().into_iter();
         let films: Vec<_> = ways
-            .map(|way| {
+            .map(|mode| {
                 let keys = format!("{environment}\nbackground = [0.5, 0.25, 8]");
-                let film = render(&described(&keys, Some(&white), (16, 4), balls), way);
+                let film = render(&described(&keys, Some(&white), (16, 4), balls), mode);
                 let at = |i: usize| film.means().nth(i).unwrap_or_default();
-                assert_eq!(at(0), [0.5, 0.25, 8.0], "{environment}, {way:?}");
+                assert_eq!(at(0), [0.5, 0.25, 8.0], "{environment}, {mode:?}");
                 let [x, ..] = at(8 * 16 + 8);
                 assert!(
                     (x - lit).abs() < 1e-5,
-                    "the mirror shows the environment map: {environment}, {way:?}: {x}"
+                    "the mirror shows the environment map: {environment}, {mode:?}: {x}"
                 );
                 film
             })
@@ -379,16 +379,16 @@ fn only_the_camera_sees_the_background() {
 
 #[test]
 fn a_factor_of_two_doubles_every_bit() {
-    for way in both() {
+    for mode in both() {
         let film = |scale: f64| {
             render(
                 &around(&noise(16, 8), &format!("\nscale = {scale}"), (16, 3), GROUND),
-                way,
+                mode,
             )
         };
         let (one, two) = (film(1.0), film(2.0));
         for (one, two) in one.means().zip(two.means()) {
-            assert_eq!(one.map(|x| 2.0 * x), two, "{way:?}");
+            assert_eq!(one.map(|x| 2.0 * x), two, "{mode:?}");
         }
         assert_eq!(mean(&film(0.0)), [0.0; 3]);
         assert!(mean(&film(1e6)).iter().all(|x| x.is_finite()));
@@ -401,9 +401,9 @@ fn all_backends_give_the_same_bits() {
     for image in [noise(33, 17), sunny(), image(1, 1, |_, _| [1.0; 3])] {
         for turn in ["", "\nrotate = [10, 20, 30]"] {
             let packed = around(&image, turn, (64, 5), &text);
-            let expected = render(&packed, Way::Cpu);
-            for way in exact_ways() {
-                assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+            let expected = render(&packed, RenderMode::Cpu);
+            for mode in exact_modes() {
+                assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
             }
         }
     }
@@ -506,7 +506,7 @@ fn an_unoccluded_wall_has_little_noise() {
              [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [9, 9]\nnormal = [{x}, {y}, {z}]\n\
              tangent = [0.3, 0.5, 0.7]\n"
         );
-        let film = render(&crate::scenes::parse(&text), Way::Cpu);
+        let film = render(&crate::scenes::parse(&text), RenderMode::Cpu);
         let values: Vec<f64> = film.means().map(|[_, green, _]| f64::from(green)).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();

@@ -4,7 +4,7 @@ use glam::UVec2;
 use wgray_render::cpu::geometry::pixel_first_hit;
 use wgray_render::records::{NO_INDEX, Packed};
 
-use crate::pictures::{both, differing, exact_ways, means, reference, render};
+use crate::pictures::{both, differing, exact_modes, means, reference, render};
 use crate::scenes;
 
 /// Returns an emitter before a wall, and a mirror that shows it.
@@ -44,7 +44,7 @@ fn only_mirrors_show_camera_invisible_emitters() {
         let (seen, hidden) = (room(integrator, &light(true)), room(integrator, &light(false)));
         let without = room(integrator, "");
         let same = reference(&hidden);
-        for way in exact_ways() {
+        for way in exact_modes() {
             assert_eq!(differing(&render(&hidden, way), &same), 0, "{way:?}, {integrator}");
         }
         for way in both() {

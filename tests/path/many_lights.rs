@@ -10,7 +10,7 @@ use wgray_render::cpu::rng::hash4;
 use wgray_render::records::{NO_INDEX, Packed};
 
 use super::{mean, scene};
-use crate::pictures::{both, differing, exact_ways, reference, render};
+use crate::pictures::{both, differing, exact_modes, reference, render};
 use crate::random::Random;
 
 const CAMERA: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.3], fov = 50 }\n\
@@ -112,8 +112,8 @@ fn selection_frequencies_and_hit_pdfs_match_the_tree() {
                         slot: 0,
                         barycentric: glam::Vec2::ZERO,
                     };
-                    let met = light_tree_pdf(&packed, hit, true, p, n);
-                    assert!((met - densities[i]).abs() < 1e-5 * met, "{met} for {}", densities[i]);
+                    let pdf = light_tree_pdf(&packed, hit, true, p, n);
+                    assert!((pdf - densities[i]).abs() < 1e-5 * pdf, "{pdf} for {}", densities[i]);
                     assert_eq!(light_tree_pdf(&packed, hit, false, p, n), 0.0);
                 }
                 let expected = f64::from(densities[i] / leaf.density) * f64::from(calls);
@@ -171,7 +171,7 @@ fn many_lights_give_the_same_bits_on_all_backends() {
         let packed = scene(16, 4, &text);
         assert_eq!(packed.specialization.light_tree, u32::from(count > 16), "{count}");
         let expected = reference(&packed);
-        for way in exact_ways() {
+        for way in exact_modes() {
             assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}, {count}");
         }
     }
@@ -220,7 +220,7 @@ fn limits_of_the_ranges_give_finite_values() {
     for sum in &expected.sums {
         assert!(sum.is_finite() && sum.min_element() >= 0.0, "{sum}");
     }
-    for way in exact_ways() {
+    for way in exact_modes() {
         assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
     }
 }
@@ -278,7 +278,7 @@ fn emissive_meshes_are_in_the_light_tree() {
     assert_eq!(first[1], NO_INDEX);
     assert!(first[0] != NO_INDEX && first[2] != NO_INDEX);
     let expected = reference(&packed);
-    for way in exact_ways() {
+    for way in exact_modes() {
         assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
     }
     // BSDF sampling alone gives the same mean.

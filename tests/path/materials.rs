@@ -1,5 +1,5 @@
-//! BSDFs alone: white furnace, reciprocity, normalized PDFs, sampled directions against the PDF. Integrals are f64
-//! quadratures.
+//! Tests of single BSDFs: white furnace, reciprocity, normalized PDFs, sampled directions against the PDF. Integrals
+//! are f64 quadratures.
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,7 +17,7 @@ use wgray_render::records::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
 struct Lobes {
     name: String,
     material: Material,
-    /// True if a white one loses no energy.
+    /// True if a white material of this kind conserves energy.
     whole: bool,
 }
 
@@ -250,13 +250,13 @@ fn reflection_is_reciprocal() {
     for lobes in all().into_iter().filter(|lobes| !(lobes.whole && lobes.has_facets())) {
         for wo in viewers() {
             for wi in [direction(0.8, 0.1), direction(0.3, 3.9), direction(0.02, 2.0)] {
-                let there = lobes.eval(wo, wi) / wi.z;
-                let back = lobes.eval(wi, wo) / wo.z;
+                let forward = lobes.eval(wo, wi) / wi.z;
+                let backward = lobes.eval(wi, wo) / wo.z;
                 // Fresnel reflectance is steep near the critical angle.
                 let off = if lobes.material.kind == ROUGH_GLASS { 4e-3 } else { 2e-5 };
                 assert!(
-                    there.abs_diff_eq(back, off * there.x.max(1.0)),
-                    "{}: {there} {back}",
+                    forward.abs_diff_eq(backward, off * forward.x.max(1.0)),
+                    "{}: {forward} {backward}",
                     lobes.name
                 );
             }
@@ -277,15 +277,15 @@ fn refraction_is_reciprocal_up_to_the_squared_index() {
         let mut seen = 0;
         for wo in viewers() {
             for wi in [direction(0.9, 3.6), direction(0.5, 4.0), direction(0.3, 2.0)].map(turned) {
-                let there = rough_dielectric_eval(&lobes.material, wo, wi).x / -wi.z;
-                let back = rough_dielectric_eval(&other, turned(wi), turned(wo)).x / wo.z;
-                let expected = there * n * n;
+                let forward = rough_dielectric_eval(&lobes.material, wo, wi).x / -wi.z;
+                let backward = rough_dielectric_eval(&other, turned(wi), turned(wo)).x / wo.z;
+                let expected = forward * n * n;
                 assert!(
-                    (back - expected).abs() < 4e-3 * expected.max(1e-3),
-                    "{}, {wo} {wi}: {there} {back}",
+                    (backward - expected).abs() < 4e-3 * expected.max(1e-3),
+                    "{}, {wo} {wi}: {forward} {backward}",
                     lobes.name
                 );
-                seen += u32::from(there > 1e-3);
+                seen += u32::from(forward > 1e-3);
             }
         }
         assert!(seen > 3, "{}: {seen}", lobes.name);
@@ -407,11 +407,11 @@ fn mean_sample_weights_equal_the_albedo() {
                 };
                 let pdf = lobes.pdf(wo, wi);
                 if (wi.z > 0.0 || lobes.has_facets()) && pdf > 0.0 {
-                    let worth = f64::from(lobes.eval(wo, wi).x) / f64::from(pdf);
-                    sum += worth * per_index(&lobes.material, wi);
+                    let weight = f64::from(lobes.eval(wo, wi).x) / f64::from(pdf);
+                    sum += weight * per_index(&lobes.material, wi);
                     if let Some(found) = lobes.facet_sample(wo, u, random) {
                         // The sample's own weight and PDF agree, except for rounding at grazing angles.
-                        let off = (f64::from(found.weight.x) - worth).abs() / worth.max(1e-3);
+                        let off = (f64::from(found.weight.x) - weight).abs() / weight.max(1e-3);
                         let density = f64::from((found.pdf - pdf).abs() / pdf);
                         let grazing = wi.z.abs() < 0.02 || wo.z < 0.02;
                         assert!(

@@ -350,8 +350,8 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
     let (i, t) = (0.6f32.acos(), (0.8f32 / 1.5).asin());
     let share = |part: f32| 0.5 * part * part;
     let mirrored = share((i - t).sin() / (i + t).sin()) + share((i - t).tan() / (i + t).tan());
-    let left = (1.0 - mirrored) / 2.25;
-    assert!((passed.x - left).abs() < 2e-3, "{passed} {left}");
+    let transmitted = (1.0 - mirrored) / 2.25;
+    assert!((passed.x - transmitted).abs() < 2e-3, "{passed} {transmitted}");
     let ends = [0.0, 1e-38, 1e-20, 1e-4, 0.5, 1.0];
     for i in 0..20_000 {
         let bits = hash4(UVec4::new(i, 1, 2, 3));
@@ -433,7 +433,7 @@ fn values_come_from_the_channels_of_a_texture() {
         let packed = picture_of(textured, texture(kind));
         // One lookup for all four values; none if constant.
         assert_eq!(packed.textures.lookups.len(), usize::from(kind == "checker"));
-        for way in crate::pictures::exact_ways() {
+        for way in crate::pictures::exact_modes() {
             assert_eq!(
                 crate::pictures::differing(&crate::pictures::render(&packed, way), &expected),
                 0,

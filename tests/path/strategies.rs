@@ -3,7 +3,7 @@
 use wgray_render::gpu::compose::Shaders;
 
 use super::{mean, scene};
-use crate::pictures::{Way, render_with};
+use crate::pictures::{RenderMode, render_with};
 use crate::{adapter, sources};
 
 const FILE: &str = "integrators/path.wgsl";
@@ -81,7 +81,7 @@ fn light_and_bsdf_sampling_agree() {
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
     ];
     let many = many_lamps();
-    // The last shape and the many lights meet all materials, each other shape one.
+    // The last shape and the many lights are combined with all materials, each other shape with one.
     let (with_one, number_of_many) = (shapes.len() - 1, shapes.len());
     let shapes = shapes.into_iter().chain([many.as_str()]);
     for (i, shape) in shapes.enumerate() {
@@ -105,9 +105,13 @@ fn light_and_bsdf_sampling_agree() {
                 "a light tree is built over many lights"
             );
             // Direct emission is subtracted.
-            let seen = mean(&render_with(&scene(4096, 0, &text), Way::Baked, sources::shaders()));
+            let seen = mean(&render_with(
+                &scene(4096, 0, &text),
+                RenderMode::Baked,
+                sources::shaders(),
+            ));
             let reflected = |shaders: &Shaders| {
-                let found = mean(&render_with(&packed, Way::Baked, shaders));
+                let found = mean(&render_with(&packed, RenderMode::Baked, shaders));
                 [0, 1, 2].map(|i| found[i] - seen[i])
             };
             let both = reflected(sources::shaders());

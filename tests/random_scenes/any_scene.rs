@@ -201,7 +201,7 @@ fn render() -> impl Strategy<Value = RenderDescription> {
                 pixel_samples: patterns::samples(pixel, pixels),
                 light_samples: patterns::samples(light, lights),
                 filter: PixelFilterDescription { kind, radius: None },
-                adaptive: (adaptive && pixel.goes_on()).then_some(AdaptiveDescription {
+                adaptive: (adaptive && pixel.is_extensible()).then_some(AdaptiveDescription {
                     error: 0.02,
                     max_samples: Some(16),
                 }),

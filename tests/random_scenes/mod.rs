@@ -13,7 +13,7 @@ use wgray_render::gpu::compose::Shaders;
 
 use crate::adapter::{self, bit_exact};
 use crate::nearly::Nearly;
-use crate::pictures::{Way, differing, first_hits, reference, render_with};
+use crate::pictures::{RenderMode, differing, first_hits, reference, render_with};
 use crate::{patterns, rounding, sources};
 
 /// Number of scenes. If set, each run has different ones.
@@ -26,15 +26,18 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
     if !cpu.sums.iter().all(|sum| sum.is_finite()) {
         return Err("a pixel is NaN or infinite".into());
     }
-    for way in [Way::Baked, Way::Buffers] {
-        let differ = differing(&render_with(&packed, way, shaders), &cpu);
+    for mode in [RenderMode::Baked, RenderMode::Buffers] {
+        let differ = differing(&render_with(&packed, mode, shaders), &cpu);
         if differ > 0 {
-            return Err(format!("{differ} of {} pixels differ, {way:?}", cpu.sums.len()));
+            return Err(format!("{differ} of {} pixels differ, {mode:?}", cpu.sums.len()));
         }
     }
     // Only some scenes, as this needs another kernel.
     if d.render.seed.is_multiple_of(4) {
-        let (gpu, cpu) = (first_hits(&packed, Way::Buffers), first_hits(&packed, Way::Cpu));
+        let (gpu, cpu) = (
+            first_hits(&packed, RenderMode::Buffers),
+            first_hits(&packed, RenderMode::Cpu),
+        );
         if bytemuck::cast_slice::<_, u8>(&gpu) != bytemuck::cast_slice::<_, u8>(&cpu) {
             return Err("the first hits differ".into());
         }
@@ -126,16 +129,16 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
         let d = strategy.new_tree(&mut runner).expect("a scene").current();
         let packed = any_scene::packed(&d);
         let cpu = reference(&packed);
-        let by_plain_wgsl = render_with(&packed, Way::Plain, sources::shaders());
+        let by_plain_wgsl = render_with(&packed, RenderMode::Plain, sources::shaders());
         if bit_exact(device) {
             plain.add(Nearly::by_plain_wgsl(&by_plain_wgsl, &cpu));
-            let found = render_with(&packed, Way::Rounded, rounding::poor_shaders());
+            let found = render_with(&packed, RenderMode::Rounded, rounding::poor_shaders());
             poor.add(Nearly::of(&packed, &found, &cpu));
         } else {
             plain.add(Nearly::of(&packed, &by_plain_wgsl, &cpu));
             poor.add(Nearly::of(
                 &packed,
-                &render_with(&packed, Way::Buffers, sources::shaders()),
+                &render_with(&packed, RenderMode::Buffers, sources::shaders()),
                 &cpu,
             ));
         }
@@ -149,7 +152,7 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     assert!(shifted.judge().is_err(), "the comparison cannot fail");
 }
 
-/// One ulp in a constant is detected, and the reported scene is valid.
+/// Checks that a change of one ulp in a constant is detected, and that the reported scene is valid.
 #[test]
 fn random_scenes_detect_a_difference_of_one_ulp() {
     if !adapter::device().is_some_and(bit_exact) {

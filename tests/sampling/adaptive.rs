@@ -11,7 +11,7 @@ use wgray_render::job::WorkSplit;
 use wgray_render::records::Packed;
 
 use super::cornell;
-use crate::pictures::{backend, crop, differing, exact_ways, film, reference, render, whole};
+use crate::pictures::{backend, crop, differing, exact_modes, film, reference, render, whole};
 
 const GOING_ON: [Pattern; 4] = [Pattern::Jittered, Pattern::Random, Pattern::Halton, Pattern::Sobol];
 
@@ -41,7 +41,7 @@ fn adaptive_images_do_not_depend_on_backend_or_work_split() {
                 variances.into_iter().all(|variance| variance >= 0.0),
                 "{pattern:?}, {kind:?}"
             );
-            for way in exact_ways() {
+            for way in exact_modes() {
                 for (band_pixels, samples_per_dispatch, rows_per_dispatch) in [
                     (1 << 20, None, None),
                     (41 * 7, Some(5), Some(3)),
@@ -49,16 +49,16 @@ fn adaptive_images_do_not_depend_on_backend_or_work_split() {
                     (1, None, None),
                     (500, Some(1), Some(2)),
                 ] {
-                    let cut = WorkSplit {
+                    let split = WorkSplit {
                         band_pixels,
                         samples_per_dispatch,
                         rows_per_dispatch,
                     };
-                    let found = film(&mut *backend(&packed, way), &packed, whole(&packed), &cut);
+                    let found = film(&mut *backend(&packed, way), &packed, whole(&packed), &split);
                     assert_eq!(
                         differing(&found, &expected),
                         0,
-                        "{pattern:?}, {kind:?}, {way:?}, {cut:?}"
+                        "{pattern:?}, {kind:?}, {way:?}, {split:?}"
                     );
                 }
             }
@@ -76,7 +76,7 @@ fn adaptive_images_do_not_depend_on_backend_or_work_split() {
 fn a_crop_is_a_part_of_the_whole() {
     let packed = adaptive(Pattern::Sobol, 0.01, 100);
     let expected = reference(&packed);
-    for way in exact_ways() {
+    for way in exact_modes() {
         for (x0, y0, x1, y1) in [
             (0, 0, 1, 1),
             (20, 13, 21, 14),
@@ -86,11 +86,11 @@ fn a_crop_is_a_part_of_the_whole() {
         ] {
             let part = Region { x0, y0, x1, y1 };
             for band_pixels in [1 << 20, 50] {
-                let cut = WorkSplit {
+                let split = WorkSplit {
                     band_pixels,
                     ..WorkSplit::default()
                 };
-                let found = film(&mut *backend(&packed, way), &packed, part, &cut);
+                let found = film(&mut *backend(&packed, way), &packed, part, &split);
                 assert_eq!(differing(&found, &crop(&expected, part)), 0, "{way:?}, {part:?}");
             }
         }
@@ -196,7 +196,7 @@ fn minimum_image_and_pilot_sizes() {
             });
         });
         let expected = reference(&packed);
-        for way in exact_ways() {
+        for way in exact_modes() {
             assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
         }
         expected.sample_counts().collect::<Vec<u32>>()

@@ -9,7 +9,7 @@ use wgray_render::pack::filter::{height, table};
 use wgray_render::records::{FILTER_BINS_MAX, Packed};
 
 use super::cornell;
-use crate::pictures::{Way, differing, exact_ways, render};
+use crate::pictures::{RenderMode, differing, exact_modes, render};
 use crate::scenes;
 
 const KINDS: [PixelFilterKind; 5] = [
@@ -138,7 +138,7 @@ fn positions_and_weights_have_the_moments_of_their_filters() {
 }
 
 #[test]
-fn the_box_filter_needs_no_table_and_its_table_gives_the_same_image() {
+fn the_box_filter_needs_no_table_and_a_table_gives_equal_samples() {
     let plain = filtered_scene(PixelFilterKind::Box, 0.5);
     assert_eq!(
         (plain.specialization.filter_bins, plain.sampling.filter_table.len()),
@@ -162,7 +162,7 @@ fn a_constant_image_is_constant_under_every_filter() {
         packed.bounds.clear();
         packed.counts.primitives = Default::default();
         packed.environment.background = glam::Vec3::new(0.25, 0.5, 0.75);
-        for sum in render(&packed, Way::Cpu).sums {
+        for sum in render(&packed, RenderMode::Cpu).sums {
             let [r, g, b] = mean(sum);
             assert!(
                 (r - 0.25).abs() < 1e-5 && (g - 0.5).abs() < 1e-5 && (b - 0.75).abs() < 1e-5,
@@ -177,9 +177,9 @@ fn images_of_every_filter_are_the_same_on_cpu_and_gpu() {
     let mut films = Vec::new();
     for kind in KINDS {
         let packed = filtered_scene(kind, 1.25);
-        let expected = render(&packed, Way::Cpu);
-        for way in exact_ways() {
-            assert_eq!(differing(&render(&packed, way), &expected), 0, "{kind:?}, {way:?}");
+        let expected = render(&packed, RenderMode::Cpu);
+        for mode in exact_modes() {
+            assert_eq!(differing(&render(&packed, mode), &expected), 0, "{kind:?}, {mode:?}");
         }
         films.push(expected);
     }

@@ -94,12 +94,12 @@ fn the_second_sobol_coordinate_is_the_product_with_pascals_matrix() {
 fn is_net(points: &[Vec2]) -> bool {
     let m = points.len().ilog2();
     (0..=m).all(|across| {
-        let mut met = vec![false; points.len()];
+        let mut occupied = vec![false; points.len()];
         for p in points {
             let (column, row) = (whole(p.x) >> (24 - across), whole(p.y) >> (24 - (m - across)));
-            met[((column << (m - across)) | row) as usize] = true;
+            occupied[((column << (m - across)) | row) as usize] = true;
         }
-        met.into_iter().all(|met| met)
+        occupied.into_iter().all(|occupied| occupied)
     })
 }
 

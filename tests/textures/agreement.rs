@@ -9,7 +9,7 @@ use wgray_render::records::Packed;
 
 use super::{cpu_picture, scene, write_exr, write_png};
 use crate::meshes::forms::Sheet;
-use crate::pictures::{Way, backend, film, reference, whole};
+use crate::pictures::{RenderMode, backend, film, reference, whole};
 use crate::render::compare;
 use crate::{adapter, sources};
 
@@ -165,10 +165,10 @@ fn images_are_the_same_on_gpu_and_cpu() {
         let expected = reference(&scene);
         let colors: BTreeSet<_> = expected.means().map(|pixel| pixel.map(f32::to_bits)).collect();
         assert!(colors.len() > 100, "{name} shows nothing");
-        for (way, cut) in [(Way::Baked, WorkSplit::default()), (Way::Buffers, odd)] {
-            let found = film(&mut *backend(&scene, way), &scene, whole(&scene), &cut);
-            let problem = compare(way, &scene, &found, &expected);
-            assert!(problem.is_ok(), "{name}, {way:?}: {}", problem.unwrap_err());
+        for (mode, cut) in [(RenderMode::Baked, WorkSplit::default()), (RenderMode::Buffers, odd)] {
+            let found = film(&mut *backend(&scene, mode), &scene, whole(&scene), &cut);
+            let problem = compare(mode, &scene, &found, &expected);
+            assert!(problem.is_ok(), "{name}, {mode:?}: {}", problem.unwrap_err());
         }
     }
 }
@@ -204,15 +204,15 @@ fn texels_in_several_buffers_give_the_same_image() {
         Gpu::new(small, scene, sources::shaders(), Options { exact, baked })
     };
     let expected = reference(scene);
-    for (way, baked) in [(Way::Baked, true), (Way::Buffers, false)] {
+    for (mode, baked) in [(RenderMode::Baked, true), (RenderMode::Buffers, false)] {
         let found = film(
             &mut new(&small, baked).unwrap(),
             scene,
             whole(scene),
             &WorkSplit::default(),
         );
-        let problem = compare(way, scene, &found, &expected);
-        assert!(problem.is_ok(), "{way:?}: {}", problem.unwrap_err());
+        let problem = compare(mode, scene, &found, &expected);
+        assert!(problem.is_ok(), "{mode:?}: {}", problem.unwrap_err());
     }
     small.info.storage_buffers = 9;
     let error = new(&small, false).err().unwrap().to_string();

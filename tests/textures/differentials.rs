@@ -143,14 +143,14 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, HitDifferenti
         if hit.primitive == NO_INDEX {
             return None;
         }
-        let spot = fetch_hit_primitive(scene, hit);
-        if is_specular(material_of(scene, &spot)) {
-            path = scatter(scene, &spot, hit, path, UVec2::ZERO, 0).primary;
+        let prim = fetch_hit_primitive(scene, hit);
+        if is_specular(material_of(scene, &prim)) {
+            path = scatter(scene, &prim, hit, path, UVec2::ZERO, 0).primary;
             continue;
         }
-        let surface = with_coordinates(surface_of(scene, &spot, hit, path.ray), &spot.primitive);
-        let at = hit_differential(scene, &spot, hit, surface, path.ray, path.differential);
-        return Some((spot.primitive, surface, at, path.depth));
+        let surface = with_coordinates(surface_of(scene, &prim, hit, path.ray), &prim.primitive);
+        let at = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
+        return Some((prim.primitive, surface, at, path.depth));
     }
 }
 
@@ -275,9 +275,9 @@ fn a_curved_mirror_needs_its_curvature() {
     let differential = camera_differential(&scene.camera, at, 1.0);
     let ray = camera_ray(&scene.camera, at);
     let hit = closest_hit(&scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
-    let spot = fetch_hit_primitive(&scene, hit);
-    let surface = surface_of(&scene, &spot, hit, ray);
-    let arrival = hit_differential(&scene, &spot, hit, surface, ray, differential);
+    let prim = fetch_hit_primitive(&scene, hit);
+    let surface = surface_of(&scene, &prim, hit, ray);
+    let arrival = hit_differential(&scene, &prim, hit, surface, ray, differential);
     let mirrored = |at: DVec2| {
         let (o, d) = exact.camera(at);
         let (center, m) = Exact::rows();
@@ -389,23 +389,23 @@ fn differentials_on_a_mesh_match_adjacent_rays() {
             if hit.primitive == NO_INDEX {
                 continue;
             }
-            let spot = fetch_hit_primitive(&packed, hit);
-            let surface = surface_of(&packed, &spot, hit, ray);
+            let prim = fetch_hit_primitive(&packed, hit);
+            let surface = surface_of(&packed, &prim, hit, ray);
             if ray.direction.dot(surface.normal).abs() < 0.1 {
                 continue;
             }
             let differential = camera_differential(&packed.camera, at, 1.0);
-            let arrival = hit_differential(&packed, &spot, hit, surface, ray, differential);
-            let footprint = footprint_of(&spot, hit, surface, arrival);
+            let arrival = hit_differential(&packed, &prim, hit, surface, ray, differential);
+            let footprint = footprint_of(&prim, hit, surface, arrival);
             let point = |at: DVec2| {
                 let (o, d) = exact.camera(at);
                 on_triangle(&sheet, matrix, hit.primitive as usize, (o + packed.origin, d))
             };
             let middle = point(at.as_dvec2());
-            let met = surface.position.as_dvec3() + packed.origin;
+            let position = surface.position.as_dvec3() + packed.origin;
             assert!(
-                (met - middle.position).length() < 1e-4,
-                "({x}, {y}): {met} {}",
+                (position - middle.position).length() < 1e-4,
+                "({x}, {y}): {position} {}",
                 middle.position
             );
             assert!(

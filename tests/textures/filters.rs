@@ -81,7 +81,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
             }
         }
     }
-    // Fewer than half: clamped ones beyond the edge do not see it.
+    // Not all of them: clamped footprints beyond the edge do not see the texel.
     assert!(varied > 800, "{varied}");
 }
 

@@ -28,10 +28,10 @@ fn reflectances_match_the_fresnel_equations() {
     assert!(reflectance(89.999, 1.5) > 0.999);
     for degrees in 0..90 {
         assert_eq!(reflectance(f64::from(degrees), 1.0), 0.0);
-        let there = reflectance(f64::from(degrees), 1.5);
+        let entering = reflectance(f64::from(degrees), 1.5);
         let refracted = (f64::from(degrees).to_radians().sin() / 1.5).asin().to_degrees();
         // From the other side.
-        assert!((there - reflectance(refracted, 1.0 / 1.5)).abs() < 1e-4);
+        assert!((entering - reflectance(refracted, 1.0 / 1.5)).abs() < 1e-4);
     }
 }
 

@@ -54,7 +54,7 @@ impl<'a> Layout<'a> {
 
     /// Returns the range of everything at a path, from the first to the last byte of its keys and values.
     pub fn extent(&self, path: &KeyPath) -> Option<Range<usize>> {
-        let way = Way::along(self.0.as_table(), &path.0);
+        let way = NodePath::along(self.0.as_table(), &path.0);
         way.rest.is_empty().then_some(())?;
         let mut found = None;
         // A key stands before its value; the header of a table belongs to the table.
@@ -70,7 +70,7 @@ impl<'a> Layout<'a> {
 
     /// Returns the range of the value at a path.
     pub fn value(&self, path: &KeyPath) -> Option<Range<usize>> {
-        let way = Way::along(self.0.as_table(), &path.0);
+        let way = NodePath::along(self.0.as_table(), &path.0);
         match way.nodes.last()? {
             Node::Value(value) if way.rest.is_empty() => value.span(),
             _ => None,
@@ -124,34 +124,34 @@ impl<'a> Node<'a> {
 }
 
 /// The nodes from the root of a document along a path, as far as they exist.
-struct Way<'a, 'p> {
+struct NodePath<'a, 'p> {
     /// The nodes, starting with the root table.
     nodes: Vec<Node<'a>>,
     /// The segments of the path that do not exist.
     rest: &'p [Segment],
 }
 
-impl<'a, 'p> Way<'a, 'p> {
-    fn along(root: &'a Table, path: &'p [Segment]) -> Way<'a, 'p> {
+impl<'a, 'p> NodePath<'a, 'p> {
+    fn along(root: &'a Table, path: &'p [Segment]) -> NodePath<'a, 'p> {
         let mut nodes = vec![Node::Table(root)];
         for (i, segment) in path.iter().enumerate() {
             match nodes.last().and_then(|node| node.step(segment)) {
                 Some(node) => nodes.push(node),
                 None => {
-                    return Way {
+                    return NodePath {
                         nodes,
                         rest: &path[i..],
                     };
                 }
             }
         }
-        Way { nodes, rest: &[] }
+        NodePath { nodes, rest: &[] }
     }
 }
 
 fn edits(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<Vec<Edit>, String> {
     let document = Document::parse(text).map_err(|error| error.message().to_owned())?;
-    let way = Way::along(document.as_table(), &path.0);
+    let way = NodePath::along(document.as_table(), &path.0);
     let here = *way.nodes.last().ok_or("has no place")?;
     match (value, way.rest) {
         (None, []) => Ok(vec![removal(text, &way, &path.0)?]),
@@ -201,7 +201,7 @@ fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> 
 }
 
 /// Returns the edits that add an absent key to the table at the end of a path, after its last key.
-fn addition(text: &str, way: &Way, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
+fn addition(text: &str, way: &NodePath, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
     let here = *way.nodes.last().ok_or("has no place")?;
     // A table of dotted keys repeats the same prefix before each key.
     let dots = way.nodes.iter().rev().take_while(|node| node.is_dotted()).count();
@@ -299,7 +299,7 @@ fn line_break(text: &str, at: usize) -> &'static str {
 }
 
 /// Returns the edits that remove the key at the end of a path, and the table if it becomes empty.
-fn removal(text: &str, way: &Way, path: &[Segment]) -> Result<Edit, String> {
+fn removal(text: &str, way: &NodePath, path: &[Segment]) -> Result<Edit, String> {
     let refused = || Err("can only be removed in the scene file".to_owned());
     let mut depth = path.len();
     loop {

@@ -212,7 +212,7 @@ pub struct State {
     /// Seconds spent on the last compilation.
     pub compile_seconds: Option<f64>,
     /// Number of executed commands.
-    pub heard: u64,
+    pub executed: u64,
     /// The number of the last frame.
     pub frame: u64,
     /// True if more frames follow without any event.
@@ -226,7 +226,7 @@ pub struct State {
 pub struct Notice {
     /// The number of the notice.
     pub number: u64,
-    /// The command that it answers, as a count like [`State::heard`].
+    /// The command that it answers, as a count like [`State::executed`].
     pub command: u64,
     /// The text; empty if the previous notice no longer applies.
     pub text: String,

@@ -189,7 +189,7 @@ impl Session {
     }
 
     /// Returns a function that sends commands from other threads without blocking. It returns the number that
-    /// [`State::heard`] reaches once the command is executed, or `None` if the session is busy.
+    /// [`State::executed`] reaches once the command is executed, or `None` if the session is busy.
     pub fn commands(&self) -> impl Fn(Command) -> Option<u64> + Send + Sync + 'static {
         let (events, asked) = (self.events.clone(), self.asked.clone());
         move |command| {

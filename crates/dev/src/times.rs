@@ -110,10 +110,10 @@ impl Times {
     }
 
     /// Returns the timings: kernels first, then the stages in order.
-    pub fn told(&self) -> Vec<Time> {
+    pub fn timings(&self) -> Vec<Time> {
         let now = Instant::now();
         let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut timings: Vec<Time> = all.iter().map(|kept| kept.told(now)).collect();
+        let mut timings: Vec<Time> = all.iter().map(|kept| kept.timing(now)).collect();
         let place = |time: &Time| (!time.kernel, PARTS.iter().position(|name| *name == time.name));
         timings.sort_by_key(place);
         timings
@@ -138,7 +138,7 @@ impl TimeRecord {
         }
     }
 
-    fn told(&self, now: Instant) -> Time {
+    fn timing(&self, now: Instant) -> Time {
         let mut last: Vec<Duration> = self.last.iter().copied().collect();
         last.sort();
         let within = |(end, took): &(Instant, Duration)| {
@@ -170,7 +170,7 @@ mod tests {
                 samples: 64 * i,
             });
         }
-        let timings = times.told();
+        let timings = times.timings();
         let names: Vec<_> = timings.iter().map(|time| time.name).collect();
         assert_eq!(names, ["render", "read files", "upload"]);
         let render = &timings[0];
@@ -188,7 +188,7 @@ mod tests {
             kept.ended
                 .push_back((now - Duration::from_millis(ago), Duration::from_millis(took)));
         }
-        let share = kept.told(now).share;
+        let share = kept.timing(now).share;
         assert!((share - (0.2 + 0.05 + 0.02)).abs() < 1e-9, "{share}");
     }
 }

@@ -37,7 +37,7 @@ const PING_INTERVAL: Duration = Duration::from_secs(15);
 #[derive(Debug, PartialEq)]
 enum Request {
     /// Acknowledges the frame of this number and all before it. There is no answer.
-    ErrorImage(u64),
+    Acknowledge(u64),
     Question(Question),
     Command(Command),
 }
@@ -87,7 +87,7 @@ impl Request {
             name.ok_or("a message must be the name of a command, or an object with that name as its only key")?;
         // From the text again: a JSON value hides that a key occurs twice.
         let parsed = match name.as_str() {
-            "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::ErrorImage(shown)),
+            "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::Acknowledge(shown)),
             name if QUESTIONS.contains(&name) => serde_json::from_str(message).map(Request::Question),
             _ => serde_json::from_str(message).map(Request::Command),
         };
@@ -113,7 +113,7 @@ enum Reply<'a> {
     },
     Object(Box<Object>),
     Objects(ObjectList),
-    /// The number of an accepted command; [`messages::State::heard`] reaches it once the command is executed.
+    /// The number of an accepted command; [`messages::State::executed`] reaches it once the command is executed.
     Asked(u64),
     #[serde(rename = "refused")]
     Refusal(String),
@@ -147,7 +147,7 @@ async fn receive(
             Message::Ping(_) | Message::Pong(_) => continue,
         };
         let reply = match Request::parse(&text) {
-            Ok(Request::ErrorImage(number)) => {
+            Ok(Request::Acknowledge(number)) => {
                 shown.send_replace(number);
                 continue;
             }
@@ -209,7 +209,7 @@ async fn send(
                 continue;
             }
             _ = clock.tick() => {
-                let now = shared.times.told();
+                let now = shared.times.timings();
                 if now == times {
                     continue;
                 }
@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn messages_are_parsed_and_errors_name_the_command() {
         assert_eq!(Request::parse("\"grab\""), Ok(Request::Command(Command::Grab)));
-        assert_eq!(Request::parse("{\"shown\":7}"), Ok(Request::ErrorImage(7)));
+        assert_eq!(Request::parse("{\"shown\":7}"), Ok(Request::Acknowledge(7)));
         let pixel = Request::Question(Question::Pixel([1, 2]));
         assert_eq!(Request::parse("{\"pixel\":[1,2]}"), Ok(pixel));
         for (message, error) in [

@@ -62,8 +62,8 @@ impl Pending {
     pub fn start(output: Output) -> io::Result<Pending> {
         let name = output.name().to_owned();
         let spool = match output.place {
-            Destination::File { path, there } => {
-                beside(&path).map(|file| Spool::Beside(file, path, there.map(|(_, permissions)| permissions)))
+            Destination::File { path, existing } => {
+                beside(&path).map(|file| Spool::Beside(file, path, existing.map(|(_, permissions)| permissions)))
             }
             Destination::Through { file: Some(file), .. } => nameless(file),
             Destination::Through { path, file: None, .. } => open(&path).and_then(nameless),

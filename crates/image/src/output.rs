@@ -19,7 +19,7 @@ pub(super) enum Destination {
         /// Path without symbolic links.
         path: PathBuf,
         /// Identity and permissions of the existing file.
-        there: Option<(Identity, Permissions)>,
+        existing: Option<(Identity, Permissions)>,
     },
     /// A pipe or a device.
     Through {
@@ -169,7 +169,7 @@ impl Output {
 
     fn identity(&self) -> Option<Identity> {
         match &self.place {
-            Destination::File { there, .. } => there.as_ref().map(|(identity, _)| identity.clone()),
+            Destination::File { existing, .. } => existing.as_ref().map(|(identity, _)| identity.clone()),
             Destination::Through { identity, .. } => Some(identity.clone()),
             Destination::Standard(stream) => {
                 let data = stream.file().and_then(|file| file.metadata());
@@ -252,15 +252,15 @@ fn place(path: &Path) -> io::Result<Destination> {
                 return Err(io::Error::new(io::ErrorKind::PermissionDenied, message));
             }
             open(&path)?;
-            let there = Some((Identity::of(&data), data.permissions()));
-            Ok(Destination::File { path, there })
+            let existing = Some((Identity::of(&data), data.permissions()));
+            Ok(Destination::File { path, existing })
         }
         Ok(data) => Ok(Destination::Through {
             identity: Identity::of(&data),
             path,
             file: None,
         }),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Destination::File { path, there: None }),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Destination::File { path, existing: None }),
         Err(error) => Err(error),
     }
 }

@@ -349,7 +349,7 @@ fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
                 .collect()
         }
         ("materials", [Segment::Key(name), rest @ ..]) => {
-            let course = read_json(text, &mut defines.anew()).ok();
+            let course = read_json(text, &mut defines.restarted()).ok();
             let index = course.and_then(|course| course.materials.iter().position(|material| material.name == *name));
             let key = match rest {
                 [Segment::Key(key)] if key == "type" => "type",

@@ -55,7 +55,7 @@ impl FromStr for Define {
 
 impl Define {
     /// Returns true if the override sets this key, a part of it or a table around it.
-    pub(super) fn stands_in_for(&self, key: &KeyPath) -> bool {
+    pub(super) fn overrides_key(&self, key: &KeyPath) -> bool {
         self.key.0.iter().zip(&key.0).all(|(own, step)| is_step(own, step))
     }
 }

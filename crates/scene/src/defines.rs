@@ -11,7 +11,7 @@ use crate::suggest;
 impl Problems {
     /// Returns the error of the first problem that an override caused.
     pub(super) fn of_define(&self, defines: &Defines) -> Option<SceneError> {
-        let problem = self.iter().find(|problem| defines.brought(&problem.key))?;
+        let problem = self.iter().find(|problem| defines.has_set(&problem.key))?;
         Some(SceneError::Override(problem.clone().at("define")))
     }
 }
@@ -36,7 +36,7 @@ impl<'a> Defines<'a> {
         Defines { given, put: Vec::new() }
     }
 
-    pub fn anew(&self) -> Defines<'a> {
+    pub fn restarted(&self) -> Defines<'a> {
         Defines::new(self.given)
     }
 
@@ -46,7 +46,7 @@ impl<'a> Defines<'a> {
     }
 
     /// Returns true if an override set the value of this key or of a table around it.
-    pub fn brought(&self, key: &KeyPath) -> bool {
+    pub fn has_set(&self, key: &KeyPath) -> bool {
         let key = key.0.as_slice();
         self.put.iter().any(|put| {
             let is_below = put.path.get(..put.own).is_some_and(|own| key.starts_with(own));

@@ -55,7 +55,7 @@ pub fn measure(
         psnr: plain(Metric::Psnr, found.psnr),
         ssim: ssim.map(Number),
         flip: flip.map(Number),
-        not_finite: match found.odd {
+        not_finite: match found.first_non_finite {
             Some(first) => Some((found.a, found.b, first).into()),
             None => None,
         },

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Serialize, Serializer};
-use wgray_image::compare::{Largest, Picture, PixelCoord, Values};
+use wgray_image::compare::{LargestDifference, Picture, PixelCoord, Values};
 
 use super::metric::{Limit, METRICS, Metric};
 
@@ -89,8 +89,8 @@ pub struct LargestReport {
     b: f64,
 }
 
-impl From<Largest> for LargestReport {
-    fn from(largest: Largest) -> Self {
+impl From<LargestDifference> for LargestReport {
+    fn from(largest: LargestDifference) -> Self {
         LargestReport {
             x: largest.pixel.x,
             y: largest.pixel.y,

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-use crate::cli::log::{Facts, Level, say, tell};
+use crate::cli::log::{Facts, Level, print, print_with};
 
 /// A log of messages that remembers the lines it printed.
 pub struct OnceLog {
@@ -23,7 +23,7 @@ impl OnceLog {
     /// Prints a line unless it was printed before.
     pub fn log_once(&self, level: Level, line: &str) {
         if !self.quiet && self.lines.borrow_mut().insert(line.to_owned()) {
-            say(level, line);
+            print(level, line);
         }
     }
 
@@ -35,7 +35,7 @@ impl OnceLog {
     /// Prints a line with additional JSON fields.
     pub fn log_with(&self, level: Level, line: &str, facts: Facts) {
         if !self.quiet {
-            tell(level, line, facts);
+            print_with(level, line, facts);
         }
     }
 }

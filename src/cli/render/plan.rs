@@ -129,7 +129,7 @@ impl<'a> Plan<'a> {
             resume: self.resume,
             interval: self.checkpoint_interval,
             wait: Box::new(move || signal().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
-            tell: Box::new(|what| self.log.log(Level::Warning, what)),
+            report: Box::new(|what| self.log.log(Level::Warning, what)),
         };
         let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
         match Checkpoint::open(opening, identity, self.scene.film_layout()) {

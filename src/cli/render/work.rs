@@ -130,7 +130,7 @@ fn render(
         Ok(match plan.deadline {
             _ if stop.signal().is_some() => Flow::Cancel,
             Some(end) if now >= end => Flow::TimeIsUp,
-            _ => Flow::GoOn,
+            _ => Flow::Continue,
         })
     };
     if let Some((previews, layout)) = previews {

@@ -40,7 +40,7 @@ export const askPixel = (pixel) => put({ pixel });
 
 // Returns whether the program has executed all commands of this page. Until then its state must not replace newer
 // input.
-export const isHeard = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.heard >= asked;
+export const isUpToDate = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.executed >= asked;
 export const lastState = () => state;
 
 export function connect() {
@@ -72,7 +72,7 @@ async function isServed() {
 function hear(message) {
   if (message.state) {
     state = message.state;
-    emit("state", state, isHeard());
+    emit("state", state, isUpToDate());
     return;
   }
   const [[name, value]] = Object.entries(message);
@@ -81,7 +81,7 @@ function hear(message) {
     if (name === "asked") asked = value;
     if (name === "refused") emit("refused", value);
     resolve(name === "refused" ? null : value);
-    if (isCommand && isHeard()) emit("state", state, true);
+    if (isCommand && isUpToDate()) emit("state", state, true);
   }
   named.get(name)?.forEach((f) => f(value));
 }

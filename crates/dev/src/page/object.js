@@ -123,7 +123,7 @@ async function send() {
 }
 
 function settle(state) {
-  if (!sending?.number || !state || state.heard < sending.number) return;
+  if (!sending?.number || !state || state.executed < sending.number) return;
   const { number, note } = sending;
   const { command, bad, text } = state.notice ?? {};
   note(command === number && bad ? text : "");

@@ -4,7 +4,7 @@ import { setUpCamera } from "/camera.js";
 import { setUpCompare } from "/compare.js";
 import { setUpFocus } from "/focus.js";
 import { setUpInvalid } from "/invalid.js";
-import { connect, element, isHeard, lastState, onFrame, onLink, onRefused, onState } from "/link.js";
+import { connect, element, isUpToDate, lastState, onFrame, onLink, onRefused, onState } from "/link.js";
 import { setUpWheel } from "/numbers.js";
 import { select, setUpObject } from "/object.js";
 import { Picture } from "/picture.js";
@@ -69,11 +69,11 @@ onFrame((header, images) => {
 // `commands` commands of all viewers.
 window.isSettled = (commands) => {
   const state = lastState();
-  return isHeard() && state.heard >= commands && picture.isSettled() && !state.busy && state.frame > 0 && numberShown >= state.frame;
+  return isUpToDate() && state.executed >= commands && picture.isSettled() && !state.busy && state.frame > 0 && numberShown >= state.frame;
 };
 
 onState((state) => {
-  element("panels").dataset.heard = state.heard;
+  element("panels").dataset.executed = state.executed;
   document.title = `${state.problems.length ? "✗ " : ""}${state.scene} – wgray`;
   element("scene").textContent = state.scene;
   element("device").textContent = state.device;

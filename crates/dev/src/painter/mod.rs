@@ -108,7 +108,7 @@ pub struct Painter {
     smaller: Option<([u32; 2], [u32; 2])>,
 
     /// Number of executed commands.
-    heard: u64,
+    executed: u64,
     /// Number of frames.
     frames: u64,
     /// Number of images.
@@ -230,7 +230,7 @@ impl Painter {
             comparison: Comparison::default(),
             events,
             smaller: None,
-            heard: 0,
+            executed: 0,
             frames: 0,
             revision: 0,
             since: None,
@@ -249,7 +249,7 @@ impl Painter {
             Event::BuildResult(built) => self.take_built(*built),
             Event::Command(command) => {
                 self.take_command(command);
-                self.heard += 1;
+                self.executed += 1;
             }
             Event::Reference(reference) => self.take_reference(reference),
             Event::Measured(apart) => self.take_measured(apart),

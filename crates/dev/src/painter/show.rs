@@ -204,7 +204,7 @@ impl Painter {
         self.state.no_comparison = self.no_comparison();
         self.state.apart = self.apart();
         self.state.camera_moved = self.camera.is_some();
-        (self.state.heard, self.state.frame) = (self.heard, self.frames);
+        (self.state.executed, self.state.frame) = (self.executed, self.frames);
         let rests = self.paused && !self.running.as_ref().is_some_and(|running| running.canvas.is_new());
         let renders = self.running.is_some() && !self.is_done() && !rests;
         self.state.busy = self.camera_waits || self.pending.is_some() || renders;

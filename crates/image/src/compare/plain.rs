@@ -53,7 +53,7 @@ impl Values {
 
 /// The largest difference of two values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Largest {
+pub struct LargestDifference {
     /// Absolute difference.
     pub difference: f64,
     /// Pixel, the first in reading order of several.
@@ -77,7 +77,7 @@ pub struct Difference {
     /// Pixels with a value that differs by more than the threshold, or that is not finite and not bit-identical.
     pub beyond: u64,
     /// The largest difference, if it is above 0.
-    pub largest: Option<Largest>,
+    pub largest: Option<LargestDifference>,
     /// Root mean square of all differences.
     pub rmse: f64,
     /// Mean of d² / (b² + 0.01), where b is the value in the second image.
@@ -90,7 +90,7 @@ pub struct Difference {
     /// Non-finite values of the second image.
     pub b: Values,
     /// The first pixel with a non-finite value in either image.
-    pub odd: Option<PixelCoord>,
+    pub first_non_finite: Option<PixelCoord>,
 }
 
 /// Returns the layers that both images have, colors first, and the channels that only the first or only the second has.
@@ -149,7 +149,7 @@ struct DifferenceSums {
     peak: f64,
     a: Values,
     b: Values,
-    odd: Option<usize>,
+    first_non_finite: Option<usize>,
 }
 
 impl DifferenceSums {
@@ -167,7 +167,7 @@ impl DifferenceSums {
             own.nan += next.nan;
             own.infinite += next.infinite;
         }
-        self.odd = self.odd.or(next.odd);
+        self.first_non_finite = self.first_non_finite.or(next.first_non_finite);
     }
 }
 
@@ -197,7 +197,7 @@ impl<'a> Layer<'a> {
             beyond: all.beyond,
             largest: all.largest.and_then(|(difference, pixel, channel)| {
                 let (name, a, b) = self.channels.get(channel)?;
-                Some(Largest {
+                Some(LargestDifference {
                     difference,
                     pixel: coord(pixel),
                     channel: (*name).to_owned(),
@@ -210,7 +210,7 @@ impl<'a> Layer<'a> {
             psnr: 20.0 * (peak / rmse).log10(),
             a: all.a,
             b: all.b,
-            odd: all.odd.map(coord),
+            first_non_finite: all.first_non_finite.map(coord),
         }
     }
 
@@ -275,7 +275,11 @@ impl<'a> Layer<'a> {
                 if !(a.is_finite() && b.is_finite()) {
                     found.a.count(*a);
                     found.b.count(*b);
-                    found.odd = Some(found.odd.map_or(start + i, |odd| odd.min(start + i)));
+                    found.first_non_finite = Some(
+                        found
+                            .first_non_finite
+                            .map_or(start + i, |first_non_finite| first_non_finite.min(start + i)),
+                    );
                     beyond[i] |= a.to_bits() != b.to_bits();
                     (apart, reference) = (0.0, 0.0);
                 }

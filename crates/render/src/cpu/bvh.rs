@@ -26,11 +26,11 @@ use crate::records::{
 const FEW_ITEMS: usize = 4;
 
 fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
-    scene.counts.room.x * (largest(origin) + scene.counts.room.y)
+    scene.counts.item_padding.x * (largest(origin) + scene.counts.item_padding.y)
 }
 
 /// Returns the closest hit among the items of the scene's BVH if it is nearer than `before`, else `before`.
-pub fn closest_in_tree(scene: &Packed, before: Hit, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {
+pub fn closest_in_bvh(scene: &Packed, before: Hit, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {
     let mut hit = before;
     let pad = item_pad(scene, ray.origin);
     let s = slabs(ray.origin, ray.direction, pad);

@@ -43,7 +43,7 @@ pub fn select_emitter(scene: &Packed, bits: UVec2) -> Emitter {
     if unit_float(bits.y) < emitter.threshold {
         emitter
     } else {
-        scene.lighting.emitters[emitter.other as usize]
+        scene.lighting.emitters[emitter.alias_index as usize]
     }
 }
 

@@ -4,7 +4,7 @@ use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4Swizzles as _};
 
 use super::alpha::skip_transparent;
-use super::bvh::{closest_in_tree, is_occluded_by_bvh, occluded_by_bvh};
+use super::bvh::{closest_in_bvh, is_occluded_by_bvh, occluded_by_bvh};
 use super::camera::camera_ray;
 use super::differential::{Differential, HitDifferential, arrival};
 use super::footprint::{Footprint, surface_footprint};
@@ -30,7 +30,7 @@ pub fn closest_hit(scene: &Packed, ray: Ray, origin_prim: UVec2, inside_prim: UV
         return closest_primitive(scene, ray, origin_prim.y, inside_prim.y);
     }
     let hit = closest_primitive(scene, ray, standalone_prim(origin_prim), standalone_prim(inside_prim));
-    closest_in_tree(scene, hit, ray, origin_prim, inside_prim)
+    closest_in_bvh(scene, hit, ray, origin_prim, inside_prim)
 }
 
 pub fn occluded_samples(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock, unlit: u32) -> u32 {

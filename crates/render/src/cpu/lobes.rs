@@ -133,7 +133,7 @@ mod tests {
 
     /// Every instruction set gives the bits of the functions for one sample.
     #[test]
-    fn all_at_once_is_one_by_one() {
+    fn simd_equals_scalar() {
         let to = LightSegments {
             towards: Vec3::new(0.3, -0.4, 0.5),
             u: Vec3::new(0.7, 0.1, 0.2),

@@ -236,9 +236,9 @@ pub fn face_terminator_offset(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3 {
     lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y
 }
 
-pub fn lift(n: Vec3, to_vertex: Vec3, up: Vec3) -> Vec3 {
+pub fn lift(n: Vec3, from_vertex: Vec3, up: Vec3) -> Vec3 {
     n * if dot(n, up) > 0.8 {
-        max(-dot(n, to_vertex), 0.0)
+        max(-dot(n, from_vertex), 0.0)
     } else {
         0.0
     }

@@ -167,7 +167,7 @@ mod tests {
     use crate::records::NO_PRIMITIVE;
 
     #[test]
-    fn what_cannot_be_reflected_by_falls_back_to_the_smooth_normal() {
+    fn unusable_normal_falls_back_to_smooth_normal() {
         let zero = Vec3::ZERO;
         let smooth_normal = normalize(Vec3::new(0.1, 0.0, 1.0));
         let surface = |x: f32| Surface {

@@ -161,7 +161,7 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
                     run.add_layers(x, layers);
                 }
             } else if first_looks {
-                first_look(scene, pixel, samples.clone(), &mut run, x);
+                add_pilot_samples(scene, pixel, samples.clone(), &mut run, x);
             } else {
                 let pilot_sums = neighbor_pilot_sum(pilot_to_read, region, pixel);
                 further_samples(scene, pixel, samples.clone(), &mut run, x, pilot_sums);
@@ -211,7 +211,7 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
 }
 
 /// Adds pilot samples to a pixel, like `shaders/kernels/adaptive.wgsl`.
-fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
+fn add_pilot_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
     for sample in samples {
         let (value, layers) = pixel_radiance(scene, pixel, sample);
         run.pilot_sums[x] = pilot_add(run.pilot_sums[x], run.sums[x], value);

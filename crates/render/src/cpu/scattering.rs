@@ -19,8 +19,8 @@ use super::surface::Surface;
 use super::thin::{thin_eval, thin_pdf, thin_sample};
 use super::warp::frame_around;
 use crate::records::{
-    DIFFUSE, FACET_KINDS, GLASS, INSTANCE, LOBE_COAT, METAL, Material, NO_INDEX, PASSING_KINDS, PHONG, PRINCIPLED,
-    Packed, ROUGH_GLASS, THIN,
+    DIFFUSE, GLASS, INSTANCE, LOBE_COAT, METAL, MICROFACET_KINDS, Material, NO_INDEX, PHONG, PRINCIPLED, Packed,
+    ROUGH_GLASS, THIN, TRANSMISSIVE_KINDS,
 };
 
 /// Placeholder for the lobes of materials that are not [`PRINCIPLED`].
@@ -166,7 +166,7 @@ pub fn is_delta(material: &Material) -> bool {
 
 #[inline(always)]
 pub fn has_facets(material: &Material) -> bool {
-    (FACET_KINDS >> material.kind) & 1 != 0
+    (MICROFACET_KINDS >> material.kind) & 1 != 0
 }
 
 #[inline(always)]
@@ -266,7 +266,7 @@ pub fn direction_allowed(
 
 #[inline(always)]
 pub fn is_transmissive(material: &Material) -> bool {
-    let passes = (PASSING_KINDS >> material.kind) & 1 != 0;
+    let passes = (TRANSMISSIVE_KINDS >> material.kind) & 1 != 0;
     passes | ((material.kind == PRINCIPLED) & (material.transmission > 0.0))
 }
 

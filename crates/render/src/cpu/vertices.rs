@@ -48,7 +48,7 @@ pub fn load_further_uv(scene: &Packed, i: &Instance, vertex: u32, uv_set: u32) -
     }
 }
 
-pub fn spot_in_set(scene: &Packed, prim: &HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
+pub fn hit_primitive_in_uv_set(scene: &Packed, prim: &HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
     let mut face = *prim;
     if is_on_mesh(hit) {
         let i = instance_of(scene, hit);
@@ -72,7 +72,7 @@ pub fn uv_in_set(scene: &Packed, first: Vec2, prim: &HitPrimitive, hit: Hit, uv_
     if uv_set == 0 {
         return first;
     }
-    face_uv(&spot_in_set(scene, prim, hit, uv_set), hit.barycentric)
+    face_uv(&hit_primitive_in_uv_set(scene, prim, hit, uv_set), hit.barycentric)
 }
 
 pub fn footprint_in_set(
@@ -86,7 +86,7 @@ pub fn footprint_in_set(
     if uv_set == 0 {
         return first;
     }
-    let face = spot_in_set(scene, prim, hit, uv_set);
+    let face = hit_primitive_in_uv_set(scene, prim, hit, uv_set);
     Footprint {
         uv: face_uv(&face, hit.barycentric),
         dx: face_uv_derivative(&face, at.x.position),

@@ -134,14 +134,14 @@ pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
 mod tests {
     use super::*;
 
-    fn told(result: Result<u8, RenderError>) -> String {
+    fn error_of(result: Result<u8, RenderError>) -> String {
         result.map_or_else(|error| error.to_string(), |value| value.to_string())
     }
 
     #[test]
     fn a_loss_is_reported_every_time_and_other_errors_once() {
         let failure = Failure::default();
-        let judge = |value: Result<u8, &str>| told(failure.judge("gpu", value.map_err(str::to_string), None));
+        let judge = |value: Result<u8, &str>| error_of(failure.judge("gpu", value.map_err(str::to_string), None));
         assert_eq!(judge(Ok(7)), "7");
         assert_eq!(judge(Err("a panic")), "gpu: a panic");
         failure.keep(DeviceFault::Other("first".to_string()));

@@ -74,7 +74,7 @@ impl Sides<'_> {
                     "completion" => ": every pixel must end with `report_completion(local)`",
                     _ => "",
                 };
-                self.tell(
+                self.report(
                     span,
                     format!("`{entry}` never writes `{name}`, which the program reads{hint}"),
                 );
@@ -89,7 +89,7 @@ impl Sides<'_> {
         Some(Span::from(text.start..text.start + head.len()))
     }
 
-    fn tell(&mut self, span: Option<Span>, message: String) {
+    fn report(&mut self, span: Option<Span>, message: String) {
         let error = ShaderError::at(self.source, span, message);
         self.found.push(error);
     }
@@ -141,7 +141,7 @@ impl Sides<'_> {
                 (place(name).or_else(|| place(other?)).or(file), message)
             }
         };
-        self.tell(span, message);
+        self.report(span, message);
     }
 
     fn bindings(&mut self) {
@@ -158,7 +158,7 @@ impl Sides<'_> {
                 }),
             };
             if let Some(message) = message {
-                self.tell(Some(own.global_variables.get_span(handle)), message);
+                self.report(Some(own.global_variables.get_span(handle)), message);
             }
         }
         // Without a buffer that the program reads back, the image would be black.
@@ -175,7 +175,7 @@ impl Sides<'_> {
                 let ty = type_name(right, known.ty);
                 let space = space_name(known.space);
                 let message = format!("{} {space} {}: {ty} is missing", place_of(known), name_of(known));
-                self.tell(file, message);
+                self.report(file, message);
             }
         }
     }
@@ -205,7 +205,7 @@ impl Sides<'_> {
             let ty = type_name(right, known.ty);
             let Some((at, found)) = own.overrides.iter().find(|(_, own)| own.name == known.name) else {
                 let file = self.file_with(right.overrides.get_span(handle));
-                self.tell(
+                self.report(
                     file,
                     format!("`override {name}: {ty};` is missing; the program sets it"),
                 );
@@ -213,7 +213,7 @@ impl Sides<'_> {
             };
             if found.id.is_some() || type_name(own, found.ty) != ty {
                 let message = format!("`{name}` must be `override {name}: {ty};`, as the program sets it");
-                self.tell(Some(own.overrides.get_span(at)), message);
+                self.report(Some(own.overrides.get_span(at)), message);
             }
         }
         for (handle, found) in own.overrides.iter() {
@@ -221,7 +221,7 @@ impl Sides<'_> {
             if !known && found.init.is_none() {
                 let name = found.name.as_deref().unwrap_or_default();
                 let message = format!("`{name}` has no value: the program does not know it; give it one, `= 0`");
-                self.tell(Some(own.overrides.get_span(handle)), message);
+                self.report(Some(own.overrides.get_span(handle)), message);
             }
         }
     }

@@ -146,7 +146,7 @@ impl Rows {
 const FIRST_HITS_RECORD: usize = size_of::<FirstHit>();
 
 /// Range of the loop by which each pixel detects truncation. A truncated loop runs once.
-const PROOF: UVec2 = UVec2::new(0, 4);
+const LOOP_PROBE: UVec2 = UVec2::new(0, 4);
 
 impl Gpu {
     /// Compiles the kernel for a scene, uploads the scene and dispatches the kernel once with no samples, since drivers
@@ -183,7 +183,7 @@ impl Gpu {
         let values = kernels.sliders.len().div_ceil(4) as u64 * size_of::<[u32; 4]>() as u64;
         let slider_values = (values > 0).then(|| device.buffer(values, BufferUsages::UNIFORM | BufferUsages::COPY_DST));
         let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
-        let completion = [device.buffer(RECEIPT, written), receipt_to_read(device)];
+        let completion = [device.buffer(RECEIPT, written), completion_staging(device)];
         let mut gpu = Gpu {
             samples_per_dispatch: samples_per_dispatch(packed, kernels.baked.is_some()),
             device: device.clone(),
@@ -330,7 +330,7 @@ impl Gpu {
             film_origin: UVec2::new(target.region.x0, target.region.y0),
             film_size: UVec2::new(target.region.width(), target.region.height()),
             samples: UVec2::new(samples.start, samples.end),
-            loop_probe: PROOF,
+            loop_probe: LOOP_PROBE,
         };
         let Device { device, queue, .. } = &self.device;
         let [written, read] = &self.completion;
@@ -442,7 +442,7 @@ impl Gpu {
                 self.undo(tile)?;
                 let count = end - samples.start;
                 if count <= 1 {
-                    return Err(self.cut_short());
+                    return Err(self.truncation_error());
                 }
                 self.samples_per_dispatch = count / 2;
                 samples
@@ -490,7 +490,7 @@ impl Gpu {
         if result.is_err() {
             self.pending = None;
             self.film = None;
-            self.completion[1] = receipt_to_read(&self.device);
+            self.completion[1] = completion_staging(&self.device);
         }
         result
     }
@@ -507,12 +507,12 @@ impl Gpu {
         self.device.wait_for(&completion)?;
         match self.ran_whole(FIRST_HITS.entry_point, region, 1, start)? {
             true => self.device.download(&target.buffer),
-            false => Err(self.cut_short()),
+            false => Err(self.truncation_error()),
         }
     }
 
     /// Returns the error for a single sample that exceeds the loop limit of the driver.
-    fn cut_short(&self) -> RenderError {
+    fn truncation_error(&self) -> RenderError {
         RenderError::LoopTruncated {
             device: self.device.info.name.clone(),
         }
@@ -526,7 +526,7 @@ fn kernel_of(adaptive: bool) -> &'static Kernel {
 const RECEIPT: u64 = size_of::<[u32; 2]>() as u64;
 
 /// Creates the mappable buffer for a completion record and the timestamps of its dispatch.
-fn receipt_to_read(device: &Device) -> wgpu::Buffer {
+fn completion_staging(device: &Device) -> wgpu::Buffer {
     device.buffer(RECEIPT + TIMES, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }
 

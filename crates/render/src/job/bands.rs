@@ -18,7 +18,7 @@ use wgray_image::memory::fallible;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
     /// Continue with the next dispatch.
-    GoOn,
+    Continue,
     /// Stop a render of all bands together as soon as every pixel has a sample; otherwise continue.
     TimeIsUp,
     /// Cancel the work.
@@ -26,9 +26,9 @@ pub enum Flow {
 }
 
 impl From<bool> for Flow {
-    /// Maps true to [`Flow::GoOn`] and false to [`Flow::Cancel`].
-    fn from(goes_on: bool) -> Flow {
-        if goes_on { Flow::GoOn } else { Flow::Cancel }
+    /// Maps true to [`Flow::Continue`] and false to [`Flow::Cancel`].
+    fn from(is_extensible: bool) -> Flow {
+        if is_extensible { Flow::Continue } else { Flow::Cancel }
     }
 }
 
@@ -169,7 +169,7 @@ impl<'a> Bands<'a> {
     ///
     /// [`RenderError::Memory`] if the films do not fit.
     pub fn as_a_whole(mut self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
-        there_is_memory(self.pixels().saturating_mul(film_layout.bytes() as u64))?;
+        check_memory(self.pixels().saturating_mul(film_layout.bytes() as u64))?;
         self.whole = Some(false);
         Ok(self)
     }
@@ -180,7 +180,7 @@ impl<'a> Bands<'a> {
     ///
     /// [`RenderError::Memory`] if the films do not fit.
     pub fn in_passes(self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
-        there_is_memory(self.pixels().saturating_mul(2 * film_layout.bytes() as u64))?;
+        check_memory(self.pixels().saturating_mul(2 * film_layout.bytes() as u64))?;
         let mut bands = self.as_a_whole(film_layout)?;
         bands.pass = Some(0);
         Ok(bands)
@@ -408,7 +408,7 @@ impl<'a> Bands<'a> {
         }
         match &self.bands[i].state {
             State::Here(piece) => {
-                self.steps.go_on(backend, region, self.samples, &piece.reached);
+                self.steps.resume(backend, region, self.samples, &piece.reached);
                 backend.resume(piece.film.clone())?;
             }
             _ => {
@@ -427,7 +427,7 @@ impl<'a> Bands<'a> {
                 Flow::TimeIsUp if self.whole.is_some() && others_have_one && self.steps.samples() > 0 => {
                     Some(Ok(End::TimeIsUp))
                 }
-                Flow::GoOn | Flow::TimeIsUp => None,
+                Flow::Continue | Flow::TimeIsUp => None,
             };
             if end.is_some() || self.is_time_to_keep() {
                 self.take(i, backend, end.is_some())?;
@@ -526,7 +526,7 @@ impl Band {
 /// # Errors
 ///
 /// [`RenderError::Memory`] if it is not.
-pub fn there_is_memory(bytes: u64) -> Result<(), RenderError> {
+pub fn check_memory(bytes: u64) -> Result<(), RenderError> {
     match usize::try_from(bytes).is_ok_and(|bytes| fallible(|| Vec::<u8>::new().try_reserve_exact(bytes)).is_ok()) {
         true => Ok(()),
         false => Err(RenderError::Memory(bytes)),

@@ -63,7 +63,7 @@ pub struct CheckpointOptions<'a> {
     /// Called at intervals while another process writes the file; returns true to keep waiting.
     pub wait: Box<dyn FnMut() -> bool + 'a>,
     /// Reports problems that do not end the work.
-    pub tell: Box<dyn FnMut(&str) + 'a>,
+    pub report: Box<dyn FnMut(&str) + 'a>,
 }
 
 /// An open checkpoint.
@@ -81,7 +81,7 @@ pub struct Checkpoint<'a> {
     /// End of the last complete piece.
     end: u64,
     interval: Duration,
-    tell: Box<dyn FnMut(&str) + 'a>,
+    report: Box<dyn FnMut(&str) + 'a>,
     /// Length below which rewriting the file is not tried again after a failure.
     untidy: u64,
     /// Flags of problems that were reported: a failed write, a lost file.
@@ -111,7 +111,7 @@ impl<'a> Checkpoint<'a> {
             resume,
             interval,
             mut wait,
-            mut tell,
+            mut report,
         } = opening;
         let name = match name.is_dir() {
             true => name.join(identity.file_name()),
@@ -152,7 +152,7 @@ impl<'a> Checkpoint<'a> {
                                 latest: BTreeMap::new(),
                                 end,
                                 interval,
-                                tell,
+                                report,
                                 untidy: 0,
                                 reported: [false; 2],
                             });
@@ -174,7 +174,7 @@ impl<'a> Checkpoint<'a> {
                     // A process that is being killed ends within a second; that is not worth a message.
                     rounds += 1;
                     if rounds == QUIET_RETRIES {
-                        tell(&format!(
+                        report(&format!(
                             "{}: in use by another process; waiting until it ends",
                             name.display()
                         ));
@@ -192,7 +192,7 @@ impl<'a> Checkpoint<'a> {
             if !is_at(&file, path) {
                 continue;
             }
-            return Checkpoint::continue_from(name, path, file, header, film_layout, interval, tell);
+            return Checkpoint::continue_from(name, path, file, header, film_layout, interval, report);
         }
     }
 
@@ -208,7 +208,7 @@ impl<'a> Checkpoint<'a> {
         header: Header,
         film_layout: FilmLayout,
         interval: Duration,
-        mut tell: Box<dyn FnMut(&str) + 'a>,
+        mut report: Box<dyn FnMut(&str) + 'a>,
     ) -> Result<Checkpoint<'a>, CheckpointError> {
         let unreadable = |error: io::Error| CheckpointError::Unreadable {
             path: name.clone(),
@@ -230,7 +230,7 @@ impl<'a> Checkpoint<'a> {
         }
         let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(failed)?;
         if contents.damaged > 0 {
-            tell(&format!(
+            report(&format!(
                 "{}: dropped {} bytes after byte {}, which are damaged or incomplete",
                 name.display(),
                 contents.damaged,
@@ -251,7 +251,7 @@ impl<'a> Checkpoint<'a> {
             latest,
             end: contents.end,
             interval,
-            tell,
+            report,
             untidy: 0,
             reported: [false; 2],
         })
@@ -336,7 +336,7 @@ impl<'a> Checkpoint<'a> {
 
     fn tell_once(&mut self, which: usize, what: &str) {
         if !std::mem::replace(&mut self.reported[which], true) {
-            (self.tell)(&format!("{}: {what}", self.name.display()));
+            (self.report)(&format!("{}: {what}", self.name.display()));
         }
     }
 

@@ -38,7 +38,7 @@ pub struct PartHeader {
     /// Bits (f64) of the exposure in stops.
     pub exposure: u64,
     /// Metadata of the image as names and texts, except those of the renderer.
-    pub told: Vec<(String, String)>,
+    pub metadata: Vec<(String, String)>,
 }
 
 impl PartHeader {
@@ -49,7 +49,7 @@ impl PartHeader {
             Some("has different layers")
         } else if !view_is_given && view(self) != view(other) {
             Some("has a different view transform or exposure")
-        } else if self.middle_depth != other.middle_depth || self.told != other.told {
+        } else if self.middle_depth != other.middle_depth || self.metadata != other.metadata {
             Some("was rendered with different settings")
         } else {
             None
@@ -90,7 +90,7 @@ impl PartHeader {
     }
 
     /// Header of a part.
-    pub fn of(tile: Tile, layout: &Layout, told: Metadata) -> PartHeader {
+    pub fn of(tile: Tile, layout: &Layout, metadata: Metadata) -> PartHeader {
         PartHeader {
             tile,
             aovs: layout.aovs.iter().map(|aov| aov.name().to_owned()).collect(),
@@ -98,7 +98,7 @@ impl PartHeader {
             middle_depth: layout.middle_depth.to_bits(),
             view_transform: layout.view.transform.name().to_owned(),
             exposure: layout.view.exposure.to_bits(),
-            told: told.pairs,
+            metadata: metadata.pairs,
         }
     }
 }
@@ -294,9 +294,9 @@ impl Parts {
     }
 
     /// Returns the metadata of the merged image.
-    pub fn told(&self) -> Metadata {
+    pub fn metadata(&self) -> Metadata {
         Metadata {
-            pairs: self.header.told.clone(),
+            pairs: self.header.metadata.clone(),
         }
     }
 
@@ -400,7 +400,7 @@ mod tests {
     use crate::film::Film;
 
     /// Returns the error of a part of 4 x 3 pixels with a modified header and piece; empty if it is valid.
-    fn told(change: impl Fn(&mut Header, &mut FilmPiece)) -> String {
+    fn error_of(change: impl Fn(&mut Header, &mut FilmPiece)) -> String {
         let region = Region::whole(4, 3);
         let mut header = Header {
             format: FORMAT,
@@ -422,7 +422,7 @@ mod tests {
                 middle_depth: 1f32.to_bits(),
                 view_transform: "gamma22".to_owned(),
                 exposure: 0f64.to_bits(),
-                told: Vec::new(),
+                metadata: Vec::new(),
             }),
         };
         let mut piece = FilmPiece {
@@ -454,28 +454,28 @@ mod tests {
     /// Files with correct hashes that the program never writes. Fuzzing found that the first case panicked.
     #[test]
     fn what_no_program_writes_is_refused() {
-        assert_eq!(told(|_, _| ()), "");
+        assert_eq!(error_of(|_, _| ()), "");
         for aov in ["normal", "shading_normal", "albedo", "variance", "sample_count"] {
-            let without = told(|header, _| part(header).aovs = vec![aov.to_owned()]);
+            let without = error_of(|header, _| part(header).aovs = vec![aov.to_owned()]);
             assert_eq!(without, format!("has no values for its layer {aov}"));
         }
-        assert_eq!(told(|header, _| part(header).aovs = vec!["other".to_owned()]), "");
+        assert_eq!(error_of(|header, _| part(header).aovs = vec!["other".to_owned()]), "");
         for (depth, exposure, wanted) in [
             (f32::NAN, 0.0, "its depth, NaN, must be"),
             (0.0, 0.0, "its depth, 0, must be"),
             (1.0, f64::INFINITY, "its exposure "),
         ] {
-            let message = told(|header, _| {
+            let message = error_of(|header, _| {
                 part(header).middle_depth = depth.to_bits();
                 part(header).exposure = exposure.to_bits();
             });
             assert!(message.starts_with(wanted), "{message}");
         }
-        let unfinished = told(|_, piece| piece.reached.pass = 8..16);
+        let unfinished = error_of(|_, piece| piece.reached.pass = 8..16);
         assert_eq!(unfinished, "its piece of the pixels 0,0,4,3 is not finished");
-        let rows = told(|_, piece| piece.region.y1 = 2);
+        let rows = error_of(|_, piece| piece.region.y1 = 2);
         assert_eq!(rows, "its piece of the pixels 0,0,4,2 is not finished");
-        let huge = told(|header, _| {
+        let huge = error_of(|header, _| {
             header.identity.picture = [1, u32::MAX];
             header.identity.region = [0, 0, 1, u32::MAX];
             part(header).tile.of = u32::MAX;

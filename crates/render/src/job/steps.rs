@@ -95,7 +95,7 @@ impl Steps {
     }
 
     /// Continues a film of a region, possibly on another backend.
-    pub fn go_on(&mut self, backend: &dyn Backend, region: Region, samples: u32, reached: &SampleProgress) {
+    pub fn resume(&mut self, backend: &dyn Backend, region: Region, samples: u32, reached: &SampleProgress) {
         self.start(backend, region, samples);
         self.reached = reached.clone();
         self.next_pass_if_ended();

@@ -56,12 +56,12 @@ pub fn write(
     let written = match format {
         Format::WebP => {
             let mut encoder = WebPEncoder::new_lossless(file);
-            told(&mut encoder, exif)?;
+            set_exif(&mut encoder, exif)?;
             encoder.write_image(&pixels, width, height, color)
         }
         _ => {
             let mut encoder = JpegEncoder::new_with_quality(file, options.quality);
-            told(&mut encoder, exif)?;
+            set_exif(&mut encoder, exif)?;
             encoder.write_image(&pixels, width, height, color)
         }
     };
@@ -88,7 +88,7 @@ fn with_alpha(band: Band, layout: &Layout) -> Vec<u8> {
     (0..band.film.sums.len()).into_par_iter().flat_map_iter(pixel).collect()
 }
 
-fn told(encoder: &mut impl ImageEncoder, exif: Option<Vec<u8>>) -> io::Result<()> {
+fn set_exif(encoder: &mut impl ImageEncoder, exif: Option<Vec<u8>>) -> io::Result<()> {
     match exif {
         Some(exif) => encoder.set_exif_metadata(exif).map_err(io::Error::other),
         None => Ok(()),

@@ -68,7 +68,7 @@ pub fn write(
                 false => png.set_source_gamma(ScaledFloat::new(GAMMA as f32)),
             }
         }
-        tell(&mut png, &options.metadata).map_err(plain)?;
+        write_metadata(&mut png, &options.metadata).map_err(plain)?;
         writers.push((png.write_header().map_err(plain)?, content));
     }
     let mut streams = Vec::new();
@@ -92,7 +92,7 @@ pub fn write(
 
 /// Adds metadata to the header: as Latin-1 text chunks, which every reader supports, or as UTF-8 if the text requires
 /// it.
-fn tell<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) -> Result<(), EncodingError> {
+fn write_metadata<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) -> Result<(), EncodingError> {
     for (name, text) in metadata.pairs.iter().cloned() {
         match text.chars().all(|c| c <= '\u{ff}') {
             true => png.add_text_chunk(name, text)?,

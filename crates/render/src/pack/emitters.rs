@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::light_tree::{self, Cone, Lamp};
+use super::light_tree::{self, Cone, TreeEmitter};
 use super::primitive::{area, axes, bounding_box, bounding_sphere};
 use super::{
     DIRECTIONAL, DISTANT, EMITTER, ENVIRONMENT, Emitter, Light, Material, NO_INDEX, NO_SHADOW, PLANE, POINT, Primitive,
@@ -23,7 +23,7 @@ pub struct PackedEmitters {
     /// The probability of sampling the environment map.
     pub environment: f64,
     /// [`Instance::leaves`](super::Instance::leaves) of each instance; empty without a light tree.
-    pub of_instances: Vec<u32>,
+    pub instance_leaves: Vec<u32>,
 }
 
 /// Maximum number of emitters that an alias table selects by power alone; more use a light tree.
@@ -141,9 +141,9 @@ pub fn emitters(
     }
     packed.environment = environment_integral.map_or(0.0, |_| powers[environment] / total);
     packed.lighting.emitters = (table(&powers).into_iter().zip(places))
-        .map(|((threshold, other), (instance, index))| Emitter {
+        .map(|((threshold, alias_index), (instance, index))| Emitter {
             threshold,
-            other,
+            alias_index,
             instance,
             index,
         })
@@ -241,17 +241,17 @@ fn with_tree(
     let power_of = |some: &[((u32, u32), f64)]| some.iter().map(|(_, power)| power).sum::<f64>();
     let (of_tree, total) = (power_of(&in_tree), power_of(&in_tree) + power_of(&far));
     let share = of_tree / total;
-    let lamps: Vec<Lamp> = in_tree
+    let lamps: Vec<TreeEmitter> = in_tree
         .iter()
         .map(|(place @ (instance, index), _)| {
             let lamp = match *instance {
-                0 => lamp_of(&packed.lighting.lights[*index as usize], primitives, &found.radiances),
+                0 => tree_emitter(&packed.lighting.lights[*index as usize], primitives, &found.radiances),
                 number => {
                     let (corners, material) = face(trees, number as usize - 1, *index);
-                    lamp_of_triangle(corners, found.radiances[material as usize], true)
+                    tree_emitter_of_triangle(corners, found.radiances[material as usize], true)
                 }
             };
-            Lamp {
+            TreeEmitter {
                 density: lamp.density * share,
                 instance: place.0,
                 index: place.1,
@@ -261,11 +261,11 @@ fn with_tree(
         .collect();
     packed.lighting.nodes = light_tree::build(&lamps);
     packed.lighting.leaves = vec![NO_INDEX; primitives.len()];
-    packed.of_instances = vec![NO_INDEX; trees.instances.len()];
+    packed.instance_leaves = vec![NO_INDEX; trees.instances.len()];
     for lamp in lamps.iter().filter(|lamp| lamp.instance != 0) {
         let number = lamp.instance as usize - 1;
-        if packed.of_instances[number] == NO_INDEX {
-            packed.of_instances[number] = packed.lighting.leaves.len() as u32;
+        if packed.instance_leaves[number] == NO_INDEX {
+            packed.instance_leaves[number] = packed.lighting.leaves.len() as u32;
             let triangles = trees.meshes[trees.instances[number].mesh as usize].triangles.len();
             packed
                 .lighting
@@ -280,7 +280,7 @@ fn with_tree(
             }
             let place = match node.instance[child] {
                 0 => packed.lighting.lights[node.index[child] as usize].primitive,
-                number => packed.of_instances[number as usize - 1] + node.index[child],
+                number => packed.instance_leaves[number as usize - 1] + node.index[child],
             };
             if place != NO_INDEX {
                 packed.lighting.leaves[place as usize] = i;
@@ -303,9 +303,9 @@ fn with_tree(
         .collect();
     let places = [(0, NO_INDEX)].into_iter().chain(far.iter().map(|(place, _)| *place));
     packed.lighting.emitters = (table(&weights).into_iter().zip(places))
-        .map(|((threshold, other), (instance, index))| Emitter {
+        .map(|((threshold, alias_index), (instance, index))| Emitter {
             threshold,
-            other,
+            alias_index,
             instance,
             index,
         })
@@ -329,10 +329,10 @@ fn face(trees: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
 }
 
 /// Returns an emissive triangle for the light tree.
-fn lamp_of_triangle([a, b, c]: [DVec3; 3], radiance: f64, two_sided: bool) -> Lamp {
+fn tree_emitter_of_triangle([a, b, c]: [DVec3; 3], radiance: f64, two_sided: bool) -> TreeEmitter {
     let span = (b - a).cross(c - a);
     let area = 0.5 * span.length();
-    Lamp {
+    TreeEmitter {
         low: a.min(b).min(c),
         high: a.max(b).max(c),
         cone: Cone::flat(span.normalize_or(DVec3::Z), two_sided),
@@ -343,9 +343,9 @@ fn lamp_of_triangle([a, b, c]: [DVec3; 3], radiance: f64, two_sided: bool) -> La
     }
 }
 
-fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -> Lamp {
+fn tree_emitter(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -> TreeEmitter {
     let center = light.center.as_dvec3();
-    let point = |cone: Cone| Lamp {
+    let point = |cone: Cone| TreeEmitter {
         low: center,
         high: center,
         cone,
@@ -376,7 +376,7 @@ fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -
     let [u, v, _] = axes(primitive);
     if primitive.kind == TRIANGLE {
         let corners = [center, center + u, center + v];
-        return lamp_of_triangle(corners, radiance, light.sides == 2);
+        return tree_emitter_of_triangle(corners, radiance, light.sides == 2);
     }
     let area = area(primitive);
     let (cone, intensity) = match is_solid(primitive.kind) {
@@ -388,7 +388,7 @@ fn lamp_of(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f64]) -
         }
     };
     let (low, high) = bounding_box(primitive);
-    Lamp {
+    TreeEmitter {
         low,
         high,
         cone,

@@ -12,14 +12,18 @@ use crate::cpu::specular::{fresnel, refracted_cosine};
 
 /// Number of sampled normals if the roughness is known, and per row if not. Sobol' points, since few microfacets tilt
 /// enough for total internal reflection, and a grid would miss them.
-const FACETS: (u32, u32) = (4096, 1024);
+const NORMAL_SAMPLES: (u32, u32) = (4096, 1024);
 
 /// Returns the tables of both sides, outside first. Rows: sqrt(alpha), 0 to 1; columns: cosine, 0 to 1. If `alpha` is
 /// known only the adjacent rows are computed, and the others are 1.
 pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     let last = (ENERGY_SIZE - 1) as f32;
     let wanted = |row: u32| alpha.is_none_or(|alpha| (row as f32 - alpha.sqrt() * last).abs() < 1.0);
-    let facets = points(if alpha.is_some() { FACETS.0 } else { FACETS.1 });
+    let facets = points(if alpha.is_some() {
+        NORMAL_SAMPLES.0
+    } else {
+        NORMAL_SAMPLES.1
+    });
     let mut table = Vec::new();
     for index in [ior, 1.0 / ior] {
         for row in 0..ENERGY_SIZE {
@@ -45,11 +49,11 @@ fn points(count: u32) -> Vec<Vec2> {
 /// Returns the single-scattering albedo of rough glass at a cosine, from reflection and transmission.
 fn glass_albedo(index: f32, alpha: f32, cosine: f32, facets: &[Vec2]) -> f32 {
     let wo = Vec3::new(max(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine);
-    glass_keeps(index, Vec2::splat(alpha), wo, facets)
+    glass_albedo_aniso(index, Vec2::splat(alpha), wo, facets)
 }
 
 /// Like `glass_albedo`, for any direction and anisotropic alpha.
-fn glass_keeps(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32 {
+fn glass_albedo_aniso(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32 {
     let eta = 1.0 / index;
     let mut sum = 0.0;
     for u in facets {
@@ -71,7 +75,7 @@ fn glass_keeps(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32 {
 
 /// Returns the single-scattering albedo of reflection with Schlick's Fresnel term, as F0 x + F90 y. Counterpart of
 /// `ggx_albedo`.
-fn mirrors(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
+fn schlick_albedo(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
     let mut sum = DVec2::ZERO;
     for u in facets {
         let m = ggx_sample(alpha, wo, *u);
@@ -87,7 +91,7 @@ fn mirrors(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
 
 /// Lobes of a material with tables, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Parts {
+pub enum TableLobes {
     /// Reflection, for a Fresnel term of 1.
     Mirror,
     /// Rough glass, with the bits of its index: from outside, from inside.
@@ -101,17 +105,17 @@ const ROWS: (u32, u32) = (10, 6);
 
 /// Correction factor of the tables of glass: total internal reflection makes a kink, where linear interpolation is too
 /// low.
-const CUT: f32 = 1.004;
+const KINK_CORRECTION: f32 = 1.004;
 
 /// Returns the table of anisotropic microfacets for `single_scatter_albedo_aniso`: the numbers of rows by roughness and
 /// by anisotropy, 1 if known; then for each part the rows, each with lines by azimuth of columns by cosine.
-pub fn aniso_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
+pub fn aniso_table(parts: TableLobes, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
     let rows = [
         if roughness.is_none() { ROWS.0 } else { 1 },
         if anisotropy.is_none() { ROWS.1 } else { 1 },
     ];
     let facets = points(match (roughness, anisotropy) {
-        (Some(_), Some(_)) if parts == Parts::Mirror => 1024,
+        (Some(_), Some(_)) if parts == TableLobes::Mirror => 1024,
         (Some(_), Some(_)) => 2048,
         (None, None) => 64,
         _ => 128,
@@ -143,18 +147,21 @@ pub fn aniso_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32>
             words.extend(
                 nodes
                     .iter()
-                    .map(|(alpha, wo)| (glass_keeps(index, *alpha, *wo, &facets) * CUT).to_bits()),
+                    .map(|(alpha, wo)| (glass_albedo_aniso(index, *alpha, *wo, &facets) * KINK_CORRECTION).to_bits()),
             );
         }
     };
     match parts {
-        Parts::Glass(index) => glass(&mut words, index),
-        Parts::Mirror => words.extend(nodes.iter().map(|(alpha, wo)| {
-            let both = mirrors(*alpha, *wo, &facets);
+        TableLobes::Glass(index) => glass(&mut words, index),
+        TableLobes::Mirror => words.extend(nodes.iter().map(|(alpha, wo)| {
+            let both = schlick_albedo(*alpha, *wo, &facets);
             ((both.x + both.y) as f32).to_bits()
         })),
-        Parts::PrincipledLobes(index) => {
-            let both: Vec<DVec2> = nodes.iter().map(|(alpha, wo)| mirrors(*alpha, *wo, &facets)).collect();
+        TableLobes::PrincipledLobes(index) => {
+            let both: Vec<DVec2> = nodes
+                .iter()
+                .map(|(alpha, wo)| schlick_albedo(*alpha, *wo, &facets))
+                .collect();
             words.extend(both.iter().map(|both| (both.x as f32).to_bits()));
             words.extend(both.iter().map(|both| (both.y as f32).to_bits()));
             if let Some(index) = index {

@@ -21,9 +21,9 @@ const BIN_RADIUS: f64 = 0.06;
 
 /// Location of the environment map in the texels, if the scene has one.
 #[derive(Default)]
-pub struct EnvironmentMap(Option<Around>);
+pub struct EnvironmentMap(Option<PackedMap>);
 
-struct Around {
+struct PackedMap {
     rows: [Vec3; 3],
     width: u32,
     height: u32,
@@ -42,7 +42,7 @@ impl EnvironmentMap {
             .environment
             .as_ref()
             .and_then(|environment| environment.image.as_ref());
-        EnvironmentMap(image.and_then(|image| around(image, texels)))
+        EnvironmentMap(image.and_then(|image| pack_map(image, texels)))
     }
 
     pub fn sum(&self) -> Option<f64> {
@@ -81,7 +81,7 @@ impl EnvironmentMap {
     }
 }
 
-fn around(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<Around> {
+fn pack_map(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<PackedMap> {
     let image = &*around.image;
     let (width, height) = (image.width as usize, image.height as usize);
     let start = texels.len();
@@ -105,7 +105,7 @@ fn around(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<Around> {
     let axes = [around.to_world.x_axis, around.to_world.y_axis, around.to_world.z_axis];
     grid.write_cells(&weights, texels);
     grid.write_distributions(&weights, axes, sum, texels);
-    Some(Around {
+    Some(PackedMap {
         rows: axes.map(|axis| axis.as_vec3()),
         width: image.width,
         height: image.height,

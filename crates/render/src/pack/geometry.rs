@@ -17,7 +17,7 @@ use wgray_scene::{Geometry, Scene, Shape};
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
 /// Builds the BVH over a scene's mesh instances and these primitives, each with its index and true if it casts a
-/// shadow. Also returns [`Counts::room`](super::Counts::room).
+/// shadow. Also returns [`Counts::item_padding`](super::Counts::room).
 pub fn trees(
     scene: &Scene,
     primitives: &[(u32, &Primitive, bool)],

@@ -97,7 +97,7 @@ impl Cone {
 
 /// An emitter in the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lamp {
+pub struct TreeEmitter {
     /// Lower corner of the bounding box.
     pub low: DVec3,
     /// Upper corner of the bounding box.
@@ -124,8 +124,8 @@ struct Bounds {
 }
 
 impl Bounds {
-    fn of(lamp: &Lamp) -> Bounds {
-        let Lamp {
+    fn of(lamp: &TreeEmitter) -> Bounds {
+        let TreeEmitter {
             low,
             high,
             cone,
@@ -168,11 +168,11 @@ const WIDTH: usize = 4;
 const PARALLEL: usize = 2048;
 
 /// Builds the tree. The root is node 0.
-pub fn build(lamps: &[Lamp]) -> Vec<LightNode> {
+pub fn build(lamps: &[TreeEmitter]) -> Vec<LightNode> {
     build_with(lamps, PARALLEL)
 }
 
-fn build_with(lamps: &[Lamp], parallel: usize) -> Vec<LightNode> {
+fn build_with(lamps: &[TreeEmitter], parallel: usize) -> Vec<LightNode> {
     let mut order: Vec<u32> = (0..lamps.len() as u32).collect();
     let builder = Builder {
         lamps,
@@ -187,7 +187,7 @@ fn build_with(lamps: &[Lamp], parallel: usize) -> Vec<LightNode> {
 }
 
 struct Builder<'a> {
-    lamps: &'a [Lamp],
+    lamps: &'a [TreeEmitter],
     total: f64,
     parallel: usize,
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec2, Vec3};
 
-use super::energy::{Parts, aniso_table, energy_table};
+use super::energy::{TableLobes, aniso_table, energy_table};
 use super::pyramid::pyramid;
 use super::*;
 use crate::cpu::lobe::{facet_alpha, is_polished};
@@ -30,7 +30,7 @@ pub struct Appearances {
     /// Albedo tables of rough glass, by index of refraction and alpha (`None` if textured).
     energies: BTreeMap<(u32, Option<u32>), u32>,
     /// Albedo tables of anisotropic microfacets, by parts, roughness and anisotropy.
-    aniso_table: BTreeMap<(Parts, Option<u32>, Option<u32>), u32>,
+    aniso_table: BTreeMap<(TableLobes, Option<u32>, Option<u32>), u32>,
 }
 
 /// Camera visibility flags.
@@ -43,9 +43,12 @@ fn camera_visibility(material: &scene::Material) -> u32 {
 }
 
 /// Record of microfacets. `resolve` looks up a textured roughness.
-fn faceted(facets: &Facets, resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
+fn microfacet_record(
+    facets: &Facets,
+    resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
+) -> Material {
     Material {
-        roughness: of_value(&facets.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, resolve),
+        roughness: resolve_scalar(&facets.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, resolve),
         anisotropy: facets.anisotropy as f32,
         rotation: (facets.rotation / 180.0) as f32,
         energy: if facets.compensated { 0 } else { NO_INDEX },
@@ -54,7 +57,7 @@ fn faceted(facets: &Facets, resolve: &mut impl FnMut(&Color, u32, Option<(Channe
 }
 
 /// Reduces microfacets to a delta BSDF if they are smooth everywhere. The same applies to glass that hardly refracts.
-fn simplest(record: Material, textured: bool) -> Material {
+fn reduce_to_delta(record: Material, textured: bool) -> Material {
     let polished = !textured && is_polished(&record);
     let kind = match record.kind {
         METAL if polished && record.eta == Vec3::ZERO => MIRROR,
@@ -186,7 +189,7 @@ impl Appearances {
                 tint: resolve(tint, FOR_TINT, None),
                 eta: index.map_or(Vec3::ZERO, |index| index.eta.as_vec3()),
                 k: index.map_or(Vec3::ZERO, |index| index.k.as_vec3()),
-                ..faceted(facets, &mut resolve)
+                ..microfacet_record(facets, &mut resolve)
             },
             Reflection::Dielectric {
                 ior,
@@ -199,7 +202,7 @@ impl Appearances {
                 tint: resolve(tint, FOR_TINT, None),
                 ior: *ior as f32,
                 absorption: absorption.as_vec3(),
-                ..faceted(facets, &mut resolve)
+                ..microfacet_record(facets, &mut resolve)
             },
             Reflection::Principled(principled) => self::principled(principled, &mut resolve),
             Reflection::Diffuse {
@@ -208,20 +211,20 @@ impl Appearances {
             } => Material {
                 kind: DIFFUSE,
                 diffuse: resolve(albedo, FOR_DIFFUSE, None),
-                roughness: of_value(roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, &mut resolve),
+                roughness: resolve_scalar(roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, &mut resolve),
                 ..bytemuck::Zeroable::zeroed()
             },
         };
         record.emission = resolve(&material.emission, FOR_EMISSION, None);
         let has = |purpose: u32| lookups.0.iter().any(|lookup| lookup.purposes & purpose != 0);
         let textured = has(FOR_ROUGHNESS);
-        let mut record = simplest(record, textured);
+        let mut record = reduce_to_delta(record, textured);
         record.camera_visibility = camera_visibility(material);
         let passes = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
         let parts = match record.kind {
-            METAL | THIN if record.energy != NO_INDEX => Some(Parts::Mirror),
-            ROUGH_GLASS if record.energy != NO_INDEX => Some(Parts::Glass(record.ior.to_bits())),
-            PRINCIPLED => Some(Parts::PrincipledLobes(passes.then_some(record.ior.to_bits()))),
+            METAL | THIN if record.energy != NO_INDEX => Some(TableLobes::Mirror),
+            ROUGH_GLASS if record.energy != NO_INDEX => Some(TableLobes::Glass(record.ior.to_bits())),
+            PRINCIPLED => Some(TableLobes::PrincipledLobes(passes.then_some(record.ior.to_bits()))),
             _ => None,
         };
         if let Some(parts) = parts {
@@ -265,7 +268,7 @@ impl Appearances {
     }
 
     /// Like `energy`, for anisotropic microfacets. `rough` and `long` mean that roughness and anisotropy are textured.
-    fn aniso_table(&mut self, record: &Material, parts: Parts, rough: bool, long: bool) -> u32 {
+    fn aniso_table(&mut self, record: &Material, parts: TableLobes, rough: bool, long: bool) -> u32 {
         let known = |number: f32, textured: bool| (!textured).then_some(number);
         let (roughness, anisotropy) = (known(record.roughness, rough), known(record.anisotropy, long));
         let key = (parts, roughness.map(f32::to_bits), anisotropy.map(f32::to_bits));
@@ -418,29 +421,29 @@ fn principled(
         specular: resolve(&p.specular_color, FOR_SPECULAR, None),
         ior: p.ior as f32,
         absorption: p.absorption.as_vec3(),
-        roughness: of_value(&p.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, resolve),
-        anisotropy: of_value(&p.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL, resolve),
+        roughness: resolve_scalar(&p.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, resolve),
+        anisotropy: resolve_scalar(&p.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL, resolve),
         rotation: (p.anisotropy_rotation / std::f64::consts::PI) as f32,
         thin: p.thin.into(),
         sheen: resolve(&p.sheen_color, FOR_SHEEN, None),
-        sheen_roughness: of_value(
+        sheen_roughness: resolve_scalar(
             &p.sheen_roughness,
             FOR_SHEEN_ROUGHNESS,
             SHEEN_ROUGHNESS_CHANNEL,
             resolve,
         ),
-        metallic: of_value(&p.metallic, FOR_METALLIC, METALLIC_CHANNEL, resolve),
-        transmission: of_value(&p.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL, resolve),
-        clearcoat: of_value(&p.clearcoat, FOR_COAT, COAT_CHANNEL, resolve),
-        clearcoat_roughness: of_value(
+        metallic: resolve_scalar(&p.metallic, FOR_METALLIC, METALLIC_CHANNEL, resolve),
+        transmission: resolve_scalar(&p.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL, resolve),
+        clearcoat: resolve_scalar(&p.clearcoat, FOR_COAT, COAT_CHANNEL, resolve),
+        clearcoat_roughness: resolve_scalar(
             &p.clearcoat_roughness,
             FOR_COAT_ROUGHNESS,
             COAT_ROUGHNESS_CHANNEL,
             resolve,
         ),
-        specular_weight: of_value(&p.specular, FOR_WEIGHT, WEIGHT_CHANNEL, resolve),
+        specular_weight: resolve_scalar(&p.specular, FOR_WEIGHT, WEIGHT_CHANNEL, resolve),
         opacity: match has_alpha {
-            true => of_value(&p.alpha, FOR_OPACITY, OPACITY_CHANNEL, resolve),
+            true => resolve_scalar(&p.alpha, FOR_OPACITY, OPACITY_CHANNEL, resolve),
             false => 1.0,
         },
         cutoff: p.alpha_cutoff as f32,
@@ -459,7 +462,7 @@ fn principled(
 }
 
 /// Resolves a scalar: a constant, or a channel of the texture that `resolve` looks up.
-fn of_value(
+fn resolve_scalar(
     value: &Value,
     purpose: u32,
     place: u32,

@@ -41,7 +41,7 @@ const MIN_EPSILON: f64 = 32.0 / 16_777_216.0;
 /// Packs a scene.
 pub fn pack(scene: &Scene) -> Packed {
     let origin = origin::origin(&scene.camera);
-    let scene = &*origin::seen_from(scene, origin);
+    let scene = &*origin::translated_to(scene, origin);
     let mut appearances = Appearances::of(scene);
     let around = EnvironmentMap::of(scene, &mut appearances.texels);
     let mut materials = appearances.materials.clone();
@@ -49,7 +49,7 @@ pub fn pack(scene: &Scene) -> Packed {
     let (mut lights, mut area_lights) = pack_lights(scene, &mut primitives, &mut materials);
     let order = SortedPrimitives::of(scene, primitives);
     connect_lights(&mut lights[..area_lights], order.all(), scene.shapes.len());
-    let (mut trees, room) = geometry::trees(scene, &order.in_bvh(), |material| {
+    let (mut trees, item_padding) = geometry::trees(scene, &order.in_bvh(), |material| {
         shadow_casters::casts_shadow(scene, material)
     });
     let mut shining = PackedEmitters::default();
@@ -58,12 +58,12 @@ pub fn pack(scene: &Scene) -> Packed {
         shining = emitters::emitters(scene, &mut materials, delta_lights, order.all(), &trees, around.sum());
         (area_lights, lights) = (0, std::mem::take(&mut shining.lighting.lights));
     }
-    for (instance, leaves) in trees.instances.iter_mut().zip(&shining.of_instances) {
+    for (instance, leaves) in trees.instances.iter_mut().zip(&shining.instance_leaves) {
         instance.leaves = *leaves;
     }
     let counts = Counts {
         tree: trees.rows().into(),
-        room,
+        item_padding,
         ..counts(
             order.outside(),
             area_lights,

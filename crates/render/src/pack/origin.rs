@@ -15,7 +15,7 @@ pub fn origin(camera: &Camera) -> DVec3 {
 }
 
 /// Translates a scene to another origin.
-pub fn seen_from(scene: &Scene, origin: DVec3) -> Cow<'_, Scene> {
+pub fn translated_to(scene: &Scene, origin: DVec3) -> Cow<'_, Scene> {
     if origin == DVec3::ZERO {
         return Cow::Borrowed(scene);
     }

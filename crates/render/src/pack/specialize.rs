@@ -6,8 +6,9 @@ use super::emitters::PackedEmitters;
 use super::environment_map::EnvironmentMap;
 use super::materials::Appearances;
 use super::{
-    Counts, DIFFUSE, FACET_KINDS, FOR_ANISOTROPY, FOR_EMISSION, FOR_ROUGHNESS, GRID, HALTON, INSTANCE, JITTERED, Light,
-    Material, NO_COLORS, OPAQUE, PRINCIPLED, RANDOM, ROTATED_GRID, SOBOL, SPECULAR_KINDS, SPOT, Specialization,
+    Counts, DIFFUSE, FOR_ANISOTROPY, FOR_EMISSION, FOR_ROUGHNESS, GRID, HALTON, INSTANCE, JITTERED, Light,
+    MICROFACET_KINDS, Material, NO_COLORS, OPAQUE, PRINCIPLED, RANDOM, ROTATED_GRID, SOBOL, SPECULAR_KINDS, SPOT,
+    Specialization,
 };
 use crate::cpu::lobe::is_polished;
 use crate::records::{LOBES, Lobe, PackedBvh};
@@ -63,7 +64,7 @@ impl Parts<'_> {
             light_samples: light_samples.count,
             filter_bins: self.filter_bins as u32,
             pilot_samples: adaptive.map_or(pixels.count, |adaptive| {
-                first_look(scene.render.integrator, pixels.count, adaptive.max_samples)
+                pilot_samples(scene.render.integrator, pixels.count, adaptive.max_samples)
             }),
             squared_error: adaptive
                 .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
@@ -100,7 +101,7 @@ impl Parts<'_> {
 
 /// Returns the number of pilot samples of adaptive sampling: whole rounds, at least as many samples as an estimate of
 /// the variance requires, at most `most`.
-fn first_look(integrator: Integrator, round: u32, most: u32) -> u32 {
+fn pilot_samples(integrator: Integrator, round: u32, most: u32) -> u32 {
     let least = integrator.pilot_samples();
     least.next_multiple_of(round).max(round).min(most)
 }
@@ -151,7 +152,7 @@ fn exponent_bits(validated: &[scene::Material], packed: &[Material]) -> u32 {
 fn delta_kinds(materials: &[Material], appearances: &Appearances) -> u32 {
     let may = |material: &&Material| {
         let textured = appearances.has_lookup(material, FOR_ROUGHNESS);
-        let faceted = FACET_KINDS >> material.kind & 1 != 0;
+        let faceted = MICROFACET_KINDS >> material.kind & 1 != 0;
         SPECULAR_KINDS >> material.kind & 1 != 0 || faceted && (textured || is_polished(material))
     };
     materials

@@ -48,9 +48,9 @@ constants! {
     /// [`Material::kind`]: a thin sheet of glass, smooth or rough.
     pub const THIN: u32 = 7;
     /// Bits of the kinds of materials with microfacets.
-    pub const FACET_KINDS: u32 = 1 << METAL | 1 << ROUGH_GLASS | 1 << THIN;
+    pub const MICROFACET_KINDS: u32 = 1 << METAL | 1 << ROUGH_GLASS | 1 << THIN;
     /// Bits of the microfacet kinds that transmit light.
-    pub const PASSING_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
+    pub const TRANSMISSIVE_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
     /// Rows and columns, for each side, of the table at [`Material::energy`].
     pub const ENERGY_SIZE: u32 = 32;
     /// Rows of the table at [`Material::aniso_table`], by azimuth.

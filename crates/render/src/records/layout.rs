@@ -257,7 +257,7 @@ records! {
         /// Probability of selecting itself, 0 to 1.
         pub threshold: f32,
         /// Index of the alias.
-        pub other: u32,
+        pub alias_index: u32,
         /// 0 for a light, else 1 plus the index of a mesh instance.
         pub instance: u32,
         /// Index of the light, or position of the triangle in its mesh; [`NO_INDEX`] for the light tree.
@@ -315,7 +315,7 @@ records! {
         /// First row of the table of texture lookups (x).
         pub lookups: UVec4,
         /// Padding of the boxes of items relative to coordinates (x), and the largest coordinate of any box (y).
-        pub room: Vec4,
+        pub item_padding: Vec4,
     }
 
     /// A node of a BVH with up to eight children, each an inner node or a leaf. Child boxes are quantized.

@@ -228,7 +228,7 @@ impl Pattern {
     }
 
     /// Returns true if the pattern can be extended beyond its count, as adaptive sampling requires.
-    pub const fn goes_on(self) -> bool {
+    pub const fn is_extensible(self) -> bool {
         !matches!(self, Pattern::Grid | Pattern::RotatedGrid)
     }
 }

@@ -12,7 +12,7 @@ use super::budget::Budget;
 use super::buffer::{Buffers, MAX_BUFFER_BYTES};
 use super::error::{GltfError, GltfFault};
 use super::json::missing;
-use super::uri::{self, Folder, Unfound};
+use super::uri::{self, Folder, UriError};
 use super::{extension, glb, json};
 
 /// Maximum size of an image file in bytes.
@@ -43,12 +43,12 @@ enum ImageFault {
     /// Missing or unreadable.
     Missing(String),
     /// Violates a rule.
-    DecodeError(GltfFault),
+    Invalid(GltfFault),
 }
 
 impl From<GltfFault> for ImageFault {
     fn from(fault: GltfFault) -> Self {
-        ImageFault::DecodeError(fault)
+        ImageFault::Invalid(fault)
     }
 }
 
@@ -170,7 +170,7 @@ impl Document {
         match self.encoded(image) {
             Ok(bytes) => Ok(Ok(bytes)),
             Err(ImageFault::Missing(why)) => Ok(Err(format!("images[{image}].uri: {why}"))),
-            Err(ImageFault::DecodeError(fault)) => Err(fault.of(&self.path)),
+            Err(ImageFault::Invalid(fault)) => Err(fault.of(&self.path)),
         }
     }
 
@@ -191,7 +191,7 @@ impl Document {
                 .extensions
                 .as_ref()
                 .and_then(|all| extension::unknown(&all.others));
-            return Err(ImageFault::DecodeError(match others {
+            return Err(ImageFault::Invalid(match others {
                 Some(name) => extension::only_in(&key, name),
                 None => GltfFault::key(key, "has neither a uri nor a bufferView"),
             }));
@@ -200,13 +200,13 @@ impl Document {
             true => uri::data(name).map_err(ImageFault::Missing)?,
             false => {
                 let path = self.folder.find(name).map_err(|unfound| match unfound {
-                    Unfound::Absent(why) => ImageFault::Missing(why),
-                    Unfound::DecodeError(rule) => ImageFault::DecodeError(fault(rule)),
+                    UriError::Absent(why) => ImageFault::Missing(why),
+                    UriError::Invalid(rule) => ImageFault::Invalid(fault(rule)),
                 })?;
                 uri::read(&path, MAX_IMAGE_BYTES).map_err(|error| {
                     let why = format!("{} cannot be read: {error}", super::error::shown(name));
                     match error.kind() {
-                        io::ErrorKind::FileTooLarge => ImageFault::DecodeError(fault(why)),
+                        io::ErrorKind::FileTooLarge => ImageFault::Invalid(fault(why)),
                         _ => ImageFault::Missing(why),
                     }
                 })?

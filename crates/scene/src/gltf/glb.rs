@@ -91,7 +91,7 @@ mod tests {
         bytes
     }
 
-    fn told(bytes: &[u8]) -> (Location, String) {
+    fn error_of(bytes: &[u8]) -> (Location, String) {
         let fault = chunks(bytes).unwrap_err();
         (fault.place, fault.message)
     }
@@ -119,28 +119,31 @@ mod tests {
     fn every_length_is_checked() {
         let byte = |offset: u64, rule: &str| (Location::Byte(offset), rule.to_owned());
         assert_eq!(
-            told(b"glTF"),
+            error_of(b"glTF"),
             byte(0, "the file is truncated: it has 4 bytes, and its header 12")
         );
         let mut bytes = made(24, &[(JSON, b"{}  ")]);
         bytes[4] = 1;
-        assert_eq!(told(&bytes), byte(4, "the version of the container is 1; it must be 2"));
         assert_eq!(
-            told(&made(25, &[(JSON, b"{}  ")])),
+            error_of(&bytes),
+            byte(4, "the version of the container is 1; it must be 2")
+        );
+        assert_eq!(
+            error_of(&made(25, &[(JSON, b"{}  ")])),
             byte(8, "the file is truncated: it has 24 of 25 bytes")
         );
         assert_eq!(
-            told(&made(23, &[(JSON, b"{}  ")])),
+            error_of(&made(23, &[(JSON, b"{}  ")])),
             byte(12, "the chunk has 4 bytes; 3 are left")
         );
         let mut bytes = made(24, &[(JSON, b"{}  ")]);
         bytes[12..16].fill(0xff);
-        assert_eq!(told(&bytes), byte(12, "the chunk has 4294967295 bytes; 4 are left"));
+        assert_eq!(error_of(&bytes), byte(12, "the chunk has 4294967295 bytes; 4 are left"));
         assert_eq!(
-            told(&made(24, &[(BIN, b"{}  ")])),
+            error_of(&made(24, &[(BIN, b"{}  ")])),
             byte(12, "the first chunk must be JSON")
         );
-        assert_eq!(told(&made(12, &[])), byte(12, "there must be a chunk of JSON"));
-        assert_eq!(told(&made(0, &[])), byte(12, "there must be a chunk of JSON"));
+        assert_eq!(error_of(&made(12, &[])), byte(12, "there must be a chunk of JSON"));
+        assert_eq!(error_of(&made(0, &[])), byte(12, "there must be a chunk of JSON"));
     }
 }

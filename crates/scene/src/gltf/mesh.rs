@@ -89,7 +89,7 @@ pub struct Meshes<'a> {
     bare: Option<(String, u32)>,
     bare_count: usize,
     /// First primitive with non-finite values, and their number, by attribute.
-    strange: Mutex<BTreeMap<&'static str, (String, usize)>>,
+    non_finite: Mutex<BTreeMap<&'static str, (String, usize)>>,
     /// First primitive with triangles without valid positions, and the number of these triangles.
     unplaced: Mutex<Option<(String, usize)>>,
 }
@@ -115,7 +115,7 @@ impl<'a> Meshes<'a> {
             lines: 0,
             bare: None,
             bare_count: 0,
-            strange: Mutex::default(),
+            non_finite: Mutex::default(),
             unplaced: Mutex::default(),
         };
         for key in keys {
@@ -183,8 +183,8 @@ impl<'a> Meshes<'a> {
     }
 
     pub fn damage(&self) -> Vec<Damage> {
-        let strange = self.strange.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let strange = strange.into_iter().map(|(name, (place, count))| {
+        let non_finite = self.non_finite.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let non_finite = non_finite.into_iter().map(|(name, (place, count))| {
             let what = format!("{place}.attributes.{name} has numbers that are not finite");
             Damage {
                 what: match count {
@@ -211,7 +211,7 @@ impl<'a> Meshes<'a> {
                 },
             }
         });
-        unplaced.into_iter().chain(strange).collect()
+        unplaced.into_iter().chain(non_finite).collect()
     }
 
     /// Returns why no triangles exist.
@@ -238,9 +238,9 @@ impl<'a> Meshes<'a> {
     }
 
     /// Records an attribute with non-finite values.
-    fn is_strange(&self, place: &str, name: &'static str) {
-        let mut strange = self.strange.lock().unwrap_or_else(PoisonError::into_inner);
-        let (first, count) = strange.entry(name).or_insert_with(|| (place.to_owned(), 0));
+    fn record_non_finite(&self, place: &str, name: &'static str) {
+        let mut non_finite = self.non_finite.lock().unwrap_or_else(PoisonError::into_inner);
+        let (first, count) = non_finite.entry(name).or_insert_with(|| (place.to_owned(), 0));
         *count += 1;
         // In any order, as above.
         if (place.len(), place) < (first.len(), first.as_str()) {
@@ -367,7 +367,7 @@ impl MeshBuilder {
             return Ok(*first);
         }
         let first = self.draft.positions.len();
-        let report = |name: &'static str| meshes.is_strange(&part.place, name);
+        let report = |name: &'static str| meshes.record_non_finite(&part.place, name);
         let Some(source) = Source::of(meshes.document, (part.primitive, &part.place), &report, first)? else {
             return Ok(first);
         };

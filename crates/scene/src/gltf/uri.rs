@@ -43,23 +43,23 @@ pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
 
 /// Why a file is not read: the value and the rule.
 #[derive(Debug)]
-pub(super) enum Unfound {
+pub(super) enum UriError {
     /// Missing or unreadable.
     Absent(String),
     /// Violates a rule.
-    DecodeError(String),
+    Invalid(String),
 }
 
-impl From<String> for Unfound {
+impl From<String> for UriError {
     fn from(rule: String) -> Self {
-        Unfound::DecodeError(rule)
+        UriError::Invalid(rule)
     }
 }
 
-impl From<Unfound> for String {
-    fn from(unfound: Unfound) -> Self {
+impl From<UriError> for String {
+    fn from(unfound: UriError) -> Self {
         match unfound {
-            Unfound::Absent(why) | Unfound::DecodeError(why) => why,
+            UriError::Absent(why) | UriError::Invalid(why) => why,
         }
     }
 }
@@ -74,7 +74,7 @@ pub(super) struct Folder {
 
 impl Folder {
     /// Resolves a URI to a canonical path in the asset root.
-    pub fn find(&self, uri: &str) -> Result<PathBuf, Unfound> {
+    pub fn find(&self, uri: &str) -> Result<PathBuf, UriError> {
         if let Some(scheme) = scheme(uri) {
             let rule = "it must be a relative path, or a data URI";
             return Err(format!("{} begins with \"{scheme}:\"; {rule}", shown(uri)).into());
@@ -99,7 +99,7 @@ impl Folder {
             Err(error) if error.kind() == io::ErrorKind::NotFound => found.find_map(Result::ok).ok_or(error),
             first => first,
         };
-        let path = path.map_err(|error| Unfound::Absent(format!("{} cannot be read: {error}", shown(uri))))?;
+        let path = path.map_err(|error| UriError::Absent(format!("{} cannot be read: {error}", shown(uri))))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
             format!("{} must lie in {root}, which cannot be found: {error}", shown(uri))

@@ -111,7 +111,7 @@ impl Overrides {
 impl Overrides {
     /// Returns the option that overrides the value of a key of the file, or a part of it.
     pub fn in_place_of(&self, key: &KeyPath) -> Option<String> {
-        if let Some(define) = self.define.iter().find(|define| define.stands_in_for(key)) {
+        if let Some(define) = self.define.iter().find(|define| define.overrides_key(key)) {
             return Some(format!("--define {define}"));
         }
         let options: [(bool, &str, &[&str]); 9] = [

@@ -16,7 +16,7 @@ use super::super::{
     Assets, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Reflection, Rotation, Scale,
     Shape, ShapeDescription, Up,
 };
-use super::mtl::Looks;
+use super::mtl::SceneMaterials;
 use super::{At, Checked, Collector, FLATTEST, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, Normals};
 
@@ -26,7 +26,7 @@ const MAX_GROUPS: usize = 1 << 24;
 /// The materials and files that shapes refer to.
 pub(super) struct SceneLookup<'a> {
     pub names: &'a BTreeMap<&'a str, usize>,
-    pub looks: Looks<'a>,
+    pub looks: SceneMaterials<'a>,
     pub assets: &'a Assets,
     /// False if the scene is invalid already: meshes are then not needed.
     pub reads_files: bool,

@@ -25,7 +25,7 @@ use glam::DVec3;
 use self::images::Images;
 pub(super) use self::light::light;
 use self::mesh::{NamedMesh, SceneLookup};
-use self::mtl::Looks;
+use self::mtl::SceneMaterials;
 use self::shape::shape;
 use self::texture::Textures;
 use super::key_path::cut;
@@ -113,7 +113,7 @@ impl Description {
         let own = (self.materials.keys().cloned().collect(), materials);
         let mut known = SceneLookup {
             names: &indices,
-            looks: Looks::new(own, textures, images, files, integrator),
+            looks: SceneMaterials::new(own, textures, images, files, integrator),
             assets,
             reads_files,
             suggestions: Suggestions::default(),
@@ -307,11 +307,11 @@ pub(super) fn adaptive(
     integrator: Integrator,
 ) -> Checked<Adaptive> {
     let (pattern, count) = (pixel_samples.pattern(integrator), pixel_samples.count);
-    check(pattern.goes_on(), || {
+    check(pattern.is_extensible(), || {
         let name = pattern.name();
         let others: Vec<_> = Pattern::ALL
             .into_iter()
-            .filter(|pattern| pattern.goes_on())
+            .filter(|pattern| pattern.is_extensible())
             .map(Pattern::name)
             .collect();
         format!(

@@ -27,7 +27,7 @@ const NS: f64 = 16.0;
 const MAX_MAP_MESSAGE: usize = 300;
 
 /// All materials of a scene: first its own, then those of meshes.
-pub(super) struct Looks<'a> {
+pub(super) struct SceneMaterials<'a> {
     pub names: Vec<String>,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
@@ -68,7 +68,7 @@ struct GroupMaterials {
     materials: Vec<Option<usize>>,
 }
 
-impl<'a> Looks<'a> {
+impl<'a> SceneMaterials<'a> {
     /// Starts with the scene's own materials and textures, and the images that they use.
     pub fn new(
         (names, materials): (Vec<String>, Vec<Material>),
@@ -78,7 +78,7 @@ impl<'a> Looks<'a> {
         integrator: Integrator,
     ) -> Self {
         let folder = &images.assets.folder;
-        Looks {
+        SceneMaterials {
             folder: folder.canonicalize().unwrap_or_else(|_| folder.clone()),
             names,
             materials,

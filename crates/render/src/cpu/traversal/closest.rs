@@ -8,7 +8,7 @@ use fearless_simd::prelude::*;
 
 use super::four::Four;
 use super::line::greater;
-use super::{Line, Mesh, Nearest, limit_from};
+use super::{Line, Mesh, Nearest, remaining_t_max};
 use crate::bvh::{BUILD_MAX_DEPTH, Node};
 
 /// Maximum number of nodes on the stack: each level pops one and pushes up to 8.
@@ -32,12 +32,12 @@ pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32
         simd,
         mesh.nodes,
         line,
-        limit_from(start, best.t),
+        remaining_t_max(start, best.t),
         #[inline(always)]
         |items, _| {
             let slots = items.clone().step_by(4);
             for (first, triangles) in slots.zip(mesh.triangles[items].chunks(4)) {
-                let (mut met, t) = Four::new(simd, mesh, triangles).met_by(simd, line);
+                let (mut met, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
                 while met != 0 {
                     let i = met.trailing_zeros() as usize;
                     met &= met - 1;
@@ -49,7 +49,7 @@ pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32
                     }
                 }
             }
-            limit_from(start, best.t)
+            remaining_t_max(start, best.t)
         },
     );
     best
@@ -67,7 +67,7 @@ pub fn any<S: Simd>(simd: S, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) ->
         #[inline(always)]
         |items, limit| {
             for triangles in mesh.triangles[items].chunks(4) {
-                let (mut met, t) = Four::new(simd, mesh, triangles).met_by(simd, line);
+                let (mut met, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
                 while met != 0 {
                     let i = met.trailing_zeros() as usize;
                     met &= met - 1;

@@ -41,7 +41,7 @@ impl<S: Simd> Four<S> {
     /// Returns the mask of hit triangles and the distances, as [`Line::triangle`] for each. Distances may be negative
     /// by up to the padding of boxes.
     #[inline(always)]
-    pub fn met_by(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
+    pub fn intersect(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
         let zero = f32x4::splat(simd, 0.0);
         let mut seen = [[zero; 3]; 3];
         for (seen, corner) in seen.iter_mut().zip(&self.corners) {

@@ -47,7 +47,7 @@ pub struct Nearest {
 
 /// Returns an upper bound on the distance beyond `start` of anything nearer than `t`, with a margin for the rounding of
 /// their sum.
-pub fn limit_from(start: f32, t: f32) -> f32 {
+pub fn remaining_t_max(start: f32, t: f32) -> f32 {
     (t - start) + t * 4.7683716e-7
 }
 

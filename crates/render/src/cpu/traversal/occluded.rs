@@ -60,7 +60,7 @@ pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) 
                 if pending.count_ones() <= FEW {
                     let four = Four::new(simd, mesh, triangles);
                     for i in bits_of(pending) {
-                        let (met, t) = four.met_by(simd, &line_at(lanes, i, &o, segments.pad));
+                        let (met, t) = four.intersect(simd, &line_at(lanes, i, &o, segments.pad));
                         for c in bits_of(met) {
                             if t[c] > 0.0 && t[c] < segments.t_max && triangles[c][3] != segments.skip {
                                 pending &= !(1 << i);
@@ -81,7 +81,7 @@ pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) 
                     pending &= !in_lanes(
                         lanes,
                         #[inline(always)]
-                        |lanes| triangle_hides(simd, lanes, &o, segments, vertices),
+                        |lanes| occluded_by_triangle(simd, lanes, &o, segments, vertices),
                     );
                 }
             }
@@ -111,14 +111,14 @@ pub fn items<S: Simd>(
             let mut occluded = 0;
             for item in items {
                 let Some(bounds) = boxes(item) else { continue };
-                let passing = in_lanes(
+                let segments_hitting_child = in_lanes(
                     lanes,
                     #[inline(always)]
                     |lanes| passing_box(simd, lanes, &o, segments, &bounds),
                 ) & mask
                     & !occluded;
-                if passing != 0 {
-                    occluded |= visit(item, passing);
+                if segments_hitting_child != 0 {
+                    occluded |= visit(item, segments_hitting_child);
                 }
             }
             occluded
@@ -225,7 +225,7 @@ fn walk<S: Simd>(
                     & in_lanes(
                         &lanes,
                         #[inline(always)]
-                        |lanes| passing(simd, lanes, &slopes, &seen, c, segments.t_max),
+                        |lanes| segments_hitting_child(simd, lanes, &slopes, &seen, c, segments.t_max),
                     );
                 any |= u32::from(children[c] != 0) << c;
             }
@@ -372,7 +372,7 @@ impl<S: Simd> Lanes<S> {
 /// Returns the mask of segments that hit an item's box, as `interval_hits` of `slab.rs`.
 #[inline(always)]
 fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segments, bounds: &Aabb) -> u64 {
-    let [near, far] = passage(
+    let [near, far] = line_intervals(
         simd,
         lanes,
         o,
@@ -387,7 +387,14 @@ fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segm
 
 /// Returns the intervals of the segments' lines inside a box, as [`Line::slab`](super::Line::slab).
 #[inline(always)]
-fn passage<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], pad: f32, low: [f32; 3], high: [f32; 3]) -> [S::f32s; 2] {
+fn line_intervals<S: Simd>(
+    simd: S,
+    lanes: &Lanes<S>,
+    o: &[f32; 3],
+    pad: f32,
+    low: [f32; 3],
+    high: [f32; 3],
+) -> [S::f32s; 2] {
     let mut near = S::f32s::splat(simd, f32::NEG_INFINITY);
     let mut far = S::f32s::splat(simd, f32::INFINITY);
     for k in 0..3 {
@@ -401,7 +408,7 @@ fn passage<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], pad: f32, low: [f32
 
 /// Returns the mask of segments that hit a child's box.
 #[inline(always)]
-fn passing<S: Simd>(
+fn segments_hitting_child<S: Simd>(
     simd: S,
     lanes: &Lanes<S>,
     slopes: &[Slope; 3],
@@ -428,7 +435,7 @@ fn passing<S: Simd>(
 
 /// Returns the mask of segments that a triangle occludes, as [`Line::triangle`](super::Line::triangle).
 #[inline(always)]
-fn triangle_hides<S: Simd>(
+fn occluded_by_triangle<S: Simd>(
     simd: S,
     lanes: &Lanes<S>,
     o: &[f32; 3],
@@ -460,7 +467,7 @@ fn triangle_hides<S: Simd>(
         low[k] = less(less(a, b), c);
         high[k] = greater(greater(a, b), c);
     }
-    let [near, far] = passage(simd, lanes, o, segments.pad, low, high);
+    let [near, far] = line_intervals(simd, lanes, o, segments.pad, low, high);
     // In this order NaN is preserved.
     let t = near.simd_gt(t).select(near, t);
     let t = far.simd_lt(t).select(far, t);

@@ -426,7 +426,7 @@ fn leaves_are_visited_until_the_limit() {
 }
 
 /// Möller and Trumbore's test in f64. Returns the distance and the smallest barycentric coordinate.
-fn by_another_way(o: DVec3, d: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, f64)> {
+fn moller_trumbore_f64(o: DVec3, d: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, f64)> {
     let (e1, e2) = (b - a, c - a);
     let p = d.cross(e2);
     let determinant = e1.dot(p);
@@ -446,7 +446,7 @@ fn single_triangles() {
         let (o, d) = (random.vector() * 2.0, random.vector());
         let vertices = corners.map(|v| v.extend(0.0).to_array());
         let found = Line::new(o, d, 0.0).triangle([&vertices[0], &vertices[1], &vertices[2]]);
-        match by_another_way(o.as_dvec3(), d.as_dvec3(), corners.map(|v| v.as_dvec3())) {
+        match moller_trumbore_f64(o.as_dvec3(), d.as_dvec3(), corners.map(|v| v.as_dvec3())) {
             Some((t, inside)) if inside > 1e-3 && t > 1e-3 => {
                 let found = f64::from(found.unwrap());
                 assert!((found - t).abs() < 1e-3 * t, "{found} {t}");

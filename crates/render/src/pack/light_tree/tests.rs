@@ -52,14 +52,14 @@ impl Random {
     }
 
     /// A square emitter, or a point.
-    fn lamp(&mut self, i: u32, two_sided: bool) -> Lamp {
+    fn lamp(&mut self, i: u32, two_sided: bool) -> TreeEmitter {
         let (center, normal) = (self.point() * 5.0, self.direction());
         let half = if self.unit() < 0.2 { 0.0 } else { 0.3 * self.unit() };
         let cone = match half == 0.0 {
             true => Cone::ALL,
             false => Cone::flat(normal, two_sided),
         };
-        Lamp {
+        TreeEmitter {
             low: center - half,
             high: center + half,
             cone,
@@ -170,7 +170,7 @@ fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64
 fn a_tree_built_in_parallel_has_the_same_nodes() {
     let mut random = Random(5);
     for count in [0, 1, 2, 5, 16, 17, 300, 5000] {
-        let lamps: Vec<Lamp> = (0..count).map(|i| random.lamp(i, i % 3 == 0)).collect();
+        let lamps: Vec<TreeEmitter> = (0..count).map(|i| random.lamp(i, i % 3 == 0)).collect();
         let serial = build_with(&lamps, usize::MAX);
         for parallel in [1, 40, PARALLEL] {
             let nodes = build_with(&lamps, parallel);
@@ -188,7 +188,7 @@ fn a_tree_built_in_parallel_has_the_same_nodes() {
 fn probabilities_sum_to_one_and_visible_emitters_have_one() {
     let mut random = Random(2);
     for (count, two_sided) in [(1, false), (2, false), (17, true), (300, false), (300, true)] {
-        let lamps: Vec<Lamp> = (0..count).map(|i| random.lamp(i, two_sided)).collect();
+        let lamps: Vec<TreeEmitter> = (0..count).map(|i| random.lamp(i, two_sided)).collect();
         let nodes = build(&lamps);
         assert_eq!(
             nodes
@@ -232,7 +232,7 @@ fn probabilities_sum_to_one_and_visible_emitters_have_one() {
 #[test]
 fn nodes_link_to_parents_and_bound_children() {
     let mut random = Random(3);
-    let lamps: Vec<Lamp> = (0..1000).map(|i| random.lamp(i, false)).collect();
+    let lamps: Vec<TreeEmitter> = (0..1000).map(|i| random.lamp(i, false)).collect();
     let nodes = build(&lamps);
     assert_eq!(nodes[0].parent.x, NO_INDEX);
     assert!(nodes.len() < 500, "too many nodes: {}", nodes.len());
@@ -274,7 +274,7 @@ fn importance_matches_the_formula_with_angles() {
     let mut random = Random(4);
     let (mut compared, mut dark) = (0, 0);
     for i in 0..20_000 {
-        let emitter = Lamp {
+        let emitter = TreeEmitter {
             cone: random.cone(),
             intensity: 1.0,
             ..random.lamp(i, false)
@@ -366,7 +366,7 @@ fn children_are_selected_in_proportion_to_importance() {
 
 #[test]
 fn coincident_and_exponential_emitters_give_shallow_trees() {
-    let at = |i: u32, p: DVec3, intensity: f64| Lamp {
+    let at = |i: u32, p: DVec3, intensity: f64| TreeEmitter {
         low: p,
         high: p,
         cone: Cone::ALL,
@@ -375,7 +375,7 @@ fn coincident_and_exponential_emitters_give_shallow_trees() {
         instance: 0,
         index: i,
     };
-    let depth = |lamps: &[Lamp]| {
+    let depth = |lamps: &[TreeEmitter]| {
         let nodes = build(lamps);
         let levels = |mut i: usize| {
             let mut levels = 0;
@@ -388,12 +388,12 @@ fn coincident_and_exponential_emitters_give_shallow_trees() {
         (0..nodes.len()).map(levels).max().unwrap()
     };
     let count = 20_000;
-    let one_place: Vec<Lamp> = (0..count).map(|i| at(i, DVec3::ONE, 1.0)).collect();
+    let one_place: Vec<TreeEmitter> = (0..count).map(|i| at(i, DVec3::ONE, 1.0)).collect();
     assert!(depth(&one_place) <= 8, "{}", depth(&one_place));
-    let row: Vec<Lamp> = (0..count).map(|i| at(i, DVec3::X * f64::from(i), 1.0)).collect();
+    let row: Vec<TreeEmitter> = (0..count).map(|i| at(i, DVec3::X * f64::from(i), 1.0)).collect();
     assert!(depth(&row) <= 12, "{}", depth(&row));
     // Each has a thousandth of the next: without the bound they would be split off one by one.
-    let falling: Vec<Lamp> = (0..300)
+    let falling: Vec<TreeEmitter> = (0..300)
         .map(|i| at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))
         .collect();
     assert!(depth(&falling) <= 48 + 9, "{}", depth(&falling));

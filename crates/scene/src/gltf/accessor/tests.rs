@@ -8,7 +8,7 @@ fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-fn told<T: std::fmt::Debug>(result: Result<T, crate::gltf::error::GltfError>) -> String {
+fn error_of<T: std::fmt::Debug>(result: Result<T, crate::gltf::error::GltfError>) -> String {
     let text = result.unwrap_err().to_string();
     text.strip_prefix("/none/a.gltf: ").unwrap_or(&text).to_owned()
 }
@@ -96,11 +96,11 @@ fn every_type_is_read() {
         assert_eq!(accessor(&bytes, of(kind)).components(0).unwrap(), count);
     }
     assert_eq!(
-        told(accessor(&bytes, of("VEC4")).vectors::<3>(0)),
+        error_of(accessor(&bytes, of("VEC4")).vectors::<3>(0)),
         "accessors[0].type: its elements have 4 components; 3 are expected"
     );
     assert_eq!(
-        told(accessor(&bytes, of("VEC4")).vectors::<3>(1)),
+        error_of(accessor(&bytes, of("VEC4")).vectors::<3>(1)),
         "accessors: 1 is out of range; the file has 1"
     );
 }
@@ -172,20 +172,20 @@ fn indices_are_whole_numbers() {
     assert_eq!(of(5125, 2).indices(0).unwrap(), [131_073, 3]);
     for component in [5120, 5122, 5126] {
         assert_eq!(
-            told(of(component, 2).indices(0)),
+            error_of(of(component, 2).indices(0)),
             "accessors[0].componentType: indices must be unsigned bytes, shorts or ints"
         );
     }
     let vector = json!({ "bufferView": 0, "componentType": 5121, "count": 2, "type": "VEC2" });
     assert_eq!(
-        told(accessor(&bytes, vector).indices(0)),
+        error_of(accessor(&bytes, vector).indices(0)),
         "accessors[0].type: indices must be SCALAR"
     );
     for (component, size) in [(5121, 1), (5123, 2), (5125, 4)] {
         let mut bytes = vec![0; size];
         bytes.extend(vec![0xff; size]);
         let description = json!({ "bufferView": 0, "componentType": component, "count": 2, "type": "SCALAR" });
-        let message = told(accessor(&bytes, description.clone()).indices(0));
+        let message = error_of(accessor(&bytes, description.clone()).indices(0));
         assert!(message.starts_with("accessors[0]: element 1 is "), "{message}");
         assert!(message.contains("restart"), "{message}");
         // One less is a valid index.
@@ -228,21 +228,21 @@ fn sparse_elements_stand_in_for_others() {
     assert_eq!(sparse(true, &[1, 3], 0).unwrap(), base);
     let zero = [[0.0, 0.0], [10.0, 11.0], [0.0, 0.0], [12.0, 13.0]];
     assert_eq!(sparse(false, &[1, 3], 2).unwrap(), zero);
-    let told = |indices: &[u8], count: usize| sparse(true, indices, count).unwrap_err();
+    let error_of = |indices: &[u8], count: usize| sparse(true, indices, count).unwrap_err();
     assert_eq!(
-        told(&[1, 4], 2),
+        error_of(&[1, 4], 2),
         "accessors[0].sparse.indices: element 1 is 4, which is not there; there are 4"
     );
     for indices in [[1, 1], [3, 1]] {
-        let message = told(&indices, 2);
+        let message = error_of(&indices, 2);
         assert!(message.ends_with("must be greater than the one before it"), "{message}");
     }
     assert_eq!(
-        told(&[0, 1, 2, 3], 5),
+        error_of(&[0, 1, 2, 3], 5),
         "accessors[0].sparse.count: 5 must be at most 4, the count of all elements"
     );
     assert_eq!(
-        told(&[0, 1, 2, 3], 3),
+        error_of(&[0, 1, 2, 3], 3),
         "accessors[0].sparse.values: 3 elements of 8 bytes, 8 apart, from byte 0 on; bufferViews[2] has 16 bytes"
     );
 }
@@ -252,14 +252,14 @@ fn an_accessor_without_bytes_is_zero() {
     let of = |count: u64| accessor(&[0], json!({ "componentType": 5123, "count": count, "type": "VEC2" }));
     assert_eq!(of(2).vectors::<2>(0).unwrap(), [[0.0; 2]; 2]);
     assert_eq!(
-        told(of(u64::from(u32::MAX)).vectors::<2>(0)),
+        error_of(of(u64::from(u32::MAX)).vectors::<2>(0)),
         "accessors[0].count: 4294967295 elements without a bufferView; there must be at most 4194304"
     );
     assert!(of(u64::MAX).vectors::<2>(0).is_err());
     // Except if an unsupported extension holds the data.
     let hidden = json!({ "componentType": 5126, "count": 2, "type": "VEC2", "extensions": { "X_bytes": {} } });
     assert_eq!(
-        told(accessor(&[0], hidden).vectors::<2>(0)),
+        error_of(accessor(&[0], hidden).vectors::<2>(0)),
         "accessors[0]: \"X_bytes\" holds its only data and is not supported; export the file without it"
     );
 }
@@ -276,15 +276,15 @@ fn no_length_offset_or_count_leaves_the_bytes() {
     };
     assert_eq!(with(&[]).unwrap().len(), 2);
     assert_eq!(
-        told(with(&[("count", json!(3))])),
+        error_of(with(&[("count", json!(3))])),
         "accessors[0]: 3 elements of 12 bytes, 12 apart, from byte 0 on; bufferViews[0] has 24 bytes"
     );
     let huge = [u64::from(u32::MAX), 1 << 40, (1 << 61) + 1, u64::MAX / 12, u64::MAX];
     for offset in [1, 24, 25].into_iter().chain(huge) {
-        assert!(told(with(&[("byteOffset", json!(offset))])).starts_with("accessors[0]: 2 elements"));
+        assert!(error_of(with(&[("byteOffset", json!(offset))])).starts_with("accessors[0]: 2 elements"));
     }
     for count in huge {
-        let message = told(with(&[("count", json!(count)), ("byteOffset", json!(4))]));
+        let message = error_of(with(&[("count", json!(count)), ("byteOffset", json!(4))]));
         assert!(
             message.starts_with(&format!("accessors[0]: {count} elements")),
             "{message}"
@@ -307,7 +307,7 @@ fn no_length_offset_or_count_leaves_the_bytes() {
         document(&bytes, json!([view]), accessors).vectors::<3>(0)
     };
     for (offset, length) in [(0, 25), (1, 24), (25, 0), (u64::MAX, 1), (1, u64::MAX), (1 << 40, 4)] {
-        let message = told(view(json!({ "buffer": 0, "byteOffset": offset, "byteLength": length })));
+        let message = error_of(view(json!({ "buffer": 0, "byteOffset": offset, "byteLength": length })));
         assert_eq!(
             message,
             format!("bufferViews[0]: {length} bytes from byte {offset} on; buffers[0] has 24")
@@ -315,7 +315,7 @@ fn no_length_offset_or_count_leaves_the_bytes() {
     }
     let stride = |stride: u64| view(json!({ "buffer": 0, "byteLength": 24, "byteStride": stride }));
     assert_eq!(
-        told(stride(11)),
+        error_of(stride(11)),
         "accessors[0]: the stride of 11 bytes must be at least the 12 of an element"
     );
     assert_eq!(stride(0).unwrap(), stride(12).unwrap());

@@ -13,13 +13,13 @@ use super::super::super::{
 };
 use super::super::principled::dielectric;
 use super::super::{number, show};
-use super::{DIFFUSE, Looks, Traits, Warnings, beside};
+use super::{DIFFUSE, SceneMaterials, Traits, Warnings, beside};
 use crate::mesh::MtlMaterial;
 
 /// Factor from `Ks` to `specular`: exporters write 0.5 for common dielectrics, whose `specular` is 1.
 const SPECULAR: f64 = 2.0;
 
-impl Looks<'_> {
+impl SceneMaterials<'_> {
     /// Returns a material. `Ka` is ignored, as exporters write anything there.
     pub(super) fn principled(&mut self, own: &MtlMaterial, file: &Path, traits: Traits) -> Material {
         let mut warnings = Warnings::default();
