@@ -12,37 +12,28 @@ struct Digits {
 }
 
 fn digits_of(bits: u32) -> Digits {
-    if bits < 0x800000u {
-        let shift = countLeadingZeros(bits) - 8u;
-        return Digits(bits << shift, 1 - i32(shift));
-    }
-    return Digits((bits & 0x7fffffu) | 0x800000u, i32(bits >> 23u));
+    let is_normal = bits >= 0x800000u;
+    let shift = max(countLeadingZeros(bits), 8u) - 8u;
+    let mantissa = select(bits << shift, (bits & 0x7fffffu) | 0x800000u, is_normal);
+    return Digits(mantissa, select(1 - i32(shift), i32(bits >> 23u), is_normal));
 }
 
 // Returns the rounded bits of 2^(exponent - 127) x (digits / 2^24), for digits from 2^24 to 2^25; of slightly more than
 // that if `more`.
 fn rounded(exponent: i32, digits: u32, more: bool) -> u32 {
-    if exponent >= 255 {
-        return INFINITE;
-    }
     let dropped = u32(clamp(2 - exponent, 1, 26));
     let kept = digits >> dropped;
     let rest = digits & ((1u << dropped) - 1u);
     let half = 1u << (dropped - 1u);
     let up = (rest > half) | ((rest == half) & (more | ((kept & 1u) == 1u)));
-    let below = u32(select(0, exponent - 1, exponent > 1)) << 23u; // the leading bit of the mantissa adds the missing 1
-    return below + kept + select(0u, 1u, up);
+    let below = u32(clamp(exponent - 1, 0, 254)) << 23u; // the mantissa's first bit adds the last 1
+    return select(below + kept + select(0u, 1u, up), INFINITE, exponent >= 255);
 }
 
 fn quotient(a: f32, b: f32) -> f32 {
     let sign = (bitcast<u32>(a) ^ bitcast<u32>(b)) & 0x80000000u;
     let x = bitcast<u32>(a) & 0x7fffffffu;
     let y = bitcast<u32>(b) & 0x7fffffffu;
-    let none = (x > INFINITE) | (y > INFINITE) | ((x == y) & ((x == 0u) | (x == INFINITE)));
-    if none | (x == 0u) | (y == 0u) | (x == INFINITE) | (y == INFINITE) {
-        let result = select(0u, INFINITE, (x == INFINITE) | (y == 0u));
-        return bitcast<f32>(sign | select(result, 0x7fc00000u, none));
-    }
     let over = digits_of(x);
     let under = digits_of(y);
     let less = over.mantissa < under.mantissa;
@@ -53,16 +44,17 @@ fn quotient(a: f32, b: f32) -> f32 {
     var rest = i32(numerator << 24u) - guess * denominator;
     let step = i32(f32(rest) / f32(denominator)) - select(0, 1, rest < 0);
     rest -= step * denominator;
-    var digits = guess + step;
-    if rest < 0 {
-        digits -= 1;
-        rest += denominator;
-    }
-    if rest >= denominator {
-        digits += 1;
-        rest -= denominator;
-    }
-    return bitcast<f32>(sign | rounded(exponent, u32(digits), rest != 0));
+    let is_below = rest < 0;
+    rest += select(0, denominator, is_below);
+    let is_above = rest >= denominator;
+    rest -= select(0, denominator, is_above);
+    let digits = guess + step - select(0, 1, is_below) + select(0, 1, is_above);
+    let finite = rounded(exponent, u32(digits), rest != 0);
+    let is_nan = (x > INFINITE) | (y > INFINITE) | ((x == y) & ((x == 0u) | (x == INFINITE)));
+    let is_infinite = (x == INFINITE) | (y == 0u);
+    let is_zero = (x == 0u) | (y == INFINITE);
+    let bits = select(select(finite, 0u, is_zero), INFINITE, is_infinite);
+    return bitcast<f32>(sign | select(bits, 0x7fc00000u, is_nan));
 }
 
 fn quotient2(a: vec2f, b: vec2f) -> vec2f {
@@ -79,13 +71,7 @@ fn quotient4(a: vec4f, b: vec4f) -> vec4f {
 
 fn square_root(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
-    if (bits == 0u) | (bits == 0x80000000u) | (bits == INFINITE) {
-        return x;
-    }
-    if bits > INFINITE { // NaN or negative
-        return bitcast<f32>(bits | 0x7fc00000u);
-    }
-    let number = digits_of(bits);
+    let number = digits_of(bits & 0x7fffffffu);
     let even = (number.exponent & 1) == 0;
     let mantissa = number.mantissa << select(0u, 1u, even);
     let exponent = (number.exponent - select(0, 1, even) + 127) / 2;
@@ -93,15 +79,16 @@ fn square_root(x: f32) -> f32 {
     var rest = i32(mantissa << 25u) - digits * digits;
     digits += i32(f32(rest) / f32(2 * digits)) - select(0, 1, rest < 0);
     rest = i32(mantissa << 25u) - digits * digits;
-    if rest < 0 {
-        digits -= 1;
-        rest += 2 * digits + 1;
-    }
-    if rest > 2 * digits {
-        rest -= 2 * digits + 1;
-        digits += 1;
-    }
-    return bitcast<f32>(rounded(exponent, u32(digits), rest != 0));
+    let is_below = rest < 0;
+    digits -= select(0, 1, is_below);
+    rest += select(0, 2 * digits + 1, is_below);
+    let is_above = rest > 2 * digits;
+    rest -= select(0, 2 * digits + 1, is_above);
+    digits += select(0, 1, is_above);
+    let finite = rounded(exponent, u32(digits), rest != 0);
+    let is_itself = (bits == 0u) | (bits == 0x80000000u) | (bits == INFINITE);
+    let root = select(finite, bits, is_itself);
+    return bitcast<f32>(select(root, bits | 0x7fc00000u, (bits > INFINITE) & !is_itself)); // NaN, or below 0
 }
 
 fn square_root4(x: vec4f) -> vec4f {
