@@ -13,7 +13,7 @@ struct Digits {
 
 fn digits_of(bits: u32) -> Digits {
     let is_normal = bits >= 0x800000u;
-    let shift = max(countLeadingZeros(bits), 8u) - 8u;
+    let shift = select(countLeadingZeros(bits) - 8u, 0u, is_normal);
     let mantissa = select(bits << shift, (bits & 0x7fffffu) | 0x800000u, is_normal);
     return Digits(mantissa, select(1 - i32(shift), i32(bits >> 23u), is_normal));
 }
