@@ -105,6 +105,7 @@ pub fn knot() -> String {
 
 /// An indexed triangle mesh.
 pub struct Triangles {
+    /// Vertex positions.
     pub positions: Vec<[f32; 3]>,
     /// Vertex indices, counterclockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,

@@ -8,12 +8,35 @@ use crate::{adapter, sources};
 
 const FILE: &str = "integrators/path.wgsl";
 
-fn path_with(changes: &[(&str, &str)]) -> Shaders {
+/// Strategies by the seed of the camera, so that a scene needs one kernel.
+const MIS: u32 = 0;
+const LIGHT: u32 = 1;
+const BSDF: u32 = 2;
+/// MIS with a wrong weight of light samples.
+const WRONG: u32 = 3;
+/// Emission that the camera sees directly.
+const DIRECT: u32 = 4;
+
+/// Returns shaders with the strategies.
+fn shaders_with_strategies() -> Shaders {
+    const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
+    const OF_BSDF: &str = "power_heuristic(state.pdf, emitter_pdf(prim, from_previous, density, ray, surface.normal))";
     let mut text = sources::shaders().text(FILE).to_owned();
-    for (from, to) in changes {
-        assert!(text.contains(from), "{from} not found");
-        text = text.replace(from, to);
+    for (weight, alternatives) in [(OF_LIGHT, "1.0, 0.0, 0.9"), (OF_BSDF, "0.0, 1.0, 1.0")] {
+        assert!(text.contains(weight), "{weight} not found");
+        text = text.replace(weight, &format!("strategy_weight({weight}, {alternatives})"));
     }
+    text += &format!(
+        "fn strategy_weight(mis: f32, light: f32, bsdf: f32, wrong: f32) -> f32 {{
+            switch camera.seed {{
+                case {MIS}u: {{ return mis; }}
+                case {LIGHT}u: {{ return light; }}
+                case {BSDF}u: {{ return bsdf; }}
+                case {WRONG}u: {{ return wrong * mis; }}
+                default: {{ return 0.0; }}
+            }}
+        }}\n"
+    );
     sources::shaders_with(FILE, &text)
 }
 
@@ -55,14 +78,7 @@ fn light_and_bsdf_sampling_agree() {
     if adapter::device().is_none() {
         return;
     }
-    const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
-    const OF_MATERIAL: &str = "power_heuristic(state.pdf, emitter_pdf(prim, seen, density, ray, surface.normal));";
-    let light_alone = path_with(&[(OF_LIGHT, "1.0"), (OF_MATERIAL, "0.0;")]);
-    let material_alone = path_with(&[(OF_LIGHT, "0.0"), (OF_MATERIAL, "1.0;")]);
-    let wrong = path_with(&[(
-        OF_LIGHT,
-        "0.9 * (select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta))",
-    )]);
+    let shaders = shaders_with_strategies();
     let camera = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5], fov = 40 }\n\
                   materials.source = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
                   materials.dim = { type = 'phong', diffuse = [0.3, 0.3, 0.3], specular = [0.3, 0.3, 0.3], shininess = 5, ambient = [0, 0, 0], emission = [1, 2, 1] }\n\
@@ -104,27 +120,26 @@ fn light_and_bsdf_sampling_agree() {
                 i == number_of_many,
                 "a light tree is built over many lights"
             );
-            // Direct emission is subtracted.
-            let seen = mean(&render_with(
-                &scene(4096, 0, &text),
-                RenderMode::Baked,
-                sources::shaders(),
-            ));
-            let reflected = |shaders: &Shaders| {
-                let found = mean(&render_with(&packed, RenderMode::Baked, shaders));
-                [0, 1, 2].map(|i| found[i] - seen[i])
+            let rendered = |strategy: u32| {
+                let mut packed = packed.clone();
+                packed.camera.seed = strategy;
+                mean(&render_with(&packed, RenderMode::Buffers, &shaders))
             };
-            let both = reflected(sources::shaders());
-            let (light, materials, wrong) = (reflected(&light_alone), reflected(&material_alone), reflected(&wrong));
+            let direct = rendered(DIRECT);
+            let reflected = |strategy: u32| {
+                let found = rendered(strategy);
+                [0, 1, 2].map(|i| found[i] - direct[i])
+            };
+            let [both, light, bsdf, wrong] = [MIS, LIGHT, BSDF, WRONG].map(reflected);
             for i in 0..3 {
                 let near = |x: f64, relative: f64| (x - both[i]).abs() < relative * both[i];
                 assert!(
                     near(light[i], 1e-2),
-                    "light alone: {light:?} for {both:?}\n{shape}{material}"
+                    "light sampling alone: {light:?} for {both:?}\n{shape}{material}"
                 );
                 assert!(
-                    near(materials[i], 1e-2),
-                    "materials alone: {materials:?} for {both:?}\n{shape}{material}"
+                    near(bsdf[i], 1e-2),
+                    "BSDF sampling alone: {bsdf:?} for {both:?}\n{shape}{material}"
                 );
                 assert!(
                     !near(wrong[i], 1e-2),

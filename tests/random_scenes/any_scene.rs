@@ -18,7 +18,7 @@ use wgray_render::records::Packed;
 use self::files::AROUND;
 pub use self::files::folder;
 use self::materials::*;
-use self::moved::moved;
+pub use self::moved::moved;
 use self::shapes::*;
 use self::values::*;
 use crate::patterns;

@@ -5,6 +5,7 @@ pub mod any_scene;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use glam::DVec3;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
@@ -125,8 +126,21 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::of_direct_light();
     let (mut plain, mut poor, mut shifted) = (Nearly::default(), Nearly::default(), Nearly::default());
-    for _ in 0..24 {
+    // Three placements of each scene share its kernels.
+    let placements = [
+        (1.0, DVec3::ZERO),
+        (1.25, DVec3::new(0.5, -0.25, 0.75)),
+        (0.8, DVec3::new(-0.3, 0.6, 0.1)),
+    ];
+    let scenes = (0..8).flat_map(|_| {
         let d = strategy.new_tree(&mut runner).expect("a scene").current();
+        placements.map(|(scale, offset)| {
+            let mut d = d.clone();
+            any_scene::moved(&mut d, scale, offset);
+            d
+        })
+    });
+    for d in scenes {
         let packed = any_scene::packed(&d);
         let cpu = reference(&packed);
         let by_plain_wgsl = render_with(&packed, RenderMode::Plain, sources::shaders());

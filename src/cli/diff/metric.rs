@@ -60,9 +60,7 @@ impl Metric {
     /// Returns the minimum and the maximum, and the rule for error messages.
     fn range(self) -> (f64, f64, &'static str) {
         match self {
-            Metric::Different | Metric::Largest | Metric::Rmse | Metric::RelMse => {
-                (0.0, f64::MAX, "of at least 0")
-            }
+            Metric::Different | Metric::Largest | Metric::Rmse | Metric::RelMse => (0.0, f64::MAX, "of at least 0"),
             Metric::Share | Metric::Flip => (0.0, 1.0, "from 0 to 1"),
             Metric::Psnr => (f64::MIN, f64::MAX, "of decibels"),
             Metric::Ssim => (-1.0, 1.0, "from -1 to 1"),

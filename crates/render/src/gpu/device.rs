@@ -7,12 +7,14 @@ use wgpu::BufferUsages;
 
 use super::adapter::{AdapterChoice, GpuInfo, HOW_TO_GET_VULKAN, NONE_FOUND, enumerate, fitting, info};
 use super::failure::{Failure, error_of_opening};
+use super::pipeline_cache::PipelineCache;
 use crate::error::RenderError;
 use wgray_image::panic_guard::{CatchPanicOnDrop, catch_panic};
 
 /// An open device. Clones are handles to the same device.
 #[derive(Clone)]
 pub struct Device {
+    pub(super) pipelines: PipelineCache,
     // Dropped in this order. wgpu may panic if the device is lost.
     pub(super) queue: CatchPanicOnDrop<wgpu::Queue>,
     pub(super) device: CatchPanicOnDrop<wgpu::Device>,
@@ -83,6 +85,7 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
     let failure = Failure::default();
     failure.listen(&device);
     Ok(Device {
+        pipelines: PipelineCache::default(),
         queue: CatchPanicOnDrop::new(queue),
         device: CatchPanicOnDrop::new(device),
         failure,

@@ -16,6 +16,7 @@ mod memory;
 mod naga_messages;
 mod nesting_limit;
 mod pipeline;
+mod pipeline_cache;
 mod prune;
 mod renderer;
 mod rounding;

@@ -7,6 +7,7 @@ use wgpu::{BindingType, BufferBindingType};
 use super::compile::check;
 use super::compose::{Kernel, Source};
 use super::device::Device;
+use super::pipeline_cache::Key;
 use super::rounding::Rounding;
 use crate::error::RenderError;
 use crate::records::Specialization;
@@ -97,7 +98,8 @@ pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&w
 }
 
 /// Compiles a kernel: with `exact` to SPIR-V whose float operations are executed as written, else from WGSL by wgpu.
-/// Both are validated by naga first, so that the error messages are the same.
+/// Both are validated by naga first, so that the error messages are the same. A pipeline in the cache of the device is
+/// returned at once.
 pub fn pipeline(
     device: &Device,
     layouts: &[wgpu::BindGroupLayout],
@@ -106,13 +108,17 @@ pub fn pipeline(
     constants: &Specialization,
     exact: Option<Rounding>,
 ) -> Result<wgpu::ComputePipeline, RenderError> {
+    let key = Key::new(kernel, source, constants, exact);
+    if let Some(pipeline) = device.pipelines.get(key) {
+        return Ok(pipeline);
+    }
     let checked = check(source)?;
     let exact = exact
         .map(|rounding| checked.exact_spirv(kernel, constants, rounding, device.info.float_controls))
         .transpose()?;
     let constants = constants.constants();
     let mut constants: Vec<(&str, f64)> = constants.iter().map(|(name, v)| (*name, f64::from(*v))).collect();
-    device.checked(|| {
+    let pipeline = device.checked(|| {
         let module = match exact {
             Some(spirv) => {
                 constants.clear(); // already resolved in the SPIR-V
@@ -149,5 +155,7 @@ pub fn pipeline(
             },
             cache: None,
         })
-    })
+    })?;
+    device.pipelines.add(key, &pipeline);
+    Ok(pipeline)
 }
