@@ -456,7 +456,7 @@ impl Situation {
                 self.face.vector(name).unwrap_or_default().write(words);
             }
             "vec2<f32>" if function.starts_with("face_") => self.face.barycentric.as_vec2().write(words),
-            "vec2<f32>" if name == "passage" => {
+            "vec2<f32>" if name == "interval" => {
                 let near = random.between(-1.0, 2.0) as f32;
                 Vec2::new(near, near + random.between(-0.3, 1.0) as f32).write(words);
             }

@@ -199,7 +199,7 @@ probes! {
     squared_deviation(sum: Vec4, sample: Vec4) -> Vec3;
     pilot_add(pilot: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
     pilot_finish(pilot: Vec4, sum: Vec4, moments: Vec4) -> Vec4;
-    samples_wanted(looks: Vec4, first: u32, squared_error: f32, most: u32) -> u32;
+    samples_wanted(pilot_sum: Vec4, first: u32, squared_error: f32, most: u32) -> u32;
     mean_of(sum: Vec4) -> Vec3;
     variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;
     display_variance(sum: Vec4, moments: Vec4) -> f32;
@@ -266,7 +266,7 @@ probes! {
     solid_gradient_derivative(kind: u32, local: Vec3, d: Vec3) -> Vec3;
     primitive_height(q: &Primitive, from_anchor: Vec3) -> f32;
     light_frustum(light: &Light, p: Vec3) -> ShadowFrustum;
-    may_block(sphere: &Sphere, cone: &ShadowFrustum) -> bool;
+    may_block(sphere: &Sphere, frustum: &ShadowFrustum) -> bool;
     phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
     is_lit(surface: &Surface, to: Vec3) -> bool;
@@ -424,13 +424,13 @@ probes! {
     vector_to_world(q: &Primitive, v: Vec3) -> Vec3;
     local_tangents(q: &Primitive, local: Vec3) -> Tangents;
     mapped_normal(surface: Surface, t: &Texture, n: Vec3) -> Vec3;
-    standalone_prim(place: UVec2) -> u32;
+    standalone_prim(prim_id: UVec2) -> u32;
     nearer_hit(a: Hit, b: Hit) -> Hit;
     with_positive_zeros(v: Vec3) -> Vec3;
     slabs(origin: Vec3, direction: Vec3, pad: f32) -> Slabs;
     inverse_of(x: f32) -> f32;
     box_interval(low: Vec3, high: Vec3, s: Slabs) -> Vec2;
-    interval_hits(passage: Vec2, limit: f32) -> bool;
+    interval_hits(interval: Vec2, limit: f32) -> bool;
     ray_interval(origin: Vec3, least: Vec3, most: Vec3, pad: f32) -> RayInterval;
     ray_interval_box(low: Vec3, high: Vec3, f: RayInterval) -> Vec2;
     steps(word: u32) -> Vec4;
@@ -461,12 +461,12 @@ probes! {
     face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, material: u32) -> Primitive;
     face_direction_allowed(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool;
     flipped_to(v: Vec3, side: Vec3) -> Vec3;
-    face_surface(face: &HitPrimitive, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface;
+    face_surface(face: &HitPrimitive, prim_id: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface;
     face_uv(face: &HitPrimitive, b: Vec2) -> Vec2;
     color_between(c0: Vec4, c1: Vec4, c2: Vec4, b: Vec2) -> Vec4;
     face_normal(face: &HitPrimitive, b: Vec2) -> Vec3;
     face_terminator_offset(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3;
-    lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3;
+    lift(n: Vec3, from_vertex: Vec3, up: Vec3) -> Vec3;
     face_tangents(face: &HitPrimitive) -> Tangents;
     face_frame(face: &HitPrimitive, b: Vec2) -> Tangents;
     face_uv_derivative(face: &HitPrimitive, d: Vec3) -> Vec2;
@@ -477,7 +477,7 @@ probes! {
 }
 
 /// Shared functions without a probe, with reasons.
-const EXCEPTIONS: &[(&str, &str)] = &[("no_hit", "it has no arguments"), ("nowhere", "it has no arguments")];
+const EXCEPTIONS: &[(&str, &str)] = &[("no_hit", "it has no arguments"), ("no_sample", "it has no arguments")];
 
 pub fn twin(name: &str) -> &'static Probe {
     PROBES

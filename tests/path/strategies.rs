@@ -123,7 +123,7 @@ fn light_and_bsdf_sampling_agree() {
             let rendered = |strategy: u32| {
                 let mut packed = packed.clone();
                 packed.camera.seed = strategy;
-                mean(&render_with(&packed, RenderMode::Buffers, &shaders))
+                mean(&render_with(&packed, RenderMode::Baked, &shaders))
             };
             let direct = rendered(DIRECT);
             let reflected = |strategy: u32| {
