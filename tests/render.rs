@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use glam::Vec4;
+use rayon::prelude::*;
 use wgray::scene::{Description, Integrator, Pattern};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
@@ -105,12 +106,14 @@ fn pictures_of_all_scenes_are_the_same() {
     let varied = variations()
         .into_iter()
         .map(|scene| (scene, [RenderMode::Baked, RenderMode::Buffers].as_slice()));
-    let (mut pixels, mut images, mut plain) = (0, 0, Nearly::default());
-    for ((name, packed), ways) in small.chain(varied) {
-        let cpu = reference(&packed);
-        for &mode in ways {
-            let gpu = render(&packed, mode);
-            let problem = compare(mode, &packed, &gpu, &cpu);
+    // In parallel: a driver compiles a kernel on one thread.
+    let scenes: Vec<_> = small.chain(varied).collect();
+    let compared = scenes.par_iter().map(|((name, packed), modes)| {
+        let cpu = reference(packed);
+        let (mut pixels, mut images, mut plain) = (0, 0, Nearly::default());
+        for &mode in *modes {
+            let gpu = render(packed, mode);
+            let problem = compare(mode, packed, &gpu, &cpu);
             assert!(problem.is_ok(), "{name}, {mode:?}: {}", problem.unwrap_err());
             if mode == RenderMode::Plain {
                 plain.add(Nearly::by_plain_wgsl(&gpu, &cpu));
@@ -118,6 +121,12 @@ fn pictures_of_all_scenes_are_the_same() {
                 (pixels, images) = (pixels + cpu.sums.len(), images + 1);
             }
         }
+        (pixels, images, plain)
+    });
+    let (mut pixels, mut images, mut plain) = (0, 0, Nearly::default());
+    for of_scene in compared.collect::<Vec<_>>() {
+        (pixels, images) = (pixels + of_scene.0, images + of_scene.1);
+        plain.add(of_scene.2);
     }
     println!("{images} images, {pixels} pixels: within the guarantees; all scenes with plain WGSL: {plain}");
 }
@@ -127,13 +136,13 @@ fn first_hits_of_all_scenes_agree() {
     if adapter::device().is_none() {
         return;
     }
-    for (name, packed) in small_scenes() {
-        let cpu = first_hits(&packed, RenderMode::Cpu);
+    small_scenes().par_iter().for_each(|(name, packed)| {
+        let cpu = first_hits(packed, RenderMode::Cpu);
         for mode in [RenderMode::Baked, RenderMode::Buffers] {
-            let problem = compare_hits(&first_hits(&packed, mode), &cpu);
+            let problem = compare_hits(&first_hits(packed, mode), &cpu);
             assert!(problem.is_ok(), "{name}, {mode:?}: {}", problem.unwrap_err());
         }
-    }
+    });
 }
 
 /// Checks that a change of one ulp in a number, or of one bit in a pixel, is detected.
