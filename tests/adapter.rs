@@ -5,12 +5,12 @@ use std::sync::OnceLock;
 
 use wgray_render::gpu::{AdapterChoice, Device, choose};
 
-/// Part of the name, driver or type of the adapter to test if several are available.
+/// Part of the name, driver or type of the adapter.
 const ADAPTER: &str = "WGRAY_TEST_ADAPTER";
 /// Set to 1 to run only the tests that need no adapter.
 const WITHOUT: &str = "WGRAY_TEST_WITHOUT_GPU";
 
-/// Returns the adapter under test, or `None` if `WGRAY_TEST_WITHOUT_GPU` is 1. Panics if no adapter is found otherwise.
+/// Returns the adapter under test; `None` if `WGRAY_TEST_WITHOUT_GPU` is 1. Panics if none is found otherwise.
 pub fn device() -> Option<&'static Device> {
     static DEVICE: OnceLock<Option<Device>> = OnceLock::new();
     DEVICE.get_or_init(open).as_ref()
@@ -35,12 +35,12 @@ fn open() -> Option<Device> {
     }
 }
 
-/// Prints a line to standard error directly, as the test harness captures `eprintln!`.
+/// Prints directly, as the test harness captures `eprintln!`.
 fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}"); // a closed stderr does not fail the test
 }
 
-/// Returns true for a software Vulkan driver, whose images must match the CPU bit for bit.
+/// Returns true for a software Vulkan driver, which must match the CPU bit for bit.
 pub fn bit_exact(device: &Device) -> bool {
     device.info.exact && device.info.is_software()
 }
@@ -66,7 +66,7 @@ pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
     swiftshader("filter_offset", ROUNDED_TWICE, 0.0102),
 ];
 
-/// Conversion of an integer to a float in two steps, each of which rounds. Scene indices are below 2^31.
+/// Conversion to a float in two steps, each of which rounds. Scene indices are below 2^31.
 pub const ROUNDED_TWICE: &str = "unsigned integers from 2^31 on, which are rounded twice";
 
 const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> KnownDifference {
@@ -85,7 +85,7 @@ pub fn allowed<'a>(known: &'a [KnownDifference], name: &str, driver: &str, what:
         .find(|k| k.what == what && (name.contains(k.adapter) || driver.contains(k.adapter)))
 }
 
-/// Checks the fraction of differing results against the table. Without an entry, no result may differ. An entry whose
+/// Compares the fraction of differing results with the table. Without an entry none may differ; an entry whose
 /// deviation no longer occurs is an error.
 pub fn judge(known: Option<&KnownDifference>, what: &str, share: f64) -> Result<(), String> {
     match known {
@@ -124,7 +124,7 @@ fn outdated_or_exceeded_known_differences_fail() {
     }
 }
 
-/// Checks that the driver properties are queried at all, as a failed query looks like missing support.
+/// A failed query of the driver properties looks like missing support.
 #[test]
 fn software_vulkan_can_be_asked_for_float_controls() {
     let Some(device) = device().filter(|device| bit_exact(device)) else {

@@ -35,7 +35,7 @@ fn edges(scene: &str) -> f64 {
         .map_or(EDGES, |(_, share, _)| *share)
 }
 
-/// Scenes with features that the oracle does not implement: name, features.
+/// Scenes with features that the oracle lacks: name, features.
 const BEYOND: &[(&str, &str)] = &[
     ("textures.toml", "images and normal maps"),
     ("ground-grid.toml", "an image"),
@@ -46,7 +46,6 @@ const BEYOND: &[(&str, &str)] = &[
     ("materials.toml", "the same, and all its materials"),
 ];
 
-/// Returns the scene at a width of 96 pixels with grid sample patterns.
 fn small(description: &Description) -> Description {
     let mut d = description.clone();
     let scale = f64::from(d.image.width) / 96.0;
@@ -66,7 +65,7 @@ fn small(description: &Description) -> Description {
     d
 }
 
-/// Cylinders with each material that the oracle implements, one visible in a mirror, seen from outside and from inside.
+/// Cylinders with each material of the oracle, one in a mirror, seen from outside and inside.
 const CYLINDERS: &str = r#"
 image = { width = 96, height = 72 }
 camera = { position = [0.3, -6, 3], look_at = [0, 0, 0.7], fov = 40 }
@@ -164,7 +163,7 @@ fn images_match_the_oracle() {
     }
 }
 
-/// Checks that each flaw is detected in at least one scene, and a flaw that affects all scenes in every scene.
+/// Each flaw is detected in a scene; one that affects all scenes, in every scene.
 #[test]
 fn a_flawed_oracle_is_found() {
     let way = *both().last().expect("the CPU at least");

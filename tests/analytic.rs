@@ -13,7 +13,7 @@ use wgray::scene::{
 use crate::pictures::{RenderMode, both, first_hits, means, render};
 use crate::scenes::packed;
 
-/// Width and height of the images in pixels.
+/// Image side in pixels.
 const SIDE: u32 = 64;
 
 fn grid(count: u32) -> SamplesDescription {
@@ -49,7 +49,7 @@ fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
     }
 }
 
-/// Returns a scene with the plane z = 0, seen from above.
+/// Returns the plane z = 0, seen from above.
 fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shininess: f64) -> Description {
     let mut scene = empty(from, DVec3::new(from.x, from.y, 0.0), DVec3::Y, height);
     let factor = |x| Some(ColorDescription::Plain(DVec3::splat(x)));
@@ -73,7 +73,6 @@ fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shini
     scene
 }
 
-/// Returns the point on the floor at the center of a pixel.
 fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
     let step = height / f64::from(SIDE);
     let (column, row) = (f64::from(pixel % SIDE) + 0.5, f64::from(pixel / SIDE) + 0.5);
@@ -83,7 +82,7 @@ fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
     )
 }
 
-/// Returns the maximum absolute error of the green channel over all pixels.
+/// Returns the maximum absolute error of the green channel.
 fn worst(scene: &Description, mode: RenderMode, expected: impl Fn(u32) -> f64) -> f64 {
     let picture = means(&render(&packed(scene), mode));
     let difference = |(i, mean): (u32, &[f64; 3])| (mean[1] - expected(i)).abs();
@@ -99,8 +98,8 @@ fn corner(x: f64, y: f64, h: f64) -> f64 {
     x * (y / (x * x + h * h).sqrt()).asinh() + y * (x / (y * y + h * h).sqrt()).asinh() - h * (x * y / (h * r)).atan()
 }
 
-/// Returns the mean of h / r from a point of a plane to a parallel rectangle at height h: the mean cosine at the plane.
-/// `at` is relative to the rectangle's center.
+/// Returns the mean of h / r from a point to a parallel rectangle at height h: the mean cosine at the plane. `at` is
+/// relative to the rectangle's center.
 fn mean_cosine([width, height]: [f64; 2], h: f64, at: DVec2) -> f64 {
     let (x0, x1) = (-width / 2.0 - at.x, width / 2.0 - at.x);
     let (y0, y1) = (-height / 2.0 - at.y, height / 2.0 - at.y);
@@ -124,7 +123,7 @@ fn the_closed_form_of_the_mean_cosine_is_right() {
     }
 }
 
-/// A rectangle light over a diffuse plane: the mean cosine, up to the error of the sample grid (a midpoint rule).
+/// The mean cosine, up to the error of the sample grid (a midpoint rule).
 #[test]
 fn light_of_a_rectangle_on_a_plane() {
     let (from, height) = (DVec3::new(0.3, 0.2, 0.5), 4.0);
@@ -161,7 +160,7 @@ fn light_of_a_rectangle_on_a_plane() {
     }
 }
 
-/// The shadow of a sphere under a point light is a conic section: an ellipse on the plane.
+/// A conic section: an ellipse on the plane.
 #[test]
 fn shadow_of_a_sphere() {
     let (from, height) = (DVec3::new(1.6, 0.0, 1.0), 2.4);
@@ -180,7 +179,7 @@ fn shadow_of_a_sphere() {
     scene.lights.push(LightDescription::Point(point));
     let axis = center - light;
     let half_angle = (radius / axis.length()).asin();
-    // Signed angle between a point of the plane and the surface of the shadow cone, positive inside.
+    // Signed angle to the surface of the shadow cone, positive inside.
     let inside = |at: DVec2| half_angle - (at.extend(0.0) - light).angle_between(axis);
     for mode in both() {
         let picture = means(&render(&packed(&scene), mode));
@@ -206,7 +205,7 @@ fn shadow_of_a_sphere() {
             !((dark / (PI * long * long) - 1.0).abs() < 0.05),
             "a circle is found out"
         );
-        // Outside the shadow, a point light has no falloff: only the cosine remains.
+        // Outside the shadow only the cosine remains: a point light has no falloff.
         let worst = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
             let to = light - on_floor(from, height, pixel).extend(0.0);
             (picture[pixel as usize][1] - to.z / to.length()).abs()
@@ -280,7 +279,7 @@ fn outlines_of_ellipsoids() {
                 "{mode:?} {center} from {view}: {centroid} for {middle}"
             );
             assert!(!((centroid + DVec2::X - middle).length() < 0.1), "a shifted pixel");
-            // Minimum depth: the depth of the center minus the half-extent along the view direction.
+            // Depth of the center minus the half-extent along the view direction.
             let half = [a, b, c]
                 .map(|axis| axis.dot(forward))
                 .map(|h| h * h)
@@ -301,7 +300,7 @@ fn outlines_of_ellipsoids() {
     }
 }
 
-/// A directional light on a plane, seen along the normal, is constant: kd n.l + ks (r.v)^s.
+/// Seen along the normal, constant: kd n.l + ks (r.v)^s.
 #[test]
 fn directional_light_on_a_plane() {
     for (exponent, other) in [(16.0, 15.0), (2.5, 2.4), (0.5, 0.6), (1.0, 1.5)] {
@@ -321,7 +320,7 @@ fn directional_light_on_a_plane() {
             assert!(error < 1e-6, "{mode:?}, shininess {exponent}: {error}");
             assert!(!(worst(&scene, mode, |_| expected(other)) < 1e-4), "another shininess");
         }
-        // From below, the plane is black: the normal faces the viewer, so that the light is behind the surface.
+        // From below: black, as the normal faces the viewer and the light is behind the surface.
         scene.camera = empty(-DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).camera;
         for mode in both() {
             assert_eq!(worst(&scene, mode, |_| 0.0), 0.0, "{mode:?}");

@@ -6,7 +6,6 @@ use crate::probes::twin;
 use crate::random::Random;
 use crate::sources::{parse, shared_source};
 
-/// An error bound of a function over its domain.
 struct Bound {
     function: &'static str,
     unit: &'static str,
@@ -133,7 +132,7 @@ const BOUNDS: &[Bound] = &[
     },
 ];
 
-/// Returns the maximum error over [`CALLS`] arguments. Only the first word of each result counts.
+/// Returns the maximum error over [`CALLS`] arguments, by the first word of each result.
 fn largest(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
     let random = Random::new(bound.bound.to_bits());
     let arguments: Vec<Vec<f32>> = (0..CALLS).map(|_| (bound.arguments)(&random)).collect();

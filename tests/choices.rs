@@ -69,7 +69,7 @@ fn a_progressive_image_ends_as_the_rendered_one() {
     assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
 }
 
-/// If the driver truncates loops and a sample exceeds its limit, the CPU renders instead and the image reports it.
+/// If the driver truncates loops and a sample exceeds its limit; the image reports it.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_by_the_cpu() {
     let Some(device) = adapter::device() else { return };

@@ -150,8 +150,7 @@ fn windows_wider_than_the_image_are_clipped_and_renormalized() {
 
 #[test]
 fn tiles_and_chunks_do_not_change_the_metrics() {
-    // The image is larger than a tile of 256 x 256 pixels and a chunk of 65,536 pixels. The contributions of distant
-    // pixels add up in both metrics.
+    // Larger than a tile of 256 x 256 pixels and a chunk of 65,536. Contributions of distant pixels add up.
     let noise = |x: u32, y: u32, c: u32| ((x * 7919 + y * 104_729 + c * 1_299_709) % 251) as f32;
     let b = picture(600, 300, BYTES, move |x, y, c| (noise(x, y, c) / 2.0).floor());
     let one = |places: &'static [(u32, u32)]| {
@@ -188,7 +187,7 @@ fn flip_decreases_with_the_viewing_distance() {
 #[test]
 fn flip_of_linear_values_adapts_its_exposures_to_the_reference() {
     let flat = |value: f32| picture(12, 12, Kind::Linear, move |_, _, _| value);
-    // the exposures follow the reference, so that a common factor cancels
+    // the exposures follow the reference, so a common factor cancels
     let found = flip(&flat(1.1), &flat(1.0));
     assert!(found > 0.01);
     for scale in [1e-30_f32, 1e-3, 1e3, 1e30] {

@@ -69,7 +69,7 @@ fn whole(backend: &mut dyn Backend) -> Film {
 }
 
 type Make<'a> = dyn Fn() -> Box<dyn Backend + 'a> + 'a;
-/// A sentence of the contract and its test, which returns the deviation as an error.
+/// A sentence and its test, which returns the deviation as an error.
 type Sentence = (&'static str, fn(&Packed, &Make) -> Result<(), String>);
 
 fn hold(what: bool, why: &str) -> Result<(), String> {
@@ -329,7 +329,7 @@ const SENTENCES: &[Sentence] = &[
     }),
 ];
 
-/// Returns the sentences that a backend violates, with the deviations.
+/// Returns the violated sentences with the deviations.
 fn broken<'a>(packed: &'a Packed, make: &Make<'a>) -> Vec<String> {
     let found = SENTENCES.iter().filter_map(|(sentence, holds)| {
         let deviation = holds(packed, make).err()?;

@@ -30,7 +30,7 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 ";
 
-/// Returns a scene with n copies of `one`, in which `{i}` is the number and `{x}`, `{y}` and `{z}` a position.
+/// Returns n copies of `one`: `{i}` is the number, `{x}`, `{y}` and `{z}` a position.
 fn scene(n: usize, one: &str) -> String {
     let mut text = START.to_owned();
     for i in 0..n {
@@ -43,7 +43,7 @@ fn scene(n: usize, one: &str) -> String {
 
 const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'first'\ncenter = [{x}, {y}, {z}]\nradius = 0.05";
 
-/// An example of every kind of object that a scene may have many of.
+/// Every kind of object that a scene may have many of.
 const KINDS: [(&str, &str); 13] = [
     ("spheres", SPHERE),
     (
@@ -104,7 +104,7 @@ fn packed(text: &str) -> Option<Packed> {
     scene.ok().map(|scene| pack(&scene))
 }
 
-/// Returns the CPU time of this thread in seconds. The resolution of `/proc`, some milliseconds, is too coarse.
+/// Returns the thread's CPU time in seconds; `/proc` resolves only some milliseconds.
 fn processor_time(work: impl Fn()) -> f64 {
     #[cfg(unix)]
     let now = || {
@@ -124,7 +124,7 @@ fn processor_time(work: impl Fn()) -> f64 {
     now() - start
 }
 
-/// Returns the minimum of three times, measured in a pool of one thread, which runs no work of other tests.
+/// Returns the minimum of three times, in a pool of one thread, which runs no work of other tests.
 fn least_of_three(work: impl Fn() + Sync) -> f64 {
     let thread = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -134,7 +134,7 @@ fn least_of_three(work: impl Fn() + Sync) -> f64 {
     thread.install(times)
 }
 
-/// Returns the ratio of the minimum times, measured until it is below `bound`, so that load does not fail the test.
+/// Returns the ratio, measured until it is below `bound`, so that load does not fail the test.
 fn ratio_below(bound: f64, large: impl Fn() + Sync, small: impl Fn() + Sync) -> f64 {
     const ROUNDS: usize = 8;
     let (mut most, mut least) = (f64::INFINITY, f64::INFINITY);
@@ -186,7 +186,7 @@ fn kernels_do_not_grow_with_materials_lights_and_textures() {
     }
 }
 
-/// Runs `wgray check` with an address space limit in KiB and returns the exit code and the messages.
+/// Runs `wgray check` with an address space limit in KiB.
 #[cfg(target_os = "linux")]
 fn check_within(kibibytes: u32, scene: &Path) -> (Option<i32>, String) {
     let script = format!("ulimit -v {kibibytes}; exec \"$0\" check \"$1\"");
@@ -201,7 +201,7 @@ fn check_within(kibibytes: u32, scene: &Path) -> (Option<i32>, String) {
     )
 }
 
-/// Returns the minimum address space in KiB, to within 500, in which `wgray check` accepts a scene.
+/// Returns the minimum address space in KiB, to within 500, for a scene.
 #[cfg(target_os = "linux")]
 fn address_space(scene: &Path) -> u32 {
     let (mut too_little, mut enough) = (0, 200_000);
@@ -226,11 +226,10 @@ fn memory_is_a_small_multiple_of_the_scene_file() {
     let small = folder.path().join("small.toml");
     std::fs::write(&small, scene(1, SPHERE)).unwrap();
     let program = address_space(&small);
-    // docs/performance.md documents 400 bytes for a sphere with its text; memory is allocated in larger pieces.
+    // docs/performance.md: 400 bytes for a sphere with its text; memory is allocated in larger pieces.
     let (code, message) = check_within(program + 65_000, &path);
     assert_eq!(code, Some(0), "{message}");
     assert!(message.contains("; 100001 shapes; "), "{message}");
-    // Negative control.
     assert_ne!(check_within(program + 20_000, &path).0, Some(0));
 }
 

@@ -17,8 +17,8 @@ fn some_scenes(count: usize) -> Vec<Packed> {
     (0..count).map(scene).collect()
 }
 
-/// Returns the numbers of culled and of wrongly culled primitives. Points are up to 30 radii away, and up to 200 in
-/// local space: at thousands of radii both tests are dominated by rounding. `bound` changes the bounding spheres.
+/// Returns how many primitives are culled, and wrongly culled. Points are up to 30 radii away, and up to 200 in local
+/// space: at thousands of radii both tests are dominated by rounding. `bound` changes the bounding spheres.
 fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usize) {
     let random = Random::new(11);
     let (mut left_out, mut wrong) = (0, 0);

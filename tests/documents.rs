@@ -6,7 +6,6 @@ use wgray::{Options, Overrides, Scene};
 
 use crate::sources::path as project;
 
-/// Returns all Markdown files below a folder of the project, relative to the project.
 fn pages_in(folder: &str) -> Vec<PathBuf> {
     let mut pages = Vec::new();
     for entry in std::fs::read_dir(project(folder)).unwrap() {
@@ -26,7 +25,6 @@ fn read(page: &Path) -> String {
     std::fs::read_to_string(project(page.to_str().unwrap())).unwrap()
 }
 
-/// Returns the lines of a page outside of code blocks.
 fn prose(page: &str) -> impl Iterator<Item = &str> {
     let mut fenced = false;
     page.lines().filter(move |line| {
@@ -36,7 +34,6 @@ fn prose(page: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Returns the targets of all links and images of a page.
 fn links(page: &str) -> Vec<String> {
     let targets = |line: &str| -> Vec<String> {
         let rest = line.split("](").skip(1);
@@ -46,7 +43,6 @@ fn links(page: &str) -> Vec<String> {
     prose(page).flat_map(targets).collect()
 }
 
-/// Returns the anchors that GitHub generates for the headings of a page.
 fn anchors(page: &str) -> Vec<String> {
     let headings = prose(page).filter(|line| line.starts_with('#'));
     headings
@@ -61,7 +57,7 @@ fn anchors(page: &str) -> Vec<String> {
         .collect()
 }
 
-/// Returns the relative links of a page without an existing target.
+/// Returns the relative links without an existing target.
 fn broken_links(page: &Path, text: &str) -> Vec<String> {
     let leads_nowhere = |link: &String| {
         if link.contains("://") {

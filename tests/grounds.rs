@@ -13,7 +13,7 @@ use crate::pictures::{differing, exact_modes, means, reference, render};
 use crate::random::Random;
 use crate::scenes::packed;
 
-/// A scene of the given size at an offset. The coordinates in its text are in units of the size.
+/// The coordinates in the text are in units of the size.
 struct Setting {
     size: f64,
     offset: DVec3,
@@ -49,7 +49,6 @@ impl Setting {
     }
 }
 
-/// Returns settings of several sizes, near the origin and a thousand sizes away.
 fn settings() -> Vec<Setting> {
     let mut all = Vec::new();
     for size in [1e-3, 1.0, 1e3] {
@@ -72,10 +71,9 @@ fn same_on_all_paths(d: &Description) {
     }
 }
 
-/// A missing light changes a value by 0.1, rounding of the normal at the limb of a small sphere by less than this.
+/// A missing light changes a value by 0.1, rounding of the normal at the limb of a small sphere by less.
 const TOLERANCE: f64 = 1e-3;
 
-/// Returns the number of pixels that differ from the oracle's.
 fn wrong(d: &Description) -> usize {
     let truth = Oracle::new(d, Flaw::None).picture();
     let cpu = reference(&packed(d));
@@ -84,7 +82,7 @@ fn wrong(d: &Description) -> usize {
     pixels.filter(|(a, b)| !a.iter().zip(*b).all(close)).count()
 }
 
-/// Checks that at most `most` pixels differ for each radius of the ground. `shapes` returns the shapes.
+/// Checks that at most `most` pixels differ for each radius.
 fn check(radii: &[f64], most: usize, shapes: impl Fn(&Setting, f64) -> String) {
     for setting in settings() {
         for &radius in radii {
@@ -165,7 +163,7 @@ fn the_inside_of_a_sphere_is_lit_from_inside_only() {
     }
 }
 
-/// Faces with common edges. Pixel centers and the light lie on lines of symmetry.
+/// Pixel centers and the light lie on lines of symmetry.
 #[test]
 fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
     for setting in settings() {
@@ -174,14 +172,14 @@ fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
             let vertices = [a, b, c].map(p).join(", ");
             format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'dull'\nvertices = [{vertices}]\n")
         };
-        // two triangles that form a tilted square, and a third below as a shadow receiver
+        // a tilted square of two triangles, and a third below as a shadow receiver
         let tilt = |x: f64, y: f64| [x, y, 0.3 * x + 0.1 * y];
         let corners = [tilt(-3.0, -3.0), tilt(3.0, -3.0), tilt(3.0, 3.0), tilt(-3.0, 3.0)];
         let below = floor([-1.0, -1.0, -3.0], [1.0, -1.0, -3.0], [0.0, 1.0, -3.0]);
         let square = floor(corners[0], corners[1], corners[2]) + &floor(corners[0], corners[2], corners[3]);
         let d = setting.scene([0.0, -0.01, 5.0], [0.0, 0.0, 0.0], [-6.0, 5.5, 2.0], &(below + &square));
         assert_eq!(wrong(&d), 0, "a square of triangles, size {}", setting.size);
-        // a box of rectangles on a rectangular floor, and a tetrahedron beside it
+        // a box of rectangles on a floor, and a tetrahedron beside it
         let face = |center: [f64; 3], side: f64, normal: [f64; 3], tangent: [f64; 3]| {
             format!(
                 "[[shapes]]\ntype = 'rectangle'\nmaterial = 'dull'\ncenter = {}\nsize = [{side:?}, {side:?}]\n\

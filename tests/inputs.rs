@@ -94,13 +94,11 @@ fn call(function: &Function, random: &Random, words: &mut Vec<u32>) {
     }
 }
 
-/// Returns a number of any magnitude and sign.
 fn wild(random: &Random) -> f32 {
     let sign = random.pick(&[1.0, -1.0]);
     (sign * random.magnitude(-44.0, 38.0)) as f32
 }
 
-/// Returns a number one or two ulps away.
 fn neighbour(x: f32, random: &Random) -> f32 {
     let step = random.pick(&[-2, -1, 1, 2]);
     f32::from_bits(x.to_bits().wrapping_add_signed(step))
@@ -109,10 +107,10 @@ fn neighbour(x: f32, random: &Random) -> f32 {
 /// A consistent set of arguments for one call.
 struct Situation {
     primitive: Primitive,
-    /// A point in local space, often on the primitive; `target` is the same point in world space.
+    /// In local space, often on the primitive; `target` is the same in world space.
     local: DVec3,
     target: DVec3,
-    /// The ray origin in world space; `local_start` is the same point in local space.
+    /// In world space; `local_start` is the same in local space.
     start: DVec3,
     local_start: DVec3,
     direction: DVec3,
@@ -249,7 +247,6 @@ impl Face {
         BOX_PAD * farthest
     }
 
-    /// Returns the vector for an argument of this name.
     fn vector(&self, name: &str) -> Option<Vec3> {
         Some(
             match name {
@@ -284,7 +281,7 @@ fn point_of(corners: &[DVec3; 3], barycentric: DVec2) -> DVec3 {
     a + (b - a) * barycentric.x + (c - a) * barycentric.y
 }
 
-/// Functions of rays in object space, whose arguments come from a [`Face`].
+/// Functions whose arguments come from a [`Face`].
 const OF_FACES: &[&str] = &[
     "slabs",
     "box_interval",
@@ -382,7 +379,7 @@ impl Situation {
         }
     }
 
-    /// Writes the words of an argument, selected by its type and, for plain numbers and vectors, by its name.
+    /// Writes the words of an argument, by its type and, for numbers and vectors, its name.
     fn argument(
         &self,
         (function, name): (&str, &str),
@@ -783,7 +780,6 @@ fn material(random: &Random) -> Material {
     material
 }
 
-/// Returns the lobes of a principled material for a random view direction.
 fn mixture(random: &Random) -> PrincipledLobes {
     let material = Material {
         ior: random.between(1.0, 3.0) as f32,

@@ -24,7 +24,7 @@ use crate::scenes;
 #[derive(Default)]
 struct Shelf {
     pieces: BTreeMap<u32, FilmPiece>,
-    /// Loses the progress of the current pass in an unfinished piece (negative control).
+    /// Loses the progress of an unfinished piece (negative control).
     forgetful: bool,
 }
 
@@ -65,7 +65,7 @@ impl CheckpointStore for Shelf {
     }
 }
 
-/// Renders up to `calls` dispatches. Returns the film if it is complete.
+/// Renders up to `calls` dispatches. Returns the film if complete.
 fn some_calls(
     packed: &Packed,
     backend: &mut dyn Backend,
@@ -110,7 +110,7 @@ fn some_calls(
     }
 }
 
-/// Returns the film of a job that is interrupted every `calls` dispatches, or `None` if it never completes.
+/// Interrupts a job every `calls` dispatches; `None` if it never completes.
 fn in_pieces(
     packed: &Packed,
     store: &mut dyn CheckpointStore,
@@ -119,7 +119,6 @@ fn in_pieces(
     calls: usize,
 ) -> Option<Film> {
     (0..1000).find_map(|round| {
-        // Each round uses another backend.
         let mut backend: Box<dyn Backend> = match round % 3 {
             0 => pictures::backend(packed, RenderMode::Buffers),
             1 => Box::new(Cpu::new(packed)),
@@ -169,7 +168,7 @@ fn interrupted_and_resumed_work_gives_the_same_film() {
     }
 }
 
-/// Negative control: a store that loses the progress of a piece gives another film.
+/// Negative control: the film differs.
 #[test]
 fn a_store_that_loses_progress_is_found() {
     let [packed, ..] = subjects();
@@ -247,7 +246,7 @@ fn last_pass(bands: &mut Bands) -> Film {
     all
 }
 
-/// Each pass ends with the film of its samples. An interrupted pass leaves the film of the previous one.
+/// An interrupted pass leaves the film of the previous one.
 #[test]
 fn the_last_pass_is_a_complete_image() {
     for packed in subjects() {
@@ -320,7 +319,7 @@ fn open(
         path: path.to_owned(),
         resume: true,
         interval: Duration::ZERO,
-        // A child process inherits the file, and therefore the lock, for a moment.
+        // A child process inherits the file, and its lock, for a moment.
         wait: Box::new(move || {
             rounds += 1;
             assert!(rounds < 200, "another process writes it");
@@ -380,7 +379,7 @@ fn pieces_before_the_damage_are_used() {
                     );
                     let left = checkpoint.pieces();
                     assert_ne!(left, whole_file);
-                    // On a slow machine, an older unfinished piece of the same rows may replace a damaged one.
+                    // On a slow machine, an older unfinished piece may replace a damaged one.
                     for piece in left.into_iter().filter(|piece| whole_file.contains(piece)) {
                         let FilmPiece {
                             region, film: found, ..

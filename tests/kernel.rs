@@ -11,7 +11,7 @@ use wgray_render::gpu::{Device, Rounding, check};
 
 use crate::sources::{file_of, shared_source, type_name};
 
-/// Returns the scalar kinds of the components of a type, in order.
+/// Returns the scalar kinds of the components of a type.
 pub fn scalars(module: &Module, ty: Handle<Type>) -> Vec<ScalarKind> {
     match &module.types[ty].inner {
         TypeInner::Scalar(s) => vec![s.kind],
@@ -31,7 +31,7 @@ pub struct Function<'a> {
     pub function: &'a naga::Function,
 }
 
-/// Returns the functions of the shared shader files, with the name of their file.
+/// Returns the functions of the shared files, with the name of their file.
 pub fn functions<'a>(module: &'a Module, source: &Source) -> Vec<(String, Function<'a>)> {
     let of = |(handle, function)| {
         (
@@ -74,7 +74,7 @@ impl Function<'_> {
         scalars(self.module, self.result())
     }
 
-    /// Returns a kernel that reads the arguments of call `id.x` from `probe_in` and writes the result to `probe_out`.
+    /// Returns a kernel that reads call `id.x` from `probe_in` and writes to `probe_out`.
     pub fn kernel(&self) -> String {
         let mut text = "@group(0) @binding(0) var<storage, read> probe_in: array<u32>;\n\
                         @group(0) @binding(1) var<storage, read_write> probe_out: array<u32>;\n\
@@ -117,7 +117,6 @@ impl Function<'_> {
         }
     }
 
-    /// Appends statements that write a value to `probe_out`.
     fn write(&self, ty: Handle<Type>, value: &str, next: &mut u32, text: &mut String) {
         match &self.module.types[ty].inner {
             TypeInner::Scalar(s) => write_word(s.kind, value, next, text),
@@ -184,7 +183,7 @@ fn write_word(kind: ScalarKind, value: &str, next: &mut u32, text: &mut String) 
     *next += 1;
 }
 
-/// Runs the entry point `probe` and returns `output` words. Uses SPIR-V where the renderer's exact kernels do.
+/// Runs the entry point `probe`, as SPIR-V where the renderer's exact kernels do.
 fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], calls: usize, output: usize) -> Vec<u32> {
     let (wgpu, queue) = device.wgpu();
     let checked =

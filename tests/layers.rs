@@ -13,7 +13,6 @@ use crate::pictures::{RenderMode, backend, crop, differing, exact_modes, film, f
 use crate::scenes::parse;
 use crate::{adapter, sources};
 
-/// Diffuse, mirror and emissive surfaces and the environment, with light of any path length.
 const SCENE: &str = r#"
 image = { width = 24, height = 16 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
@@ -64,7 +63,7 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 "#;
 
-/// Returns the scene with other values of keys in `[render]`.
+/// Returns the scene with other keys in `[render]`.
 fn with(settings: &str) -> String {
     let keys: Vec<&str> = settings.lines().filter_map(|line| line.split(" =").next()).collect();
     let kept = SCENE
@@ -91,7 +90,6 @@ fn subjects() -> Vec<(&'static str, Packed)> {
     ]
 }
 
-/// Returns the number of pixels that differ in a layer.
 fn other_layers(a: &Film, b: &Film) -> usize {
     let only = |film: &Film| Film {
         sums: vec![Vec4::ZERO; film.sums.len()],
@@ -192,12 +190,12 @@ fn light_layers_are_by_path_length() {
     assert!(none[0] > 0.0 && none[1..] == [0.0, 0.0], "{none:?}");
     assert!(once[1] > 0.0 && once[2] == 0.0, "{once:?}");
     assert!(often[2] > 0.0, "{often:?}");
-    // The light of short paths does not depend on the maximum depth.
+    // Light of short paths does not depend on the maximum depth.
     assert_eq!([none[0], once[0]], [often[0]; 2]);
     assert_eq!(once[1], often[1]);
 }
 
-/// Returns a rectangle of 1 x 1 that faces the camera or is seen from behind. Pixels have the same size.
+/// Returns a 1 x 1 rectangle; pixels have the same size.
 fn facing(size: (u32, u32), place: [f64; 2], more: &str, from_behind: bool) -> String {
     let ([x, z], (width, height)) = (place, size);
     let y = if from_behind { 5 } else { -5 };
@@ -342,7 +340,7 @@ fn alpha_is_the_fraction_of_samples_that_hit() {
         let film = on_all(&packed);
         for (i, share) in shares.into_iter().enumerate() {
             assert_eq!(film.alpha(i), share, "{place:?}, pixel {i}");
-            // Colors are premultiplied, and the environment is invisible.
+            // Premultiplied; the environment is invisible.
             let color = Vec3::new(0.5, 0.25, 4.0) * share;
             assert_eq!(
                 Vec3::from(wgray_render::film::mean(film.sums[i])),

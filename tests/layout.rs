@@ -16,8 +16,8 @@ fn size<R: Record>() -> (&'static str, u32) {
     (R::NAME, size_of::<R>() as u32)
 }
 
-/// Returns the errors in the WGSL layout of a record (WGSL, section 14.4.1). Both sides have the same list of fields,
-/// and `bytemuck::Pod` proves that the Rust struct has no padding.
+/// Returns the errors in the WGSL layout of a record (WGSL, section 14.4.1); `bytemuck::Pod` proves that the Rust
+/// struct has no padding.
 fn layout_problems(module: &Module, (name, bytes): (&str, u32)) -> Vec<String> {
     let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
     let Some((_, ty)) = found else {

@@ -14,7 +14,7 @@ use crate::scenes::{self, parse};
 const SIDE: u32 = 64;
 const FOV: f64 = 10.0;
 
-/// Returns an emissive disk of radius 0.005 `distance`, seen along y from the origin. `lens` are lines of `[camera]`.
+/// Returns an emissive disk of radius 0.005 `distance`, seen along y from the origin; `lens`: lines of `[camera]`.
 fn spot(distance: f64, lens: &str, samples: u32) -> Packed {
     let radius = 0.005 * distance;
     parse(&format!(
@@ -46,15 +46,15 @@ fn pixels() -> f64 {
     f64::from(SIDE) / 2.0 / (FOV / 2.0).to_radians().tan()
 }
 
-/// Returns the center of a pixel relative to the image center in pixels, right and up.
+/// Returns a pixel center in pixels from the image center, right and up.
 fn place(i: usize) -> (f64, f64) {
     let side = SIDE as usize;
     let half = f64::from(SIDE) / 2.0;
     ((i % side) as f64 + 0.5 - half, half - (i / side) as f64 - 0.5)
 }
 
-/// Returns the relative errors in the image of a disk blurred to a circle of this radius at distance 1: the maximum
-/// error of the mean radiance in rings, and the error of the total.
+/// Returns the relative errors in the image of a disk blurred to this radius at distance 1: the maximum of the mean
+/// radiance in rings, and that of the total.
 fn wrong(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
     let (circle, spot) = (radius * pixels(), 0.005 * pixels());
     let within = spot * spot / (circle * circle); // fraction of the aperture that sees the disk
@@ -121,7 +121,7 @@ fn the_focus_plane_is_sharp() {
         let with = means(&render(&spot(5.0, lens, 256), way));
         let without = means(&render(&spot(5.0, "", 256), way));
         let defocused = means(&render(&spot(5.5, lens, 256), way));
-        // The pixel samples are equal, up to rounding at the edge of the disk.
+        // Equal pixel samples, up to rounding at the edge of the disk.
         let difference = |a: &[[f64; 3]]| a.iter().zip(&without).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>();
         assert!(difference(&with) < 0.05, "{way:?}: {}", difference(&with));
         assert!(difference(&defocused) > 1.0, "{way:?}: {}", difference(&defocused));
@@ -153,7 +153,7 @@ fn blades_give_a_polygon_with_a_corner_at_the_top() {
             assert!(!lit(&far, turned(degrees + 60.0), way), "{way:?} {degrees}");
             assert!(lit(&far, turned(degrees + 120.0), way), "{way:?} {degrees}");
         }
-        // Near points show it upside down. The circle of confusion is nearly the same.
+        // Near points show it upside down, with nearly the same circle of confusion.
         let near = spot(2.4, &format!("{lens}0"), 64);
         assert!(lit(&near, turned(180.0), way), "{way:?}");
         assert!(!lit(&near, turned(0.0), way), "{way:?}");
@@ -208,7 +208,7 @@ fn lens_samples_are_stratified_and_independent_of_pixel_samples() {
             let straight =
                 (ray.direction / ray.direction.y + ray.origin * packed.camera.inverse_focus) * pixels() as f32;
             let at = Vec2::new(straight.x + SIDE as f32 / 2.0, SIDE as f32 / 2.0 - straight.z) - pixel.as_vec2();
-            // The square-to-disk mapping preserves the sectors between the diagonals, which have equal areas.
+            // The square-to-disk mapping preserves the sectors between the diagonals, of equal areas.
             let sector = usize::from(lens.x > lens.z) + 2 * usize::from(lens.x > -lens.z);
             let quarter = usize::from(at.x > 0.5) + 2 * usize::from(at.y > 0.5);
             of_lens[sector] += 1;

@@ -44,7 +44,6 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 "#;
 
-/// Returns the scene of [`FILE`], built in code.
 fn described() -> Description {
     let samples = |pattern, count| SamplesDescription {
         pattern: Some(pattern),

@@ -20,7 +20,6 @@ fn small(name: &str, size: (u32, u32), pixel_samples: u32, light_samples: u32) -
     d
 }
 
-/// Returns a scene with small spheres, all in view.
 fn spheres(count: u32) -> Description {
     let mut d = small("cornell.toml", (4, 3), 1, 1);
     let Some(material) = d.materials.keys().next().cloned() else {
@@ -37,7 +36,7 @@ fn spheres(count: u32) -> Description {
     d
 }
 
-/// Returns a scene with planes below the floor, which are not in the BVH.
+/// Returns planes below the floor, which are not in the BVH.
 fn planes(count: u32) -> Description {
     let mut d = small("cornell.toml", (4, 3), 1, 1);
     let Some(material) = d.materials.keys().next().cloned() else {
@@ -73,7 +72,7 @@ fn attempt(packed: &Packed, mode: RenderMode, shaders: &Shaders) -> Result<Film,
     Ok(film)
 }
 
-/// Returns shaders that loop `rounds` times in the dispatch of the first sample and add the iterations to red.
+/// Returns shaders that loop `rounds` times in the first dispatch and add the iterations to red.
 fn looping(rounds: u32) -> Shaders {
     assert_eq!(rounds % 4, 0);
     let (file, store) = ("kernels/render.wgsl", "    film[index] = sum;");
@@ -89,13 +88,13 @@ fn looping(rounds: u32) -> Shaders {
     edited_shaders(file, store, &looping)
 }
 
-/// Returns true if a film of one sample equals `plain` plus the iterations of [`looping`].
+/// Returns true if a film of one sample equals `plain` plus the iterations.
 fn has_rounds(film: &Film, plain: &Film, rounds: u32) -> bool {
     let right = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
     film.sums.iter().zip(&plain.sums).all(right)
 }
 
-/// Returns true if the driver under test truncates loops when the check is disabled.
+/// Returns true if the driver truncates loops without the check.
 fn driver_cuts_loops() -> bool {
     const ROUNDS: u32 = 1_000_000;
     let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 1));
@@ -216,7 +215,7 @@ fn long_loops_of_edited_shaders_are_errors_or_correct() {
             Err(error) => panic!("{rounds} rounds: {error}"),
         }
     }
-    // A kernel that does not report completion is rejected on every driver.
+    // Rejected on every driver.
     let unsigned = edited_shaders("completion.wgsl", "atomicAdd(&completion.groups_done, 1u);", "");
     let device = adapter::device().expect("a device");
     let options = wgray_render::gpu::Options {
@@ -230,7 +229,6 @@ fn long_loops_of_edited_shaders_are_errors_or_correct() {
     );
 }
 
-/// Negative control: without the check, a driver that truncates loops gives a wrong image.
 #[test]
 fn without_the_check_truncated_images_are_wrong() {
     if adapter::device().is_none() || !driver_cuts_loops() {

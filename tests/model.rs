@@ -24,7 +24,7 @@ impl Default for Model {
     }
 }
 
-/// Returns a corner of the box from (-1, 0, -0.5) to (1, 1, 0.5), with +y up.
+/// Returns a corner of the box (-1, 0, -0.5) to (1, 1, 0.5), +y up.
 fn corner(i: usize) -> [f32; 3] {
     let side = |axis: usize, low: f32, high: f32| if i >> axis & 1 == 0 { low } else { high };
     [side(0, -1.0, 1.0), side(1, 0.0, 1.0), side(2, -0.5, 0.5)]
@@ -45,7 +45,6 @@ impl Model {
         positions.chain(indices).chain(keys).collect()
     }
 
-    /// Returns the JSON without the buffer list.
     fn json(&self) -> Value {
         let [r, g, b] = self.color;
         let material = |name: &str, color: [f64; 3], metallic: f64| {

@@ -16,7 +16,7 @@ fn words(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the texts to be replaced that do not occur in their file, and the number of all texts.
+/// Returns the missing texts, and the number of all.
 fn missing(table: &toml::Table, read: impl Fn(&str) -> String) -> (Vec<String>, usize) {
     let (mut missing, mut count) = (Vec::new(), 0);
     for (file, mistakes) in table {

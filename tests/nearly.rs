@@ -6,14 +6,14 @@ use std::fmt;
 use wgray_render::film::Film;
 use wgray_render::records::Packed;
 
-/// Maximum relative error of a pixel, relative to its largest channel: in dark channels, patterns subtract nearly equal
+/// Maximum error of a pixel, relative to its largest channel: in dark channels, patterns subtract nearly equal
 /// integrals.
 const RELATIVE: f64 = 1e-4;
 /// `RELATIVE` for textures on other devices than software Vulkan: one digit of a coordinate spans many texels.
 const TEXTURED: f64 = 1e-3;
 /// Maximum share of outliers, on edges where a comparison flips.
 pub const EDGES: f64 = 1e-3;
-/// Image side in pixels below which `EDGES` is scaled up on such devices, as edges grow with the side only.
+/// Image side in pixels below which `EDGES` is scaled up on such devices: edges grow with the side only.
 const SIDE: f64 = 400.0;
 /// Maximum relative error of the mean. On such devices, images below `SIDE` leave outliers out.
 const MEAN: f64 = 1e-5;

@@ -170,7 +170,6 @@ impl<'a> Oracle<'a> {
         (0..width * height).map(pixel).collect()
     }
 
-    /// Returns the cell centers of a square grid.
     fn grid(&self, count: u32) -> Vec<DVec2> {
         let side = f64::from(count).sqrt().round() as u32;
         assert_eq!(side * side, count, "the oracle samples by square grids");
@@ -179,7 +178,7 @@ impl<'a> Oracle<'a> {
         (0..count).map(place).collect()
     }
 
-    /// Returns the ray through an image point, in pixels from the top left corner. The image plane is at distance 1.
+    /// Returns the ray through a point in pixels from the top left. The image plane is at distance 1.
     fn camera_ray(&self, at: DVec2) -> (DVec3, DVec3) {
         let (width, height) = (f64::from(self.scene.image.width), f64::from(self.scene.image.height));
         let basis = |position: DVec3, look_at: DVec3, up: DVec3| {
@@ -269,7 +268,7 @@ impl<'a> Oracle<'a> {
             _ if bounces == render.max_depth => render.background,
             MaterialDescription::Mirror(mirror) => {
                 assert!(mirror.normal_map.is_none(), "the oracle knows no normal maps");
-                // If the reflection is below the surface, the geometric normal is used.
+                // For a reflection below the surface.
                 let mirrored = direction.reflect(shading);
                 let is_usable = mirrored.dot(normal) > 0.0 && shading.dot(direction) < 0.0;
                 let mirrored = if is_usable { mirrored } else { direction.reflect(normal) };
@@ -319,7 +318,7 @@ impl<'a> Oracle<'a> {
         for light in &self.scene.lights {
             let samples = self.samples(light, point);
             for (to_light, distance) in &samples {
-                // Light above the triangle but below the shading horizon is excluded, too.
+                // Above the triangle but below the shading horizon.
                 if shading.dot(*to_light) <= 0.0 {
                     continue;
                 }
@@ -363,7 +362,7 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// Returns kd max(0, n.l) + ks max(0, r.v)^shininess, or 0 if n.l <= 0.
+    /// Returns kd max(0, n.l) + ks max(0, r.v)^shininess; 0 if n.l <= 0.
     fn reflected(
         &self,
         diffuse: DVec3,
@@ -387,7 +386,6 @@ impl<'a> Oracle<'a> {
         diffuse * if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine } + specular * highlight
     }
 
-    /// Returns directions and distances to the samples of a light.
     fn samples(&self, light: &LightDescription, from: DVec3) -> Vec<(DVec3, f64)> {
         let way = |to: DVec3| ((to - from).normalize(), (to - from).length());
         match light {
@@ -407,7 +405,7 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// Returns true if a shape, except the triangle `own`, occludes the segment. Lights do not occlude.
+    /// Returns true if a shape except the triangle `own` occludes; lights do not.
     fn hidden(&self, from: DVec3, direction: DVec3, distance: f64, own: Option<[DVec3; 3]>) -> bool {
         let end = distance * (1.0 - self.scene.render.shadow_epsilon.max(1e-5));
         let transparent = self.scene.render.shadows == Shadows::Transparent;
@@ -434,7 +432,6 @@ fn light_color(light: &LightDescription) -> DVec3 {
     }
 }
 
-/// Returns unit tangent and bitangent.
 fn frame(normal: DVec3, tangent: DVec3) -> (DVec3, DVec3) {
     let bitangent = normal.cross(tangent).normalize();
     (bitangent.cross(normal.normalize()), bitangent)
@@ -545,7 +542,6 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
     }
 }
 
-/// Loads a mesh file in world space.
 fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form {
     assert!(
         i.matrix.is_none() && i.materials.is_empty() && file.up == Up::Z,

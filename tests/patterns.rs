@@ -35,7 +35,7 @@ fn snake_case(name: &str) -> String {
     result
 }
 
-/// Returns samples of a pattern, with the largest count up to `count` that the pattern permits.
+/// Returns samples of a pattern: the largest permitted count up to `count`.
 pub fn samples(pattern: Pattern, count: u32) -> SamplesDescription {
     let side = count.isqrt();
     SamplesDescription {

@@ -131,7 +131,6 @@ use crate::sources::{parse, shared_source};
 /// Variable that names the only function to compare.
 const FUNCTION: &str = "WGRAY_TEST_FUNCTION";
 
-/// Calls per function.
 const CALLS: usize = 8192;
 
 /// A twin with arguments and results as words.
@@ -553,7 +552,6 @@ fn same(kind: ScalarKind, a: u32, b: u32) -> bool {
     a == b || kind == ScalarKind::Float && f32::from_bits(a).is_nan() && f32::from_bits(b).is_nan()
 }
 
-/// Returns the indices of differing calls.
 fn differing(kinds: &[ScalarKind], a: &[u32], b: &[u32]) -> Vec<usize> {
     assert_eq!(a.len(), b.len());
     let calls = a.chunks_exact(kinds.len()).zip(b.chunks_exact(kinds.len())).enumerate();
@@ -569,11 +567,10 @@ fn show(kinds: &[ScalarKind], words: &[u32]) -> String {
     kinds.iter().zip(words).map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// The check name of calls with denormals.
 const DENORMALS: &str = "denormal numbers";
 
-/// Compares a function with its twin. Calls with denormals are left out on devices with a known difference; returns how
-/// many of them differ.
+/// Compares a function with its twin. Devices with a known difference leave out calls with denormals; returns how many
+/// of them differ.
 fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let (name, kinds) = (function.name(), function.words_out());
     let words = inputs(function, CALLS, name.bytes().map(u64::from).sum());
@@ -589,7 +586,7 @@ fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let kinds_in: Vec<ScalarKind> = arguments.flat_map(|(_, ty)| scalars(function.module, ty)).collect();
     let is_large = |(word, kind): (&u32, &ScalarKind)| *kind == ScalarKind::Uint && *word >= 1 << 31;
     let has_large = |call: &usize| call_words(*call).iter().zip(&kinds_in).any(is_large);
-    // `jittered_sample`, called by `sample_square`, computes large integers from small ones.
+    // `sample_square` calls `jittered_sample`, which computes large integers from small ones.
     let converts_arguments = !matches!(name, "jittered_sample" | "sample_square");
     let is_rounded_twice = known.is_some_and(|known| known.reason == ROUNDED_TWICE);
     if is_rounded_twice && converts_arguments && !differ.iter().all(has_large) {
@@ -680,7 +677,7 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
     );
 }
 
-/// The inputs reach both results of each predicate, and hits and misses of each intersection.
+/// Also hits and misses of each intersection.
 #[test]
 fn inputs_cover_both_outcomes_of_predicates() {
     let source = shared_source();
@@ -724,7 +721,6 @@ fn inputs_cover_both_outcomes_of_predicates() {
     }
 }
 
-/// Checks that a change of one ulp in a constant is detected.
 #[test]
 fn a_difference_of_one_ulp_is_found() {
     let Some(device) = adapter::device() else { return };
@@ -788,7 +784,7 @@ fn nan_does_not_propagate() {
     }
 }
 
-/// Denormals are detected exactly where a twin has them.
+/// Exactly where a twin has them.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn denormal_numbers_in_twins_are_detected() {

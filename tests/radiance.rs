@@ -113,8 +113,8 @@ fn the_ground_occludes_light_from_below() {
     }
 }
 
-/// A sphere of radius 0.5 at height 1 under a directional light from above casts a disk of radius 0.5. The camera is
-/// below the sphere, which would cover it; its image plane, where rays start, is at 0.25.
+/// Radius 0.5, height 1: a disk of radius 0.5. The camera is below the sphere, which would cover it; its image plane,
+/// where rays start, is at 0.25.
 #[test]
 fn a_sphere_under_directional_light_casts_a_disk() {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
@@ -134,8 +134,8 @@ fn a_sphere_under_directional_light_casts_a_disk() {
     }
 }
 
-/// Returns large shapes of every kind that cover the image. `dark_or_lit` adds a small one above them: shapes with
-/// nothing on one side cast no shadow.
+/// Returns large shapes of every kind. `dark_or_lit` adds a small one above: shapes with nothing on one side cast no
+/// shadow.
 fn covers(heights: [f64; 4]) -> [String; 4] {
     let [a, b, c, d] = heights;
     [
@@ -147,7 +147,7 @@ fn covers(heights: [f64; 4]) -> [String; 4] {
     .map(|text| format!("[[shapes]]\nmaterial = 'ground'\n{text}\n"))
 }
 
-/// Renders the ground below covers. Returns whether all is dark, and whether all is lit.
+/// Returns whether all is dark and whether all is lit below covers.
 fn dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let above = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [90, 90, 5]\nradius = 0.5\n";

@@ -74,7 +74,7 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
     scenes::descriptions().into_iter().map(small).collect()
 }
 
-/// Returns each scene and each pattern at least once, with different sizes, seeds and sample counts.
+/// Returns each scene and pattern at least once, with varied sizes, seeds and sample counts.
 pub fn variations() -> Vec<(String, Packed)> {
     let (mut scenes, patterns) = (scenes::descriptions(), patterns::all());
     scenes.sort_by_key(|(_, d)| d.integrator() == Integrator::Path); // last: keeps the indices of the others
@@ -145,7 +145,7 @@ fn first_hits_of_all_scenes_agree() {
     });
 }
 
-/// Checks that a change of one ulp in a number, or of one bit in a pixel, is detected.
+/// By one ulp in a number, or one bit in a pixel.
 #[test]
 fn a_different_image_is_found() {
     let Some(device) = adapter::device() else { return };

@@ -8,7 +8,6 @@ use crate::oracle::{Flaw, Oracle};
 use crate::pictures::reference;
 use crate::scenes::{packed, scene};
 
-/// Scales about the origin, then translates.
 fn transformed(description: &Description, scale: f64, offset: DVec3) -> Description {
     let mut description = description.clone();
     let point = |p: &mut DVec3| *p = *p * scale + offset;
@@ -47,7 +46,6 @@ fn transformed(description: &Description, scale: f64, offset: DVec3) -> Descript
     description
 }
 
-/// Returns the Cornell scene with one sample per pixel, so that each counts.
 fn cornell() -> Description {
     let mut description = scene("cornell.toml");
     (description.image.width, description.image.height) = (200, 200);
@@ -56,14 +54,13 @@ fn cornell() -> Description {
     description
 }
 
-/// Returns the pixels that differ by more than a tolerance.
 fn beyond(a: &Film, b: &Film, tolerance: f32) -> Vec<usize> {
     let far = |(a, b): ([f32; 3], [f32; 3])| a.iter().zip(b).any(|(a, b)| !((a - b).abs() <= tolerance));
     let pairs = a.means().zip(b.means()).enumerate();
     pairs.filter(|(_, pair)| far(*pair)).map(|(pixel, _)| pixel).collect()
 }
 
-/// Returns the visibly different pixels of 40,000. A shadow edge that moves across a light sample changes a value by
+/// Returns the visible differences in 40,000 pixels. A shadow edge that moves across a light sample changes a value by
 /// 1/16 of the light.
 fn visible(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
     let expected = reference(&packed(&cornell()));
@@ -115,8 +112,7 @@ fn camera_moved(description: &Description, way: DVec3) -> Description {
     description
 }
 
-/// The segment from pixel (15, 193) to the first light sample passes an edge of the tetrahedron at 4e-7, so the scale
-/// decides its occlusion.
+/// The segment from pixel (15, 193) to the first light sample passes an edge at 4e-7: the scale decides.
 #[test]
 fn scaling_changes_pixels_only_near_edges() {
     let (scene, expected) = (cornell(), reference(&packed(&cornell())));
@@ -131,8 +127,7 @@ fn scaling_changes_pixels_only_near_edges() {
     assert_eq!(near, 0, "of the pixels of everywhere");
 }
 
-/// Checks offsets up to 1000 times the scene's size and more: coordinates are relative to a point near the look-at
-/// point.
+/// Up to 1000 times the scene's size and more: coordinates are relative to a point near the look-at point.
 #[test]
 fn translation_does_not_change_the_image() {
     for offset in [100.0, -2000.0, 1e6] {
@@ -140,7 +135,7 @@ fn translation_does_not_change_the_image() {
         let (found, expected) = (reference(&packed(&found)), reference(&packed(&expected)));
         assert_eq!(found, expected, "moved by {offset}");
     }
-    // Offsets that are not multiples of the grid of possible origins.
+    // No multiples of the grid of possible origins.
     for offset in [1999.3, -77_777.7] {
         let found = visible(offset, 0.0);
         assert!(found.is_empty(), "moved by {offset}: pixels {found:?}");

@@ -178,13 +178,13 @@ pub fn poor_shaders() -> &'static Shaders {
     POOR.get_or_init(|| shaders_with(ROUNDING, &poor_device()))
 }
 
-/// Seeds of the camera that select the operations of [`selectable_shaders`].
+/// Seeds of the camera for [`selectable_shaders`].
 const DEVICE: u32 = 0;
 const CORRECTED: u32 = 1;
 const IMPRECISE: u32 = 2;
 
-/// Returns shaders with the software functions over this device's operations, the same over imprecise ones, or the
-/// imprecise ones alone, by the seed of the camera, so that a scene needs one kernel.
+/// Returns the software functions over this device's operations, over imprecise ones, or the imprecise ones alone, by
+/// the seed of the camera: a scene needs one kernel.
 fn selectable_shaders() -> Shaders {
     let mut text = over_a_poor_device();
     for (from, to) in [
@@ -210,7 +210,7 @@ fn selectable_shaders() -> Shaders {
     shaders_with(ROUNDING, &text)
 }
 
-/// With imprecise operations images are within the tolerances; with the software functions they are bit-identical.
+/// Within the tolerances; with the software functions bit-identical.
 #[test]
 fn images_keep_their_guarantees_on_an_imprecise_device() {
     if !adapter::device().is_some_and(bit_exact) {

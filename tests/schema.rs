@@ -31,7 +31,6 @@ fn fits(scene: &Table) -> bool {
     validator().is_valid(&serde_json::to_value(scene).expect("JSON"))
 }
 
-/// Validates by the program.
 fn load(scene: &Table, folder: &Path) -> Result<(), String> {
     let text = toml::to_string(scene).expect("TOML");
     let description = Description::parse(&text, "s.toml").map_err(|error| error.to_string())?;
@@ -366,7 +365,7 @@ integrator = "path"
 "#,
 ];
 
-/// Errors that the schema does not cover: relations of values, names, file contents.
+/// Errors beyond the schema: relations of values, names, file contents.
 const OF_SEVERAL: &[&str] = &[
     // Names and files.
     "there is no texture",
@@ -384,7 +383,7 @@ const OF_SEVERAL: &[&str] = &[
     "must have a red and green factor",
     "texture's factor",
     "texture with uv_set",
-    // Keys that exclude or require others.
+    // Exclude or require others.
     "integrator = \"path\"",
     "must be from 1 to 64",
     "must not be there",
@@ -415,7 +414,6 @@ const OF_SEVERAL: &[&str] = &[
     "must be [0, 0, 0, 1]",
 ];
 
-/// Collects the paths of all values.
 fn places(value: &Value, here: &mut Vec<Step>, all: &mut Vec<Vec<Step>>) {
     all.push(here.clone());
     match value {
@@ -458,7 +456,6 @@ fn at<'a>(scene: &'a mut Value, place: &[Step]) -> &'a mut Value {
     })
 }
 
-/// Returns the scene with other values at one place.
 fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
     let floats = [-1e10, -400.0, -0.5, -1e-12, 0.0, 1e-12, 0.5, 1.5, 1e7, 1e10];
     let wholes = [-1, 0, 2, 17, 101, 1025, 65_537, 5_000_000_000_i64];
@@ -503,7 +500,6 @@ fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
     all
 }
 
-/// Returns the disagreement of schema and program, if any.
 fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
     match (fits(scene), load(scene, folder)) {
         (false, Ok(())) => Some(format!("only the schema rejects {scene}")),
@@ -516,7 +512,7 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
         {
             None
         }
-        // The schema does not require the static keys of a camera with a path.
+        // Static keys of a camera with a path.
         (true, Err(message)) if message.contains(": camera.") && message.ends_with(" is missing") => {
             let has_path = scene["camera"].get("path").is_some();
             (!has_path).then(|| format!("the schema accepts a camera without: {message}"))
@@ -649,7 +645,7 @@ fn the_projects_scenes_are_valid() {
     }
 }
 
-/// Returns the parts of the schema with their headings in the documentation.
+/// Returns the schema's parts with their headings.
 fn parts() -> Vec<(String, &'static Json)> {
     let defs = schema()["$defs"].as_object().unwrap();
     let of_types = defs.iter().map(|(name, part)| {
@@ -756,7 +752,6 @@ fn same(a: &Json, b: &Json) -> bool {
     }
 }
 
-/// Visits each described key with its path.
 fn each_key(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
     match schema {
         Json::Object(all) => {
@@ -797,7 +792,7 @@ fn every_key_has_a_description_and_every_number_a_range() {
             !is_number || ends.iter().any(|end| property.get(end).is_some()),
             "{path}: {property}"
         );
-        // If a texture may replace the number, the key describes the range.
+        // A texture may replace the number: the key describes the range.
         let is_texture = |either: &Json| either["properties"].get("texture").is_some();
         let either = property.get("anyOf").filter(|either| is_texture(&either[1]));
         let mut plain = either.map_or(&Json::Null, |either| &either[0]);

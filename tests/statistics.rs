@@ -14,7 +14,7 @@ use crate::{adapter, patterns, scenes};
 /// Probability of rejecting a uniform pattern; each test makes dozens of checks.
 const SIGNIFICANCE: f64 = 1e-6;
 
-/// Returns `sets` pixels with `count` positions. From the GPU if available; `tests/probes.rs` shows that the twins
+/// Returns `sets` pixels with `count` positions, from the GPU if available: `tests/probes.rs` shows that the twins
 /// agree.
 fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
     let mut description = scenes::scene("cornell.toml");
@@ -34,7 +34,6 @@ fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
         .collect()
 }
 
-/// Evaluates a shared function with a two-word result.
 fn evaluate(name: &str, words: Vec<u32>) -> Vec<u32> {
     let Some(device) = adapter::device() else {
         return twin(name).results(&words, 2);
@@ -138,7 +137,7 @@ fn positions_are_on_the_unit_square() {
     }
 }
 
-/// Checks that each position, and all positions of a pixel together, are uniform.
+/// Each position, and all positions of a pixel together.
 #[test]
 fn random_patterns_are_uniform_over_pixels() {
     let mut tested = 0;
@@ -203,7 +202,7 @@ fn noisy(pattern: Pattern, seed: u32, counts: (u32, u32)) -> Packed {
     scenes::packed(&d)
 }
 
-/// Returns each pixel's deviation from the reference, in standard errors over the seeds.
+/// Returns the deviations from the reference, in standard errors over the seeds.
 fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
     let n = pictures.len() as f64;
     let pixel = |i: usize| {
@@ -217,7 +216,7 @@ fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
     (0..truth.len()).map(pixel).collect()
 }
 
-/// Checks that mean and mean square of the deviations are at most those of a normal distribution.
+/// Checks that mean and mean square are at most those of a normal distribution.
 fn unbiased(deviations: &[f64]) -> Result<(), String> {
     let n = deviations.len() as f64;
     let mean = deviations.iter().sum::<f64>() / n;

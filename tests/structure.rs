@@ -9,7 +9,7 @@ use syn::{Attribute, File, Item, ItemMacro, ItemMod, ItemUse, Macro, UseTree, Vi
 
 use crate::sources;
 
-/// Folders whose files and subfolders are the checked modules, with the path of their parent module.
+/// Folders of the checked modules, with the path of their parent module.
 const FOLDERS: [(&str, &[&str]); 6] = [
     ("crates/image/src", &[]),
     ("crates/scene/src", &[]),
@@ -78,7 +78,7 @@ fn strings(names: &[&str]) -> Module {
     names.iter().map(|&name| name.to_owned()).collect()
 }
 
-/// Reads the files of a folder with their module paths, except test modules.
+/// Reads the files with their module paths, except test modules.
 fn read(folder: &Path, module: &[String], files: &mut Vec<(Module, File)>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -102,7 +102,6 @@ fn read(folder: &Path, module: &[String], files: &mut Vec<(Module, File)>) {
     files.retain(|(module, _)| !of_tests.iter().any(|tests| module.starts_with(tests)));
 }
 
-/// Returns the modules that a file declares for tests only.
 fn tests_of(file: &File) -> impl Iterator<Item = String> {
     file.items.iter().filter_map(|item| match item {
         Item::Mod(module) if is_test(&module.attrs) => Some(module.ident.to_string()),
@@ -117,7 +116,6 @@ fn is_test(attributes: &[Attribute]) -> bool {
     })
 }
 
-/// Returns the modules that each module imports.
 fn imports(files: &[(Module, File)], parent: &[String]) -> BTreeMap<String, BTreeSet<String>> {
     let child = |module: &[String]| module.strip_prefix(parent)?.first().cloned();
     let modules: BTreeSet<String> = files.iter().filter_map(|(module, _)| child(module)).collect();
@@ -145,7 +143,7 @@ fn imports(files: &[(Module, File)], parent: &[String]) -> BTreeMap<String, BTre
     all
 }
 
-/// Returns the names that the parent module re-exports, each with the child module that defines it.
+/// Returns the re-exported names, each with its child module.
 fn exports(files: &[(Module, File)], parent: &[String], modules: &BTreeSet<String>) -> BTreeMap<String, String> {
     let mut exports = BTreeMap::new();
     let roots = files.iter().filter(|(module, _)| module == parent);
@@ -197,7 +195,7 @@ fn public_names(file: &File) -> impl Iterator<Item = String> {
     })
 }
 
-/// A visitor that collects the paths starting with `crate`, `self` or `super`, relative to the root of the package.
+/// Collects the paths from `crate`, `self` or `super`, relative to the root of the package.
 struct Paths {
     module: Module,
     found: Vec<Module>,
@@ -218,7 +216,7 @@ impl Paths {
         self.found.push(base.into_iter().chain(rest.cloned()).collect());
     }
 
-    /// Adds the paths in the text of tokens, which are separated by spaces.
+    /// Adds the paths in the text of tokens, separated by spaces.
     fn add_tokens(&mut self, tokens: &str) {
         let tokens = tokens.replace(" :: ", "::");
         let paths = tokens.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
@@ -259,7 +257,6 @@ impl Visit<'_> for Paths {
     }
 }
 
-/// Returns all paths that a `use` item imports.
 fn used(tree: &UseTree) -> Vec<Module> {
     match tree {
         UseTree::Path(path) => {
@@ -274,7 +271,6 @@ fn used(tree: &UseTree) -> Vec<Module> {
     }
 }
 
-/// Returns the groups of modules that import each other, directly or indirectly.
 fn cycles(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<Vec<String>> {
     let reached = |start: &String| {
         let mut reached = BTreeSet::new();

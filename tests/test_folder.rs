@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-/// A temporary folder that is deleted when the value is dropped. The modules that use it define how the program runs in
-/// it.
+/// A temporary folder that is deleted on drop. Modules define how the program runs in it.
 pub struct TestFolder {
     folder: TempDir,
 }
@@ -37,7 +36,7 @@ impl TestFolder {
         fs::write(self.path(name), text).expect("a file");
     }
 
-    /// Returns the sorted names of all files, including hidden ones, except those for which `known` returns true.
+    /// Returns the sorted names of all files, hidden ones included, except those that are `known`.
     pub fn files_but(&self, known: impl Fn(&str) -> bool) -> Vec<String> {
         let entries = fs::read_dir(self.folder()).expect("the folder");
         let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());

@@ -101,7 +101,7 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         .filter(two_sided)
         .collect();
     let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
-    // WGSL's `before` is updated in place in Rust.
+    // `before` is updated in place in Rust.
     let in_place = |wgsl: &Signature, twin: &Signature| {
         let names =
             |s: &Signature, name: &str| s.parts.iter().any(|(n, ty)| n == name && Some(ty) == s.result.as_ref());
@@ -145,7 +145,7 @@ fn functions_and_records_match() {
         if file.starts_with("kernels/") || WITHOUT_TWIN.iter().any(|(f, _)| *f == file) {
             continue;
         }
-        // Files that use overrides or bindings are parsed in a kernel; their twins take the scene first.
+        // Files with overrides or bindings are parsed in a kernel; their twins take the scene first.
         let kernel = kernels.iter().find(|kernel| kernel.start_of(file).is_some());
         let source = if is_shared(file) {
             &shared
@@ -384,7 +384,6 @@ fn an_inexact_operation_is_found() {
     assert_eq!(violations(&without).len(), 1, "one undecorated operation");
 }
 
-/// Returns the positions of the instructions.
 fn positions(module: &[u32]) -> impl Iterator<Item = usize> {
     let mut at = 5; // after the header
     instructions(module).map(move |(_, words)| {

@@ -20,7 +20,7 @@ const KEPT: &str = "tests/unchanged.txt";
 /// Features that the project's scenes lack. Those named `random` were generated and use [`any_scene::folder`].
 const FOLDER: &str = "tests/unchanged";
 
-/// Returns normal, depth, texture coordinates, shape and material, which the checksums cover.
+/// Returns normal, depth, texture coordinates, shape and material.
 fn old_words(hit: &FirstHit) -> [u32; 8] {
     let [x, y, z] = hit.normal.to_array().map(f32::to_bits);
     let [u, v] = hit.uv.to_array().map(f32::to_bits);

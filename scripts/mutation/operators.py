@@ -187,7 +187,7 @@ def main():
     parser.add_argument("--again", type=argparse.FileType(), metavar="LOG", help="test only the survivors listed in LOG")
     arguments = parser.parse_args()
     listed = all_mutations()
-    chosen = [m for m in listed if not arguments.only or m.file[8:-3] in arguments.only.split(",")][:: arguments.sample]
+    chosen = [m for m in listed if not arguments.only or m.file.split("cpu/")[-1][:-3] in arguments.only.split(",")][:: arguments.sample]
     if arguments.again:
         names = {line.removeprefix("survives: ").strip() for line in arguments.again if line.startswith("survives: ")}
         chosen = [m for m in chosen if m.name in names]

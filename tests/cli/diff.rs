@@ -67,12 +67,10 @@ fn floats(values: &[f32]) -> FlatSamples {
     FlatSamples::F32(values.to_vec())
 }
 
-/// Returns channels R, G and B with the same values.
 fn gray(values: &[f32]) -> Vec<(&'static str, FlatSamples)> {
     ["R", "G", "B"].into_iter().map(|name| (name, floats(values))).collect()
 }
 
-/// Writes two images of 4 x 2 pixels that differ by 10 steps in one value.
 fn two(place: &TestFolder) -> (Vec<u8>, Vec<u8>) {
     let a: Vec<u8> = (0..24).map(|i| i * 9).collect();
     let mut b = a.clone();
@@ -549,7 +547,7 @@ fn jpegs_and_interlaced_pngs_are_read() {
     );
     says(&place.run(&["diff", "a.jpg", "decoded.png"]), 0, "identical\n");
     says(&place.run(&["diff", "a.jpg", "b.jpg"]), 5, "128 of 128 pixels");
-    // two pixels in a row: the first in pass 1 of 7, the second in pass 6, each row with filter 0
+    // two pixels in a row: in pass 1 and in pass 6 of 7, each row with filter 0
     let chunk = |kind: &[u8; 4], data: &[u8]| {
         let body = [kind.as_slice(), data].concat();
         let length = (data.len() as u32).to_be_bytes();
@@ -659,7 +657,7 @@ fn the_difference_image_shows_the_location() {
         assert!(high - low < 40, "{low} {high}");
         (low + high) / 2
     };
-    // the map is to the right of both images, below a label of 20 rows and a gap of 8
+    // the map is to the right of both, below a label of 20 rows and a gap of 8
     let middle = (ends(|place| place.0), ends(|place| place.1));
     let expected = (8 + 2 * (width + 8) + 456, 8 + 20 + 123);
     assert!(

@@ -7,18 +7,15 @@ use std::os::unix::fs::PermissionsExt as _;
 
 use super::{Ran, TestFolder, program, project};
 
-/// A name with characters that are special in a shell, in YAML or in Open Job Description.
+/// Special characters of a shell, of YAML and of Open Job Description.
 const ODD: &str = "it's $HOME \"{{a}}\" #1 é.toml";
-/// `ODD`, quoted for a shell.
 const ODD_QUOTED: &str = "'it'\\''s $HOME \"{{a}}\" #1 é.toml'";
-/// Options of `wgray render`, quoted for a shell.
 const OPTIONS: &str = "--size 20x12 --spp 4 -D 'materials.gray.color=[0.1, 0.5, 0.3]' --aov normal --device cpu";
 
 fn template(name: &str) -> String {
     fs::read_to_string(project("examples/farm").join(name)).expect("a template")
 }
 
-/// Writes the template for Slurm with these settings.
 fn write_slurm(place: &TestFolder, variables: &str, scene: &str, options: &str, output: &str) {
     let text = template("slurm.sh");
     let (head, rest) = text.split_once("# Settings.").expect("the settings");
@@ -33,7 +30,7 @@ fn write_slurm(place: &TestFolder, variables: &str, scene: &str, options: &str, 
     place.write("slurm.sh", &(head.to_owned() + &settings + rest));
 }
 
-/// Runs a shell script with arguments and variables, in a folder other than the scene's.
+/// Runs a shell script in a folder other than the scene's.
 fn run(words: &[&str], variables: &[(&str, &str)]) -> Ran {
     let mut command = assert_cmd::Command::new("sh");
     command.current_dir("/").args(words).envs(variables.iter().copied());
@@ -49,14 +46,13 @@ fn run(words: &[&str], variables: &[(&str, &str)]) -> Ran {
     )
 }
 
-/// Runs a task of an array as Slurm does.
 fn task(place: &TestFolder, kind: &str, first: &str, index: &str) -> Ran {
     let script = place.path("slurm.sh").display().to_string();
     let folder = place.folder().display().to_string();
     run(&[&script, kind, &folder, first], &[("SLURM_ARRAY_TASK_ID", index)])
 }
 
-/// Renders the scene with the odd name, and returns the bytes of its image and of one with another seed.
+/// Returns the image of the scene with the odd name, and that with another seed.
 fn whole(place: &TestFolder) -> [Vec<u8>; 2] {
     fs::copy(place.path("small.toml"), place.path(ODD)).expect("a copy");
     ["", "--seed 5"].map(|more| {
@@ -78,7 +74,6 @@ fn tasks_of_slurm_render_the_image() {
         OPTIONS,
         "'- {{}} .exr'",
     );
-    // An array of two tasks, and an array of one task.
     for (first, index) in [("0", "0"), ("0", "1"), ("2", "0")] {
         let ran = task(&place, "tile", first, index);
         assert_eq!(ran.code, 0, "{}", ran.stderr);
@@ -140,7 +135,6 @@ fn tasks_of_slurm_render_frames() {
     assert!(place.read("out.3.png") != place.read("out.8.png"), "the control");
 }
 
-/// Writes a program for tests into the folder `bin`.
 fn write_program(place: &TestFolder, name: &str, script: &str) {
     let path = place.path("bin").join(name);
     fs::create_dir_all(place.path("bin")).expect("a folder");
@@ -156,7 +150,7 @@ fn path_with_bin(place: &TestFolder) -> String {
     )
 }
 
-/// A task that is signaled before its time limit is requeued, unless it was cancelled or requeued too often.
+/// Before the time limit, unless cancelled or requeued too often.
 #[test]
 fn signaled_tasks_of_slurm_are_requeued() {
     let place = TestFolder::new();
@@ -272,7 +266,6 @@ fn arrays_are_as_few_as_the_cluster_allows() {
             array("merge", 0, merge, 5),
         ]
     );
-    // After a failure, the arrays that were submitted are cancelled.
     for (broken, cancelled) in [
         ("1", None),
         ("3", Some("1 2")),
@@ -286,7 +279,6 @@ fn arrays_are_as_few_as_the_cluster_allows() {
     }
 }
 
-/// Returns the scripts in a template for Open Job Description.
 fn scripts(template: &str) -> Vec<String> {
     let script = |text: &str| -> String {
         let indent = " ".repeat(12);

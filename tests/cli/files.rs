@@ -83,7 +83,7 @@ mod unix {
         );
     }
 
-    /// Starts a render that would take minutes and waits until its temporary file exists.
+    /// Starts a render of minutes and waits for its temporary file.
     fn long_render(place: &TestFolder, shell: &str, options: &[&str]) -> Child {
         let before = temporary(place);
         let child = Command::new("sh")
@@ -145,7 +145,7 @@ mod unix {
         }
     }
 
-    /// Signals that `nohup` (SIGHUP) and shells (SIGINT, for background jobs) ignore for their children.
+    /// `nohup` (SIGHUP) and shells (SIGINT, for background jobs) ignore them for their children.
     #[test]
     fn ignored_signals_stay_ignored() {
         for signal in ["HUP", "INT", "TERM"] {

@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use super::{NO_DRIVER, SCENE, TestFolder};
 use crate::gltf::build::png;
 
-/// Writes the test scene with a camera that moves from left to right and is centered at frame 5.
+/// Writes the scene with a camera that moves to the right and is centered at frame 5.
 fn moving(place: &TestFolder, interpolation: &str) {
     let keys = "{ frame = 1, position = [-2, -5, 1] }, { frame = 5, position = [0, -5, 1] }, { frame = 9, position = [2, -5, 1] }";
     let path = format!("fov = 40, path = {{ interpolation = \"{interpolation}\", keys = [{keys}] }} }}");
@@ -14,7 +14,7 @@ fn moving(place: &TestFolder, interpolation: &str) {
     place.write("moving.toml", &SCENE.replace("fov = 40 }", &path));
 }
 
-/// Returns the width and the bits of the colors of an EXR. The metadata may depend on the source file.
+/// Returns the width and color bits of an EXR; the metadata may depend on the source file.
 fn bits(place: &TestFolder, name: &str) -> (u32, Vec<u32>) {
     let picture = image::open(place.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     let picture = picture.into_rgb32f();
@@ -30,7 +30,7 @@ fn quietly(place: &TestFolder, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &CPU[..]].concat());
 }
 
-/// Runs a render that must be rejected with this code and message and write no file.
+/// Runs a render that must be rejected and write no file.
 fn refused(place: &TestFolder, arguments: &[&str], code: i32, message: &str) {
     let before = place.files();
     let ran = place.run(&[&["render"], arguments, &CPU[..]].concat());
@@ -64,7 +64,7 @@ fn a_frame_equals_a_still_image_of_its_camera() {
             );
         }
         assert_ne!(bits(&place, "out.001.exr"), bits(&place, "out.009.exr"));
-        // Halfway between two keys, as a single frame and in any order with others.
+        // Halfway between two keys, alone and in any order with others.
         place.write("still.toml", &SCENE.replace("[0, -5, 1]", "[-1, -5, 1]"));
         quietly(&place, &["still.toml", "-o", "still.exr"]);
         quietly(&place, &["moving.toml", "--frames", "3", "-o", "alone.exr"]);
@@ -72,7 +72,7 @@ fn a_frame_equals_a_still_image_of_its_camera() {
         for name in ["alone.exr", "3.exr"] {
             assert_eq!(bits(&place, name), bits(&place, "still.exr"), "{name}");
         }
-        // Without `--frames`, the camera's own keys apply; here they equal those of frame 5.
+        // Without `--frames` the camera's own keys apply: those of frame 5.
         quietly(&place, &["moving.toml", "-o", "itself.exr"]);
         assert_eq!(bits(&place, "itself.exr"), bits(&place, "out.005.exr"));
     }
@@ -136,7 +136,7 @@ fn names_have_the_numbers_and_folders_keep_their_marks() {
     for name in ["m#.0003.png", "m#.12345.png", "m#.png"] {
         assert!(files.contains(&name.to_owned()), "{files:?}");
     }
-    // A single frame needs no number, and without `--frames` a # is literal.
+    // A single frame needs no number; without `--frames` a # is literal.
     quietly(&place, &["m#.toml", "--frames", "4", "-o", "one.png"]);
     quietly(&place, &["m#.toml", "-o", "#.##.png"]);
     assert!(place.files().contains(&"#.##.png".to_owned()));
@@ -164,7 +164,7 @@ fn ambiguous_frame_names_are_rejected() {
         2,
         "--output: b11.png: frames 1 and 11 would be written to this file",
     );
-    // Problems of the last frame are reported before the first one is rendered.
+    // Problems of the last frame precede the first render.
     place.write("2.exr", "");
     let mut mode = fs::metadata(place.path("2.exr")).unwrap().permissions();
     mode.set_readonly(true);
@@ -318,7 +318,7 @@ fn invalid_cameras_are_rejected_before_the_first_frame() {
 fn a_failed_frame_ends_the_run_and_finished_frames_remain() {
     let place = TestFolder::new();
     moving(&place, "linear");
-    // /dev/full passes the check at the start, as it is not a regular file. Writing the second frame to it fails.
+    // /dev/full passes the check at the start, as it is not a regular file; writing the second frame fails.
     #[cfg(target_os = "linux")]
     {
         std::os::unix::fs::symlink("/dev/full", place.path("s.2.json")).unwrap();

@@ -25,7 +25,6 @@ fn quietly(place: &TestFolder, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &QUICK].concat());
 }
 
-/// Returns the pixels as bits, rendered with these options.
 fn bits(place: &TestFolder, arguments: &[&str]) -> Vec<u32> {
     quietly(place, &[arguments, &["-o", "bits.exr"]].concat());
     pixels(place, "bits.exr")
@@ -61,7 +60,7 @@ fn a_model_renders_without_a_scene() {
             "{line}"
         );
     }
-    // Both file forms give the same image. The margin of 5 % around the model is less than a pixel.
+    // The margin of 5 % around the model is less than a pixel.
     quietly(
         &place,
         &["box.glb", "--background", "none", "-o", "box.png", "-o", "box.exr"],
@@ -134,7 +133,7 @@ fn options_select_parts_by_name_or_index() {
             "{options:?}"
         );
     }
-    // The aspect ratio of the image is the camera's, unless a size is given.
+    // The aspect ratio is the camera's, unless a size is given.
     for (options, size) in [
         (&["--camera", "0"][..], "720 x 480"),
         (&["--camera", "1"], "720 x 720"),
@@ -279,7 +278,7 @@ fn frames_are_times_of_the_animation() {
     assert_eq!(ran.code, 0);
     assert!(ran.stderr.contains("all frames are equal"), "{}", ran.stderr);
     assert_eq!(pixels(&place, "named.exr"), moment(&place, "0.25"));
-    // A generated camera does not move: a rising part does not change the framing of the rest.
+    // A generated camera does not move: a rising part does not change the framing.
     Model::default().write_glb(place.folder(), "box.glb");
     quietly(&place, &["box.glb", "--frames", "0-18:6", "-o", "s##.exr"]);
     quietly(&place, &["box.glb", "--frames", "18", "-o", "alone.exr"]);
@@ -421,7 +420,6 @@ fn info_lists_what_options_select() {
         (&"box.glb".into(), &serde_json::json!(["golden"]))
     );
     assert_eq!(model["cameras"].as_array().map(Vec::len), Some(2));
-    // Each listed number and name can be selected.
     for (list, option) in [
         ("cameras", "--camera"),
         ("animations", "--animation"),

@@ -41,7 +41,6 @@ impl Example {
         )
     }
 
-    /// Applies the change that the page describes.
     fn change(&self) {
         let scene = self.folder.path().join("scenes/ball.toml");
         let text = fs::read_to_string(&scene).unwrap();

@@ -2,7 +2,6 @@
 
 use super::{Ran, TestFolder};
 
-/// Returns the names of the commands that a help text lists.
 fn listed(help: &str) -> Vec<String> {
     let list = help.split("Commands:\n").nth(1).unwrap_or_default();
     let lines = list.lines().take_while(|line| !line.is_empty());
@@ -11,7 +10,7 @@ fn listed(help: &str) -> Vec<String> {
     names.filter(|name| *name != "help").map(str::to_owned).collect()
 }
 
-/// Calls `each` with the words of every command, nested ones included.
+/// Calls `each` with the words of every command.
 fn for_each_command(place: &TestFolder, words: &[&str], each: &mut dyn FnMut(&[&str])) {
     each(words);
     let help = place.run(&[words, &["-h"]].concat()).stdout;
@@ -43,7 +42,7 @@ fn help_is_short() {
     assert!(commands >= 12, "{commands}");
 }
 
-/// `-h` omits rarely used options; `--help` and `wgray help` list all options.
+/// `-h` omits rarely used options.
 #[test]
 fn the_long_help_lists_all_options() {
     let place = TestFolder::new();
@@ -188,7 +187,6 @@ fn common_mistakes_have_hints() {
             ran.stderr
         );
     }
-    // JSON messages contain the hint, too.
     let ran = place.run(&["box.glb", "--log-format", "json"]);
     assert!(ran.stderr.contains("wgray render box.glb"), "{}", ran.stderr);
     for option in ["--spp", "--samples", "--pixel-samples"] {

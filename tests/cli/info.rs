@@ -4,7 +4,6 @@ use serde_json::Value;
 
 use super::{NO_DRIVER, SCENE, TestFolder, project_scene};
 
-/// Returns the JSON output for a scene.
 fn info(place: &TestFolder, arguments: &[&str]) -> Value {
     let all = [&["info", "--json"], arguments].concat();
     let ran = place.run(&all);
@@ -144,7 +143,6 @@ fn info_selects_the_same_device_as_a_render() {
     let on_gpu = info(&place, &["small.toml", "--device", "gpu"]);
     assert!(on_gpu["memory"]["scene_on_device"].as_u64() > Some(500), "{on_gpu}");
     assert_eq!(on_gpu["kernel"]["entry"], "render");
-    // The same without any Vulkan driver.
     let ran = place.run_with(&["info", "small.toml"], &NO_DRIVER);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(ran.stdout.contains("    device      cpu: no Vulkan"), "{}", ran.stdout);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::{Ran, TestFolder, program};
 
-/// A render that takes a few seconds, with an auxiliary layer.
+/// Takes a few seconds.
 const LONG: [&str; 8] = [
     "render",
     "small.toml",
@@ -20,7 +20,6 @@ const LONG: [&str; 8] = [
     "normal",
 ];
 
-/// Returns the image of an uninterrupted render.
 fn expected(place: &TestFolder) -> Vec<u8> {
     let mut arguments = LONG.to_vec();
     arguments.extend(["-o", "whole.exr", "--reproducible", "--device", "cpu"]);
@@ -39,7 +38,6 @@ fn start(place: &TestFolder, arguments: &[&str]) -> Child {
         .expect("the program")
 }
 
-/// Waits until the checkpoint is larger than this number of bytes.
 fn wait_for(place: &TestFolder, file: &str, bytes: u64) {
     let start = Instant::now();
     while fs::metadata(place.path(file)).map_or(0, |data| data.len()) <= bytes {
@@ -48,7 +46,7 @@ fn wait_for(place: &TestFolder, file: &str, bytes: u64) {
     }
 }
 
-/// Waits for 0.15 s of CPU time of the process, after which its signal handlers are installed even on a busy machine.
+/// Waits for 0.15 s of CPU time, after which the signal handlers are installed even on a busy machine.
 fn work_of(child: &Child) {
     let ticks = || {
         let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
@@ -73,7 +71,7 @@ fn ended(child: Child) -> Ran {
     )
 }
 
-/// Resumes from the checkpoint and renders to the end.
+/// Resumes from the checkpoint.
 fn go_on(place: &TestFolder, device: &str) -> Ran {
     let mut arguments = LONG.to_vec();
     arguments.extend(["--reproducible", "--checkpoint", "c", "--resume", "--device", device]);
@@ -109,7 +107,7 @@ fn a_killed_render_resumes() {
     let ran = go_on(&place, "cpu");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(place.read("out.exr") == expected);
-    // The complete checkpoint remains and can be resumed from at once.
+    // The complete checkpoint remains and can be resumed.
     let ran = go_on(&place, "gpu");
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(place.read("out.exr") == expected);
@@ -136,7 +134,7 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
         if !more.is_empty() && place.path("c").exists() {
             fs::remove_file(place.path("c")).expect("a checkpoint"); // so that there is work left
         }
-        // With an interval of 1 h, only the signal causes a checkpoint to be written.
+        // With an interval of 1 h, only the signal causes a checkpoint.
         let child = start(
             &place,
             &[
@@ -202,7 +200,7 @@ fn a_second_writer_waits_and_resumes() {
     let ran = ended(second);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(place.read("second.exr") == expected);
-    // The second process reused the pieces of the first: the file contains each finished piece once.
+    // The file contains each finished piece once.
     let third = start(
         &place,
         &[&options[..], &["-o", "third.exr", "--stats", "stats.json"]].concat(),
@@ -216,7 +214,7 @@ fn a_second_writer_waits_and_resumes() {
     );
 }
 
-/// Checks that SIGTERM before the start of the render also exits with the code that requests another attempt.
+/// SIGTERM before the start of the render also exits with the code that requests another attempt.
 #[cfg(target_os = "linux")]
 fn a_farm_ends_one_that_waits(place: &TestFolder, options: &[&str]) {
     let waiting = start(place, &[options, &["-o", "third.exr", "--requeue-exit", "75"]].concat());
@@ -235,7 +233,7 @@ fn a_farm_ends_one_that_waits(place: &TestFolder, options: &[&str]) {
     assert_eq!(ended(waiting).code, 75);
 }
 
-/// Checks the messages for a checkpoint that exists, belongs to other options, or is not a checkpoint.
+/// Existing checkpoints, those of other options, and files that are not checkpoints.
 #[test]
 fn checkpoints_of_other_jobs_are_rejected() {
     let place = TestFolder::new();
@@ -368,7 +366,7 @@ fn a_folder_has_a_checkpoint_for_each_job() {
     assert!(ran.stderr.contains("--checkpoint: kept: needs #"), "{}", ran.stderr);
 }
 
-/// Pieces of another job behind the header of this one are rejected.
+/// Behind the header of this one.
 #[test]
 fn pieces_of_another_job_are_rejected() {
     let place = TestFolder::new();
@@ -389,7 +387,7 @@ fn pieces_of_another_job_are_rejected() {
     assert!(place.read("c.exr") == place.read("a.exr") && place.read("a.exr") != place.read("b.exr"));
 }
 
-/// The checkpoint is moved, removed or replaced while the render writes to it.
+/// Moved, removed or replaced while the render writes to it.
 #[cfg(unix)]
 #[test]
 fn a_removed_checkpoint_is_restored_or_reported() {
@@ -458,7 +456,7 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
     assert!(place.read("out.exr") == expected);
 }
 
-/// A full disk during a render: the output fails, the checkpoint remains, and with free space the render resumes.
+/// The output fails; with free space the render resumes.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_keeps_the_checkpoint() {
@@ -482,8 +480,8 @@ fn a_full_disk_keeps_the_checkpoint() {
     assert!(place.read("out.exr") == expected);
 }
 
-/// Renders to a full and to a read-only file system, in a separate mount namespace. Where that is not permitted, only
-/// the file size limit above and a read-only folder are tested.
+/// In a separate mount namespace; where that is not permitted, only the file size limit above and a read-only folder
+/// are tested.
 #[cfg(target_os = "linux")]
 #[test]
 fn full_and_read_only_file_systems() {
@@ -740,7 +738,7 @@ fn a_time_limit_ends_with_a_complete_image() {
             ran.stderr
         );
     }
-    // With enough time the limit has no effect, and a stopped render resumes to the same image.
+    // With enough time the limit has no effect; a stopped render resumes to the same image.
     let short = [
         "render",
         "small.toml",

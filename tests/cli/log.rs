@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::program;
 use super::{NO_DRIVER, Ran, SCENE, TestFolder};
 
-/// Parses the lines of standard error and checks the keys that all objects have.
+/// Parses standard error and checks the common keys.
 fn lines(ran: &Ran) -> Vec<Value> {
     let lines = ran.stderr.lines().map(|line| {
         let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));

@@ -2,7 +2,6 @@
 
 use super::{Ran, TestFolder};
 
-/// Returns the names of all commands, from the help.
 fn commands(place: &TestFolder) -> Vec<String> {
     let help = place.run(&["--help"]).stdout;
     let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
@@ -47,7 +46,7 @@ fn every_command_has_a_page() {
         let command = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
         let arguments: Vec<&str> = std::iter::once("man").chain(command).collect();
         assert_eq!(place.run(&arguments).stdout, page, "{name} is printed");
-        // The page contains every option of the help, in bold and with escaped hyphens.
+        // Every option of the help, in bold and with escaped hyphens.
         let arguments: Vec<&str> = command.into_iter().chain(["--help"]).collect();
         let help = place.run(&arguments).stdout;
         let is_option = |line: &&str| line.starts_with("  -") || line.starts_with("      -");
@@ -73,7 +72,6 @@ fn every_command_has_a_page() {
     ] {
         assert!(render.contains(part), "{part}");
     }
-    // Existing pages are replaced.
     std::fs::write(folder.join("wgray.1"), "old").unwrap();
     place.quietly(&["man", "-o", "pages/man1"]);
     assert_ne!(std::fs::read_to_string(folder.join("wgray.1")).unwrap(), "old");
@@ -98,7 +96,7 @@ fn unknown_pages_are_rejected() {
     assert!(place.files().is_empty());
 }
 
-/// Formats a page with groff, if it is installed, and checks that groff prints no warnings.
+/// Checks that groff, if installed, prints no warnings.
 fn has_no_warnings(page: &std::path::Path) {
     let groff = std::process::Command::new("groff")
         .args(["-man", "-Tutf8", "-ww", "-z"])
@@ -114,7 +112,7 @@ fn has_no_warnings(page: &std::path::Path) {
     }
 }
 
-/// Checks that the documentation and the help, which the manual pages repeat, have the same exit codes.
+/// Also by the help, which the manual pages repeat.
 #[test]
 fn exit_codes_are_documented() {
     let page = std::fs::read_to_string(super::project("docs/command-line.md")).unwrap();

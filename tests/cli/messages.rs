@@ -10,7 +10,7 @@ mod unix {
         place.shell("sh", line)
     }
 
-    /// Redirections of standard error to a stream that cannot be written to: full, closed, or without a reader.
+    /// Redirections of standard error to full, closed and unread streams.
     const UNWRITABLE: [&str; 3] = ["2>/dev/full", "2>&-", "2>&1 >&3 3>&- | true"];
 
     #[test]
@@ -92,7 +92,6 @@ mod unix {
     }
 }
 
-/// Returns the message for the scene with `from` replaced by `to`.
 fn message_for(from: &str, to: &str) -> String {
     let place = TestFolder::new();
     assert!(SCENE.contains(from), "{from}");
@@ -175,7 +174,7 @@ fn wrong_types_are_reported_with_the_right_type() {
     }
 }
 
-/// The parser and the validation print the same range for an integer.
+/// The parser and the validation print the same range.
 #[test]
 fn integer_ranges_are_consistent() {
     let render = |line: &str| (String::from("[render]"), format!("[render]\n{line}"));
@@ -329,7 +328,6 @@ fn arguments_in_messages_are_escaped_and_short() {
         assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{arguments:?}");
         assert!(ran.stderr.starts_with(expected), "{arguments:?}: {}", ran.stderr);
     }
-    // Ordinary words get a suggestion.
     let ran = place.run(&["rendr"]);
     assert!(ran.stderr.contains("'render'"), "{}", ran.stderr);
     let long = "a.".repeat(30_000);

@@ -31,8 +31,8 @@ use std::path::Path;
 use crate::sources::path as project;
 use crate::test_folder::TestFolder;
 
-/// Restores the default actions of SIGINT and SIGHUP for child processes. Shells ignore the former for background jobs,
-/// `nohup` ignores the latter.
+/// Restores the default actions of signals for child processes: shells ignore SIGINT for background jobs, `nohup`
+/// ignores SIGHUP.
 #[cfg(unix)]
 pub fn heed_interrupts() {
     // SAFETY: setting the default action of a signal has no precondition; no handler of this process is lost.
@@ -47,7 +47,7 @@ struct Ran {
     stdout: String,
     /// Standard error without the lines of `summary`.
     stderr: String,
-    /// Lines about written images, `box.png: 1024 x 1024, 64 spp, 12.3 s`, and progress lines of slow machines.
+    /// Lines like `box.png: 1024 x 1024, 64 spp, 12.3 s`, and progress lines of slow machines.
     summary: Vec<String>,
 }
 
@@ -88,7 +88,7 @@ fn is_summary(line: &str) -> bool {
     }
 }
 
-/// A scene of 10 x 6 pixels in which all random numbers differ between pixels.
+/// 10 x 6 pixels in which all random numbers differ.
 const SCENE: &str = r#"image = { width = 10, height = 6 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
 [render]
@@ -120,7 +120,6 @@ tangent = [1, 0, 0]
 "#;
 
 impl TestFolder {
-    /// Creates a folder with the scene `small.toml`.
     fn new() -> TestFolder {
         TestFolder::with_file("small.toml", SCENE)
     }
@@ -184,7 +183,7 @@ const NO_DRIVER: [(&str, &str); 2] = [
     ("VK_ICD_FILENAMES", "/nonexistent.json"),
 ];
 
-/// Returns the width, height and bytes of an 8-bit RGB PNG.
+/// Returns width, height and bytes of an 8-bit RGB PNG.
 fn read_png(path: &Path) -> (u32, u32, Vec<u8>) {
     let picture = image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let image::DynamicImage::ImageRgb8(picture) = picture else {

@@ -31,7 +31,7 @@ fn options_override_the_values_of_the_scene() {
 #[test]
 fn the_option_sets_the_maximum_depth() {
     let place = TestFolder::new();
-    // With a depth of 1, light enters the glass but does not leave it.
+    // With a depth of 1, light does not leave the glass.
     let ball = SCENE.replacen("material = \"gray\"", "material = \"glass\"", 1);
     let ball = ball.replace(
         "[materials.gray]",
@@ -46,7 +46,7 @@ fn the_option_sets_the_maximum_depth() {
     assert_ne!(place.read("option.exr"), place.read("plain.exr"));
 }
 
-/// Checks that the warning about ignored keys is the same for the option and the key.
+/// The option and the key give the same warning about ignored keys.
 #[test]
 fn the_integrator_option_overrides_the_scene() {
     let place = TestFolder::new();
@@ -127,7 +127,7 @@ fn devices_are_selected_by_kind_and_by_part_of_a_name() {
     }
 }
 
-/// Software Vulkan rounds quotients and square roots correctly, so that the option has no effect.
+/// Software Vulkan rounds quotients and square roots correctly, so the option has no effect.
 #[test]
 fn rounding_in_software_gives_the_same_image() {
     let place = TestFolder::new();

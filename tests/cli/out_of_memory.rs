@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::TestFolder;
 
-/// Writes a scene with a mesh that needs several hundred megabytes.
+/// Writes a scene with a mesh of several hundred megabytes.
 fn large(place: &TestFolder) {
     const SIDE: usize = 300;
     let mut mesh = String::new();
@@ -29,8 +29,7 @@ fn large(place: &TestFolder) {
     );
 }
 
-/// Checks that the program, whichever allocation fails first, prints one line, exits with code 7 and leaves no file
-/// behind.
+/// Whichever allocation fails first: one line, no file left behind.
 #[test]
 fn the_program_ends_with_code_7() {
     let place = TestFolder::new();
@@ -67,7 +66,7 @@ fn the_program_ends_with_code_7() {
     assert!(failed > 2 && succeeded > 3, "{failed} failed, {succeeded} succeeded");
 }
 
-/// Checks that other commands do not panic either if a thread cannot be started.
+/// If a thread cannot be started.
 #[test]
 fn other_commands_end_with_code_7() {
     let place = TestFolder::new();
@@ -83,7 +82,7 @@ fn other_commands_end_with_code_7() {
     assert!(failed > 2, "{failed}");
 }
 
-/// Checks that an image too large for the memory is an ordinary error with its size, not a failed allocation.
+/// An image too large for the memory, with its size in the message.
 #[test]
 fn handled_allocations_are_errors() {
     let place = TestFolder::new();

@@ -199,7 +199,7 @@ fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
     }
 }
 
-/// Returns the test scene for the path integrator, with a finite floor.
+/// Returns a scene for the path integrator, with a finite floor.
 fn path_scene(settings: &str) -> String {
     SCENE
         .replace("[render]", &format!("[render]\nintegrator = \"path\"\n{settings}"))
@@ -454,7 +454,7 @@ fn stats_have_the_documented_fields() {
     }
 }
 
-/// If the driver truncates loops and a sample exceeds its limit, the CPU renders instead and a message reports it.
+/// If the driver truncates loops and a sample exceeds its limit; a message reports it.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_on_the_cpu() {
     if crate::adapter::device().is_none() {

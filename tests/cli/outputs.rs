@@ -5,7 +5,6 @@ use std::fs;
 
 use super::{Ran, SCENE, TestFolder};
 
-/// Writes a scene with a texture image, a normal map and an unused texture image.
 fn textured(place: &TestFolder) {
     let texture = |name: &str, file: &str, encoding: &str| {
         image::RgbImage::new(2, 2).save(place.path(file)).unwrap();
@@ -24,7 +23,7 @@ fn textured(place: &TestFolder) {
     place.write("tiles.toml", &scene);
 }
 
-/// Writes a scene with a mesh whose .mtl file has two used materials, one of them textured, and an unused one.
+/// Writes a scene with a mesh whose .mtl file has two used materials, one textured, and an unused one.
 fn with_materials(place: &TestFolder) {
     for name in ["wood.png", "spare.png"] {
         image::RgbImage::new(2, 2).save(place.path(name)).unwrap();
@@ -77,7 +76,6 @@ fn a_mesh_has_the_materials_of_its_file() {
         place.read("a.exr")
     };
     let with_own = picture("box.toml");
-    // The same materials, defined in the scene.
     let material = "[materials.red]\ntype = 'phong'\ncolor = [1, 0, 0]\nspecular = [0, 0, 0]\n";
     let texture = "[textures.wood]\ntype = 'image'\nfile = 'wood.png'\n[materials.wood]\ntype = 'phong'\n\
                    color = { texture = 'wood' }\nspecular = [0, 0, 0]\n";
@@ -89,7 +87,7 @@ fn a_mesh_has_the_materials_of_its_file() {
     assert!(picture("other.toml") != with_own);
 }
 
-/// Checks that the render is rejected and leaves all files unchanged.
+/// Checks that the render is rejected and leaves all files.
 #[track_caller]
 pub fn refused(place: &TestFolder, arguments: &[&str], code: i32, message: &str) {
     let content = |place: &TestFolder| -> Vec<(String, Vec<u8>)> {
@@ -137,7 +135,7 @@ fn no_input_is_replaced() {
     );
     fs::copy(place.path("small.toml"), place.path("scene.png")).unwrap();
     refused(&place, &["scene.png"], 2, &format!("scene.png {foreign}"));
-    // An EXR contains its layers, so that no separate layer file collides.
+    // An EXR contains its layers: no separate file collides.
     place.quietly(&[
         "render",
         "tiles.toml",
@@ -279,7 +277,7 @@ mod unix {
         );
     }
 
-    /// Standard output receives the same bytes as a file.
+    /// The same bytes as a file.
     #[test]
     fn standard_output_receives_an_image_or_statistics() {
         let place = TestFolder::new();
@@ -449,7 +447,7 @@ mod unix {
         );
     }
 
-    /// Checks the mode bits instead of trying to write, as root can write to any file.
+    /// By the mode bits, as root can write to any file.
     #[test]
     fn a_read_only_file_is_not_replaced_and_other_files_keep_their_mode() {
         let place = TestFolder::new();
@@ -474,7 +472,7 @@ mod unix {
         assert_eq!(mode & 0o777, 0o640);
     }
 
-    /// Opening a pipe without a reader blocks; Ctrl+C still ends the program.
+    /// Opening a pipe without a reader blocks.
     #[test]
     fn waiting_for_a_reader_can_be_interrupted() {
         crate::cli::heed_interrupts();

@@ -121,8 +121,7 @@ fn a_failed_output_leaves_no_incomplete_files() {
     ]);
     assert_ne!(ran.code, 0);
     assert!(ran.stderr.contains("/dev/full: cannot be written"), "{}", ran.stderr);
-    // Outputs are renamed one after the other: outputs before the failure may exist and are complete, later ones must
-    // not exist.
+    // Outputs are renamed one after the other: those before the failure may exist, complete; later ones must not.
     assert!(!place.files().contains(&"b.png".to_owned()), "{:?}", place.files());
     assert!(
         place.files().iter().all(|name| !name.starts_with('.')),
@@ -197,7 +196,7 @@ fn options_override_the_view_of_the_scene() {
         shown(&["--exposure", "-2"]),
         plain(&["--view-transform", "khronos-pbr-neutral", "--exposure", "-2"])
     );
-    // An EXR is linear, whatever the view settings. The library writes the same images as the program.
+    // An EXR is linear, whatever the view settings. The library writes the same images.
     place.quietly(&["render", "shown.toml", "--device", "cpu", "-o", "s.exr"]);
     render(&place, &["-o", "p.exr"]);
     assert_eq!(place.read("s.exr"), place.read("p.exr"));
@@ -384,7 +383,7 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
     }
 }
 
-/// Radiance layers use the view settings of the image, albedo only the sRGB curve, and other layers no transform.
+/// Albedo has only the sRGB curve, other layers no transform.
 #[test]
 fn radiance_layers_use_the_view_of_the_image() {
     let place = TestFolder::new();
@@ -609,7 +608,7 @@ fn options_without_an_applicable_output_are_rejected() {
     assert!(samples(&place.path("b")).contains_key("R"));
 }
 
-/// Such an image is rejected before the render, which would take long.
+/// Before the render, which would take long.
 #[test]
 fn images_too_large_for_a_format_are_rejected() {
     let place = TestFolder::new();
@@ -632,7 +631,7 @@ fn images_too_large_for_a_format_are_rejected() {
             message,
         );
     }
-    // A crop within the limits is accepted, and the maximum sizes are written.
+    // A crop within the limits, and the maximum sizes.
     let crop = [
         "--size",
         "65536x60000",

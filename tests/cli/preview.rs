@@ -9,7 +9,7 @@ use wgray::image::read_metadata;
 
 use super::{Ran, TestFolder, heed_interrupts, program, project_scene};
 
-/// A render that takes minutes, with passes of some hundredths of a second.
+/// Takes minutes, with passes of some hundredths of a second.
 const LONG: [&str; 8] = [
     "render",
     "small.toml",
@@ -25,7 +25,6 @@ fn start(place: &TestFolder, arguments: &[&str]) -> Child {
     start_in_shell(place, "", arguments)
 }
 
-/// Starts the long render with a preceding line of shell code.
 fn start_in_shell(place: &TestFolder, line: &str, arguments: &[&str]) -> Child {
     heed_interrupts();
     Command::new("sh")
@@ -63,7 +62,7 @@ fn ended(child: Child) -> Ran {
     Ran::new(output.status.code(), String::new(), &stderr, &[])
 }
 
-/// Returns the number of samples and of requested samples of a file that is marked as partial.
+/// Returns samples and requested samples of a file that is marked as partial.
 fn partial(path: &Path) -> Option<(u32, u32)> {
     let metadata = read_metadata(path).expect("metadata");
     let text = metadata.get("partial")?.strip_suffix(" samples").expect("samples");
@@ -71,7 +70,6 @@ fn partial(path: &Path) -> Option<(u32, u32)> {
     Some((samples.parse().expect("a number"), of.parse().expect("a number")))
 }
 
-/// Returns the contents of all files and removes the files.
 fn take_files(place: &TestFolder) -> Vec<(String, Vec<u8>)> {
     let files = place.files().into_iter();
     let files: Vec<_> = files.map(|name| (name.clone(), place.read(&name))).collect();
@@ -130,7 +128,7 @@ fn the_complete_files_are_the_same_with_and_without_previews() {
     }
 }
 
-/// Returns true if an image has the same pixels as a render with `samples` samples and the further options `more`.
+/// Returns true if the image equals a render with `samples` samples and the options `more`.
 fn has_pixels_of(place: &TestFolder, file: &str, samples: u32, more: &[&str]) -> bool {
     let spp = samples.to_string();
     let size = ["render", "small.toml", "--size", "150x100", "--device", "cpu"];
@@ -184,7 +182,6 @@ fn a_signal_leaves_the_last_complete_pass() {
         expected.sort_unstable();
         assert_eq!(place.files(), expected);
         assert!(samples > first, "{samples}");
-        // The pixels are those of a render with exactly as many samples.
         assert!(has_pixels_of(&place, "first.exr", first, &more[..2]));
         assert!(has_pixels_of(&place, "out.exr", samples, &more[..2]));
         assert!(!has_pixels_of(&place, "out.exr", samples + 1, &more[..2]));
@@ -271,7 +268,7 @@ fn files_with_more_samples_stay() {
     );
     assert!(ran.summary.is_empty() && !place.path("stats.json").exists());
     assert_eq!(files.map(|file| place.read(file)), before);
-    // A complete image replaces all files; a preview replaces a file with as many samples.
+    // A preview replaces a file with as many samples.
     let ran = render(&[&outputs[..], &["--preview", "--spp", "2"]].concat());
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(files.iter().all(|file| partial(&place.path(file)).is_none()));

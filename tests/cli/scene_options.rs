@@ -4,7 +4,6 @@ use std::fs;
 
 use super::{SCENE, TestFolder, read_png};
 
-/// A sphere of a principled material under a gray environment.
 const BALL: &str = "image = { width = 12, height = 8 }\n\
                     camera = { position = [0, -4, 1], look_at = [0.5, 0, 0], fov = 40 }\n\
                     render = { integrator = 'path', pixel_samples = { count = 4 } }\n\
@@ -20,7 +19,6 @@ fn quietly(place: &TestFolder, arguments: &[&str]) {
     place.quietly(&[&["render"], arguments, &["--device", "cpu"]].concat());
 }
 
-/// Writes an environment map of 4 x 2 texels with a gradient.
 fn write_room(place: &TestFolder, name: &str) {
     let room = image::Rgb32FImage::from_fn(4, 2, |x, y| image::Rgb([1.0 + x as f32, 0.5, 0.25 + y as f32]));
     room.save(place.path(name)).unwrap();
@@ -192,7 +190,7 @@ fn a_turntable_is_one_full_turn() {
     let names = ["t.01.exr", "t.02.exr", "t.03.exr", "t.04.exr"];
     let found = place.files_but(|name| !name.starts_with("t."));
     assert_eq!(found, names);
-    // The first frame is the still image. After a quarter turn the camera is at +x of its target, after a half at +y.
+    // The first frame is the still image. A quarter turn is at +x of the target, a half at +y.
     assert_eq!(place.read("t.01.exr"), place.read("still.exr"));
     assert_eq!(place.read("t.03.exr"), place.read("alone.exr"));
     let at = |position: &str, name: &str| {

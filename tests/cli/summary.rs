@@ -2,7 +2,7 @@
 
 use super::{SCENE, TestFolder, is_summary};
 
-/// Removes the time from a summary, as it differs between runs.
+/// Removes the time, which differs between runs.
 fn without_time(line: &str) -> String {
     let (rest, _) = line.rsplit_once(", ").unwrap_or((line, ""));
     rest.to_owned()
@@ -44,7 +44,7 @@ fn a_render_ends_with_a_summary_line() {
         stream.summary
     );
     assert!(place.read("piped.png").starts_with(b"\x89PNG"));
-    // In JSON, the message "render done" replaces the summary line.
+    // "render done" replaces the summary line.
     let json = place.run(&[
         "render",
         "small.toml",
@@ -57,7 +57,6 @@ fn a_render_ends_with_a_summary_line() {
     ]);
     assert_eq!(json.summary, [""; 0]);
     assert!(json.stderr.contains("\"render done\""), "{}", json.stderr);
-    // A failed render prints no summary.
     let failed = place.run(&["render", "small.toml", "-o", "missing/a.png"]);
     assert_eq!((failed.code, failed.summary.len()), (8, 0));
 }
@@ -88,7 +87,7 @@ fn a_default_name_replaces_images_of_this_program_only() {
     let ours = place.read("small.png");
     place.quietly(&[&options[..], &["--reproducible", "--bit-depth", "16"]].concat());
     assert_ne!(place.read("small.png"), ours, "its own image is replaced");
-    // Writing the image again removes the chunk that names wgray as its author, as in an image of another program.
+    // Rewriting the image removes the chunk that names wgray as its author.
     let picture = image::load_from_memory(&ours).expect("a PNG");
     picture.save(place.path("small.png")).expect("written");
     let of_others = place.read("small.png");
@@ -99,7 +98,6 @@ fn a_default_name_replaces_images_of_this_program_only() {
         place.write("small.png", content);
         refused(&[], "small.png");
     }
-    // An explicit output name replaces the file.
     place.quietly(&[&options[..], &["-o", "small.png"]].concat());
     place.write("small.depth.png", "notes");
     refused(&["--aov", "depth"], "small.depth.png");

@@ -6,7 +6,6 @@ use wgray_dev::{Against, Command, Frame, View};
 
 use super::running::{Files, KERNEL, Running, SCENE};
 
-/// Returns the pixel of a PNG file.
 fn pixel(png: &[u8], x: u32, y: u32) -> [u8; 3] {
     image::load_from_memory(png).unwrap().into_rgb8().get_pixel(x, y).0
 }

@@ -15,7 +15,7 @@ const MEANS: [(View, Layer); 5] = [
     (View::ShadingNormal, Layer::Normal),
 ];
 
-/// Returns the scene with global illumination and an environment that emits light.
+/// Returns the scene for the path integrator, with an environment.
 fn path() -> String {
     SCENE.replace(
         "[render]",
@@ -30,7 +30,6 @@ fn adaptive() -> String {
     )
 }
 
-/// Returns the finished image of a layer, and its frame.
 #[track_caller]
 fn wait_layer(running: &Running, view: View) -> (FilmLayer, Arc<Frame>) {
     running.wait("the layer", |running| {
@@ -87,7 +86,7 @@ fn layers_equal_those_of_render_and_sum_to_the_image() {
             let sum = [0, 1, 2].map(|c| direct[c] + indirect[c] + emission[c]);
             assert!(close(*color, sum), "pixel {i}: {color:?} {sum:?}");
         }
-        // When color is selected again, its kernel and its image are still cached.
+        // The kernel and the image of color are still cached.
         running.session.send(Command::View(View::Color));
         running.wait("light", |running| {
             let frame = running.frame()?;

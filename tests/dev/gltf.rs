@@ -36,7 +36,7 @@ fn start(folder: &Path, name: &str) -> Running {
     Running::start(sources, None)
 }
 
-/// Waits for a complete image in whose center, on the large box, this channel is the strongest.
+/// Waits for an image in whose center, on the large box, this channel is the strongest.
 fn wait_for(running: &Running, strongest: [f64; 3]) {
     let wanted = strongest.map(|value| value > 0.5);
     running.wait("the image of the file", |running| {
@@ -59,13 +59,13 @@ fn saving_a_model_updates_the_image() {
     write(RED);
     let running = start(folder.path(), "box.glb");
     wait_for(&running, RED);
-    // The file is overwritten in place, as exporters do, and then replaced by renaming another file.
+    // Overwritten in place, as exporters do, then replaced by a rename.
     write(GREEN);
     wait_for(&running, GREEN);
     model(BLUE).write_glb(folder.path(), "new~");
     fs::rename(folder.path().join("new~"), folder.path().join("box.glb")).unwrap();
     wait_for(&running, BLUE);
-    // An incomplete file is reported as an error until the rest is written.
+    // Incomplete: an error until the rest is written.
     let whole = model(RED).glb();
     fs::write(folder.path().join("box.glb"), &whole[..whole.len() / 2]).unwrap();
     assert!(running.wait_problem().message.contains("box.glb: "));
@@ -73,8 +73,7 @@ fn saving_a_model_updates_the_image() {
     wait_for(&running, RED);
 }
 
-/// Writes a file in pieces, as an exporter does: incomplete pieces cause no error, and the state reports that files are
-/// being read.
+/// Incomplete pieces cause no error; the state reports that files are being read.
 #[test]
 fn incomplete_files_of_an_exporter_cause_no_error() {
     let folder = TempDir::new().unwrap();
@@ -83,7 +82,7 @@ fn incomplete_files_of_an_exporter_cause_no_error() {
     let running = start(folder.path(), "box.glb");
     wait_for(&running, RED);
     let whole = model(GREEN).glb();
-    // On a busy machine the writer may pause for so long that the file seems complete.
+    // On a busy machine the writer may pause until the file seems complete.
     let shows_no_error = (0..20).any(|_| {
         let [start, mut written] = [Instant::now(); 2];
         let (mut was_read, mut has_paused) = (false, false);
@@ -120,7 +119,7 @@ fn files_that_a_model_refers_to_are_watched() {
     wait_for(&running, RED);
     model(GREEN).write_gltf(folder.path(), "box");
     wait_for(&running, GREEN);
-    // Only the buffer is removed and restored: an error without it, then the image again.
+    // Without the buffer an error, then the image again.
     let buffer = folder.path().join("box.bin");
     let bytes = fs::read(&buffer).unwrap();
     fs::remove_file(&buffer).unwrap();

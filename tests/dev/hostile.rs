@@ -90,7 +90,6 @@ fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
         (set(&"[0]".repeat(1000), &json!(1)), "must"),
         (set(&"a".repeat(3900), &json!(1)), nothing),
         (set("", &json!(1)), "must be"),
-        // messages of other forms
         ("{\"set\":{\"path\":\"render.seed\"}}".to_owned(), unknown),
         ("{\"set\":{\"path\":5,\"value\":1}}".to_owned(), unknown),
         ("{\"set\":{\"path\":[\"render\"],\"value\":1}}".to_owned(), unknown),
@@ -123,7 +122,7 @@ fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert_eq!(session.state().undo, None);
-    // Control: a valid message takes effect, and none of the messages above did.
+    // Control: a valid message takes effect; none above did.
     let mut other = Viewer::new(address);
     other.say(set("shapes[0].radius", &json!(0.25)).as_bytes()).unwrap();
     session.wait("the value that is right", |_| {
@@ -131,7 +130,7 @@ fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
     });
     session.wait_rendered(&files);
 
-    // Messages that are not text, or far too long, only close their own connection.
+    // Not text, or too long: only its own connection closes.
     for message in [&b"\xff\xfe{"[..], set(&"a".repeat(1 << 20), &json!(1)).as_bytes()] {
         let mut other = Viewer::new(address);
         let _ = other.say(message); // the server may close the connection during the message

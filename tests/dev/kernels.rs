@@ -43,7 +43,7 @@ fn errors_in_unused_kernels_are_reported_at_once() {
         );
     }
     assert_eq!(running.colors(), good);
-    // The session continues with the last valid shaders, including that kernel.
+    // The session continues with the last valid shaders.
     let revision = running.revision();
     running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
     running.wait_done(revision);
@@ -62,7 +62,7 @@ fn errors_in_unused_kernels_are_reported_at_once() {
     running.wait_rendered(&files);
 }
 
-/// Adds a loop of a million iterations to a shader. It does not change the result, but no compiler can remove it.
+/// Adds a loop of a million iterations without effect that no compiler can remove.
 fn long_loop(files: &Files, file: &str, before: &str) {
     let rounds = "var rounds = 0u;
     for (var i = 0u; i < 1000000u + 0u * params.origin.x; i++) { rounds += (rounds ^ i) & params.loop_probe.y; }
@@ -110,7 +110,7 @@ fn a_truncated_loop_is_reported_or_the_image_is_complete() {
     );
     running.wait_rendered(&files);
 
-    // The loop is in a kernel of another view: only that view reports the error.
+    // The loop is in a kernel of another view, which alone reports the error.
     long_loop(&files, FIRST_HITS, "let pixel = params.origin");
     running.wait_well();
     running.session.send(Command::View(View::Normal));

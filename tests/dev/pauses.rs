@@ -68,7 +68,7 @@ fn the_time_to_an_image_contains_the_time_to_compile() {
     running.wait_rendered(&files);
     files.tint(0.5);
     running.wait_rendered(&files);
-    // A preview size that the viewer chooses is not reported as an image that is too large to display.
+    // A preview size that the viewer chooses is not reported as too large to display.
     running.session.send(Command::Preview(Preview::try_from(2).unwrap()));
     running.wait("a preview", |running| {
         (running.frame()?.header.finest == [20, 15]).then_some(())

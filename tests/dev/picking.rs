@@ -9,20 +9,19 @@ use wgray_dev::{Command, Object, SceneView, Set, Sources};
 use super::running::{Files, Running};
 use crate::model::Model;
 
-/// A view of 40 x 30 pixels from -y. Its width covers nearly x = -2 to 2.
+/// From -y; the width covers nearly x = -2 to 2.
 const START: &str = "\
 image = { width = 40, height = 30 }
 camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
 render.pixel_samples = { count = 1 }
 ";
-/// Pixels at the left, in the middle and at the right.
 const LEFT: [u32; 2] = [10, 15];
 const MIDDLE: [u32; 2] = [20, 15];
 const RIGHT: [u32; 2] = [30, 15];
 
 const TILE: &str = "v -0.4 0 -0.4\nv 0.4 0 -0.4\nv 0.4 0 0.4\nv -0.4 0 0.4\nf 1 2 3 4\n";
 
-/// A mesh with materials of its own for the left and the right part.
+/// A mesh with materials for the left and the right part.
 const PAIR: &str = "\
 mtllib pair.mtl
 v -1.4 0 -0.4
@@ -42,7 +41,6 @@ f 5 6 7 8
 ";
 const MTL: &str = "newmtl bark\nKd 0.4 0.2 0.1\nnewmtl leaf\nKd 0.1 0.5 0.1\n";
 
-/// Waits for the scene and returns it.
 fn seen(running: &Running) -> std::sync::Arc<SceneView> {
     running.wait("a scene", |running| running.session.seen.borrow().clone())
 }
@@ -51,13 +49,11 @@ fn groups(object: &Object) -> Vec<&str> {
     object.groups.iter().map(|group| group.name.as_str()).collect()
 }
 
-/// Returns the number of the line with this text.
 #[track_caller]
 fn line(text: &str, of: &str) -> usize {
     1 + text.lines().position(|line| line == of).unwrap()
 }
 
-/// Sets a value and returns the error, if any.
 fn set(running: &Running, path: &str, value: serde_json::Value) -> Option<String> {
     let executed = running.state().executed;
     running.session.send(Command::Set(Set {
@@ -128,7 +124,7 @@ translate = [1, 0, 0]
     let mesh = scene.object("meshes.tile", None);
     let file = mesh.groups[0].fields.iter().find(|field| field.name == "file").unwrap();
     assert!(file.fixed.is_some(), "no viewer says which files are read");
-    // The instance is moved away from the clicked pixel; it is then picked at its new position.
+    // The instance is moved away from the clicked pixel and picked at its new position.
     assert_eq!(set(&running, "instances[1].translate", json!([1, 0, 0.9])), None);
     assert_eq!(
         files.read("scene.toml"),
@@ -186,7 +182,7 @@ materials = {{ leaf = 'leaf' }}
         (groups(&crown), &crown.note),
         (vec!["shapes[0]", "materials.leaf"], &None)
     );
-    // A mesh part can only be assigned materials of the scene, and values of other files cannot be set.
+    // A mesh part only takes materials of the scene; values of other files cannot be set.
     for (path, value, expected) in [
         (
             "shapes[0].materials.leaf",

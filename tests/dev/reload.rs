@@ -153,7 +153,7 @@ fn an_invalid_shader_is_reported_and_the_image_stays() {
     assert!(excerpt.contains("= sun;") && excerpt.contains("^^^"), "{excerpt}");
     std::thread::sleep(SETTLED);
     assert_eq!((running.colors(), running.revision()), (good, revision));
-    // Changes that do not need the invalid shader still take effect.
+    // Changes that do not need the invalid shader take effect.
     running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
     running.wait_done(revision);
     running.session.send(Command::ResetCamera);
@@ -258,7 +258,7 @@ fn saves_by_rename_and_links_are_detected() {
     running.wait_rendered(&files);
     #[cfg(unix)]
     {
-        // The scene becomes a link to a file in another folder, which is then edited; likewise a shader.
+        // Scene and shader become links to files in another folder, which are then edited.
         let elsewhere = Files::new(&SCENE.replace("fov = 40", "fov = 60"));
         for name in ["scene.toml", "shaders/phong.wgsl"] {
             fs::remove_file(files.path(name)).unwrap();
@@ -299,7 +299,7 @@ fn deleted_files_are_reported_until_they_return() {
     files.write("shaders/phong.wgsl", Shaders::built_in().text("phong.wgsl"));
     running.wait_well();
 
-    // A whole folder is removed and restored, as when another branch is checked out.
+    // Checking out another branch does the same.
     for name in ["shaders/kernels", "shaders"] {
         fs::rename(files.path(name), files.path("away")).unwrap();
         assert_eq!(running.wait_problem().kind, "file");
@@ -336,7 +336,7 @@ fn an_edited_texture_updates_the_image() {
     paint([30, 30, 200]);
     running.wait_rendered(&files);
     assert_ne!(running.colors(), red);
-    // A missing or damaged texture is replaced by a stand-in, as in `render`.
+    // A missing or damaged texture has a stand-in, as in `render`.
     fs::remove_dir_all(files.path("textures")).unwrap();
     running.wait_rendered(&files);
     assert_ne!(running.colors(), red);
@@ -393,7 +393,6 @@ fn a_finished_kernel_is_shown_while_a_newer_save_waits_for_the_compiler() {
         std::thread::sleep((compile / 3).max(Duration::from_millis(60)));
     }
     assert!(saves > 1);
-    // Finally the latest save is shown.
     running.wait_rendered(&files);
 }
 
@@ -418,7 +417,7 @@ fn a_comment_in_a_shader_is_not_compiled_and_later_errors_have_the_right_line() 
     let text = files.read(KERNEL);
     let line = text.lines().position(|line| line.contains("= sun;")).unwrap() + 1;
     assert_eq!(running.wait_problem().line, Some(line));
-    // The same with an additional comment above it: the line of the error moves.
+    // A comment above it moves the line of the error.
     files.write(KERNEL, &format!("// zero\n{text}"));
     running.wait("the error at its new line", |running| {
         (running.state().problems.first()?.line == Some(line + 1)).then_some(())
@@ -440,7 +439,7 @@ fn reading_a_changed_scene_is_reported_until_it_is_read() {
     files.write("scene.toml", SCENE);
     running.wait_rendered(&files);
     running.wait("the end", |running| (!running.state().reading).then_some(()));
-    // The file returns to its previous content before it is read again: `reading` must end in this case, too.
+    // If the file returns to its previous content before it is read again, `reading` must end, too.
     files.write("scene.toml", half);
     running.wait("reading", |running| running.state().reading.then_some(()));
     files.write("scene.toml", SCENE);

@@ -18,7 +18,7 @@ use wgray_render::job::{self, WorkSplit};
 use wgray_render::pack::pack;
 use wgray_render::records::Packed;
 
-/// Timeout of all waits, sufficient even on a busy machine.
+/// Timeout of all waits, even on a busy machine.
 pub const LONGEST: Duration = Duration::from_secs(40);
 /// Time after which a session without events is idle.
 pub const SETTLED: Duration = Duration::from_millis(400);
@@ -152,7 +152,7 @@ impl Files {
         Pixels { width, height, colors }
     }
 
-    /// Returns `value` of each pixel of the film that `render` makes of a scene.
+    /// Returns `value` of each pixel of the film that `render` makes.
     pub fn rendered_as<T>(&self, packed: &Packed, value: &dyn Fn(&Film, usize) -> T) -> Vec<T> {
         let device = choose(&AdapterChoice::Auto).unwrap();
         let shaders = Shaders::read(&self.path("shaders")).unwrap();
@@ -183,7 +183,7 @@ pub struct Running {
     pub session: Session,
 }
 
-/// Serves a session for the rest of the process. Returns the session and its address.
+/// Serves a session for the rest of the process; returns it with its address.
 pub fn serve(running: Running) -> (&'static Running, SocketAddr) {
     let listener = Listener::open("127.0.0.1:0").unwrap();
     let address = listener.address().unwrap();

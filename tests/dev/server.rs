@@ -8,7 +8,6 @@ use wgray_dev::{Command, Listener, Move};
 
 use super::running::{Files, LONGEST, SCENE, serve};
 
-/// Sends a request. Returns the first line and the whole text of the answer.
 fn ask(address: SocketAddr, request: &str) -> (String, String) {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(LONGEST)).unwrap();
@@ -118,7 +117,7 @@ fn the_server_answers_its_own_pages_only() {
     let accepted = ask(address, &upgrade(&own, &format!("Origin: http://{own}\r\n"))).0;
     assert_eq!(accepted, "HTTP/1.1 101 Switching Protocols");
 
-    // The number of viewers is limited, and a viewer that disconnects makes room for another one.
+    // The number of viewers is limited; one that disconnects makes room.
     let request = upgrade(&own, &format!("Origin: http://{own}\r\n"));
     let mut open = Vec::new();
     let full = loop {
@@ -141,7 +140,7 @@ fn the_server_answers_its_own_pages_only() {
         session.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         session.wait_done(revision);
     }
-    // A message that is too large ends the connection: 5,000 bytes of text, masked with zeros.
+    // Too large, which ends the connection: 5,000 bytes of text, masked with zeros.
     let mut large = vec![0x81, 0x80 | 126, 0x13, 0x88, 0, 0, 0, 0];
     large.resize(8 + 5000, b' ');
     let mut stream = open.pop().unwrap();

@@ -7,7 +7,6 @@ use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
 
 const FILE: &str = "kernels/render.wgsl";
 
-/// Adds declarations to the kernel and multiplies its radiance by an expression.
 fn declare(files: &Files, declared: &str, factor: &str) {
     let text = files.read(KERNEL);
     let text = text.replace(RADIANCE, &format!("({RADIANCE} * vec4f(vec3f({factor}), 1.0))"));
@@ -30,7 +29,6 @@ fn line_of(files: &Files, what: &str) -> usize {
     text.lines().position(|line| line.contains(what)).unwrap() + 1
 }
 
-/// Waits for a complete image that equals `wanted`.
 #[track_caller]
 fn wait_for(running: &Running, wanted: &Pixels) {
     running.wait("the image of the sliders", |running| {
@@ -39,7 +37,7 @@ fn wait_for(running: &Running, wanted: &Pixels) {
     });
 }
 
-/// Returns the image that `render` makes of the files after edits of the kernel.
+/// Returns the image that `render` makes after edits of the kernel.
 fn rendered(files: &Files, edits: &[(&str, &str)]) -> Pixels {
     let text = files.read(KERNEL);
     let edited = Files::new(&files.read("scene.toml"));
@@ -104,7 +102,7 @@ fn a_slider_equals_an_edit_without_a_compilation() {
     running.session.send(Command::ResetSliders);
     wait_for(&running, &first);
 
-    // The range and the line number of a slider follow the file without a compilation.
+    // Range and line of a slider follow the file without a compilation.
     files.edit(
         KERNEL,
         "override tint: f32 = 0.5; // 0..1",
@@ -115,7 +113,7 @@ fn a_slider_equals_an_edit_without_a_compilation() {
     });
     assert_eq!(slider(&running, "tint").slider.line, wanted.slider.line + 1);
     assert_eq!(running.state().compile_seconds, compiled);
-    // An edited value in the file replaces that of its slider. Other sliders keep their values through a compilation.
+    // An edited value in the file replaces that of its slider; other sliders keep theirs through a compilation.
     slide(&running, "tint", Value::Number(0.9));
     slide(&running, "level", Value::Number(5.0));
     files.edit(KERNEL, "tint: f32 = 0.5", "tint: f32 = 0.75");

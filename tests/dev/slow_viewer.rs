@@ -8,7 +8,7 @@ use wgray_dev::{Command, Move};
 use super::running::{Files, SCENE, serve};
 use super::viewer::{Received, Viewer};
 
-/// Returns a scene with noisy frames, which PNG hardly compresses.
+/// Returns noisy frames, which PNG hardly compresses.
 fn noisy() -> String {
     SCENE
         .replace("width = 40", "width = 320")
@@ -37,7 +37,7 @@ fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
         session.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         session.wait_done(revision);
     }
-    // Without acknowledgements, the viewer receives two frames and every state.
+    // Without acknowledgements: two frames and every state.
     let newest = session.state().frame;
     while states < newest {
         match viewer.receive().unwrap() {
@@ -52,7 +52,7 @@ fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
         }
     }
     assert_eq!(frames.len(), 2, "{frames:?}");
-    // An acknowledgement of one frame permits one more, which is the newest.
+    // One acknowledgement permits one frame, the newest.
     viewer.acknowledge(&frames[0]);
     let next = loop {
         if let Received::Frame(header, _) = viewer.receive().expect("a frame") {

@@ -11,7 +11,7 @@ use super::running::LONGEST;
 /// A connection of a viewer.
 pub struct Viewer {
     stream: TcpStream,
-    /// Maximum number of bytes read per second.
+    /// In bytes per second.
     rate: Option<f64>,
 }
 
@@ -78,7 +78,7 @@ impl Viewer {
         self.stream.set_read_timeout(Some(timeout)).unwrap();
     }
 
-    /// Returns the next message, or `None` at the end of the connection or after the timeout.
+    /// Returns the next message; `None` at the end of the connection or after the timeout.
     pub fn receive(&mut self) -> Option<Received> {
         loop {
             let [kind, short] = self.read::<2>()?;
@@ -102,7 +102,7 @@ impl Viewer {
         }
     }
 
-    /// Returns the next text message, or `None` at the end of the connection or after the timeout.
+    /// Returns the next text message; `None` as for [`Viewer::receive`].
     pub fn hear(&mut self) -> Option<Value> {
         loop {
             if let Received::Text(message) = self.receive()? {
@@ -130,7 +130,7 @@ impl Viewer {
         Some(())
     }
 
-    /// Sends a message that must be rejected, and returns the reason from the answer or from the following state.
+    /// Sends a message that must be rejected; returns the reason, from the answer or the following state.
     #[track_caller]
     pub fn refused(&mut self, text: &str) -> String {
         self.say(text.as_bytes()).unwrap();

@@ -20,7 +20,6 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
         running.session.send(Command::Move(by));
         running.wait_done(revision);
     }
-    // Commands in quick succession are all executed.
     running.session.send(Command::Move(Move::Orbit(-0.1, 0.0)));
     running.session.send(Command::View(View::Normal));
     running.session.send(Command::View(View::Color));
@@ -32,7 +31,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     running.wait("a finished image", settled);
     let state = running.state();
     assert!(state.camera_moved);
-    // The camera's text, pasted into a scene file, gives the displayed image.
+    // The camera's text gives the displayed image.
     let from_text = {
         let (start, end) = (SCENE.find("[camera]").unwrap(), SCENE.find("[render]").unwrap());
         Files::new(&format!("{}{}\n{}", &SCENE[..start], state.camera, &SCENE[end..]))
@@ -57,7 +56,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     assert!(!notice.bad && notice.text.contains("scene.toml"), "{}", notice.text);
     std::thread::sleep(SETTLED);
     assert_eq!(running.revision(), revision, "nothing was rendered again");
-    // Undoing the save restores the text of the file, but not the view.
+    // Undoing restores the text, but not the view.
     assert_eq!(running.state().undo.as_deref(), Some("camera"));
     running.session.send(Command::UndoWrite);
     running.wait("the file to be as it was", |running| {
@@ -129,7 +128,7 @@ fn the_views_show_the_first_hits() {
 
 #[test]
 fn another_view_shows_the_samples_of_a_paused_render() {
-    // The render takes minutes, but soon has a sample of each pixel.
+    // Takes minutes, but soon has a sample of each pixel.
     let long = SCENE
         .replace("width = 40", "width = 120")
         .replace("height = 30", "height = 90");
@@ -200,7 +199,7 @@ fn the_output_file_is_the_finished_image() {
             (picture.dimensions() == (40, 30) && *picture.as_raw() == wanted).then_some(())
         });
     }
-    // Writing the image next to the scene does not trigger a reload, and no temporary file remains.
+    // Writing the image triggers no reload, and no temporary file remains.
     let mut names: Vec<_> = fs::read_dir(files.folder.path())
         .unwrap()
         .map(|entry| entry.unwrap().file_name())

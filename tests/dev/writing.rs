@@ -8,7 +8,6 @@ use wgray_dev::{Command, Move, Set, Sources};
 
 use super::running::{Files, Running, SCENE, SETTLED};
 
-/// Sets a value and waits until the command is executed.
 #[track_caller]
 fn set(running: &Running, path: &str, value: Value, gesture: Option<u64>) {
     let path = path.to_owned();
@@ -24,7 +23,6 @@ fn follow(running: &Running, command: Command) {
     });
 }
 
-/// Returns the error of the last command.
 #[track_caller]
 fn refused(running: &Running) -> String {
     let state = running.state();
@@ -47,7 +45,7 @@ fn a_new_value_is_written_and_shown() {
     running.wait_rendered(&files);
     assert_ne!(running.colors(), before);
     assert_eq!(running.state().undo.as_deref(), Some("materials.red.color"));
-    // Absent keys are added and removed again. A value that equals that of the file is not written.
+    // Absent keys are added and removed. A value equal to the file's is not written.
     set(&running, "shapes[0].radius", json!(0.5), None);
     assert_eq!(running.state().undo.as_deref(), Some("materials.red.color"));
     set(&running, "render.seed", json!(3), None);
@@ -57,7 +55,7 @@ fn a_new_value_is_written_and_shown() {
     // An enumeration value that needs another kernel.
     set(&running, "render.pixel_samples.pattern", json!("random"), None);
     running.wait_rendered(&files);
-    // Changes of the session do not trigger the file watcher; an edit of the file does.
+    // Only edits of the file trigger the watcher.
     let scenes = running.state().scenes;
     std::thread::sleep(SETTLED);
     assert_eq!(running.state().scenes, scenes);
@@ -73,7 +71,6 @@ fn concurrent_saves_of_an_editor_are_kept() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
-    // The editor saves, and the page sets a value before the file is read again.
     for round in 0..10 {
         let fov = |round: i32| format!("fov = {}", 40 + round);
         files.edit("scene.toml", &fov(round), &fov(round + 1));
@@ -101,7 +98,7 @@ fn setting_a_list_element_keeps_the_other_elements() {
     let center = |numbers: &str| start.replace("[0,  0, # here\n 0.5]", numbers);
     assert_eq!(files.read("scene.toml"), center("[0.25,  0, # here\n 1]"));
     running.wait_rendered(&files);
-    // The other elements of an absent list get their default values.
+    // Other elements of an absent list get their defaults.
     set(&running, "camera.up[0]", json!(0.5), None);
     assert!(files.read("scene.toml").contains("fov = 40\nup = [0.5, 0, 1]\n"));
     let text = files.read("scene.toml");
@@ -117,7 +114,6 @@ fn setting_a_list_element_keeps_the_other_elements() {
         assert!(refused(&running).contains(expected), "{path}: {}", refused(&running));
     }
     assert_eq!(files.read("scene.toml"), text);
-    // A valid value clears the error.
     set(&running, "shapes[0].center[0]", json!(0), None);
     let notice = running.state().notice.clone().unwrap();
     assert!(!notice.bad && notice.text.is_empty(), "{notice:?}");
@@ -147,7 +143,7 @@ fn written_values_are_undone_and_redone() {
     assert_eq!(running.state().undo.as_deref(), Some("materials.red.shininess"));
     let last = files.read("scene.toml");
     assert!(last.contains("shininess = 36\r\n"), "{last}");
-    // Saving the camera is an undo step, too. Undoing it keeps the view.
+    // Undoing a saved camera keeps the view.
     follow(&running, Command::Move(Move::Orbit(0.3, 0.1)));
     follow(&running, Command::SaveCamera);
     assert_eq!(running.state().undo.as_deref(), Some("camera"));
@@ -239,7 +235,7 @@ fn changes_of_another_program_are_not_undone() {
     follow(&running, Command::UndoWrite);
     let refused = refused(&running);
     assert!(refused.contains("changed by another program"), "{refused}");
-    // The next change of the page keeps the change of the other program.
+    // Keeps the change of the other program.
     set(&running, "camera.fov", json!(55), None);
     assert_eq!(files.read("scene.toml"), edited.replace("fov = 50", "fov = 55"));
     follow(&running, Command::UndoWrite);
@@ -276,7 +272,7 @@ fn values_overridden_by_options_cannot_be_set() {
         assert_eq!(refused(&running), expected);
         assert_eq!(files.read("scene.toml"), SCENE);
     }
-    // Other values can be set. The defined value stays in effect.
+    // Other values can be set; the defined one stays.
     let revision = running.revision();
     set(&running, "shapes[0].center", json!([0, 0, 0.75]), None);
     running.wait_done(revision);

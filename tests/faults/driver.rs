@@ -10,7 +10,7 @@ use crate::cli::without_summary;
 use crate::sources::path as project;
 use crate::test_folder::TestFolder;
 
-/// A scene of 40 x 30 pixels in which all random numbers differ between pixels.
+/// 40 x 30 pixels in which all random numbers differ.
 pub const SCENE: &str = r#"image = { width = 40, height = 30 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
 [render]
@@ -48,7 +48,7 @@ pub struct Driver {
     lavapipe: PathBuf,
 }
 
-/// Builds the driver. Without lavapipe, returns `None` if `WGRAY_TEST_WITHOUT_GPU` is 1, and panics otherwise.
+/// Builds the driver. Without lavapipe: `None` if `WGRAY_TEST_WITHOUT_GPU` is 1, panics otherwise.
 pub fn driver() -> Option<&'static Driver> {
     static DRIVER: OnceLock<Option<Driver>> = OnceLock::new();
     DRIVER.get_or_init(prepare).as_ref()
@@ -65,7 +65,7 @@ fn prepare() -> Option<Driver> {
     };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faults");
     fs::create_dir_all(&folder).expect("a folder below target/");
-    // Renamed when complete, as other tests may run concurrently.
+    // Renamed when complete, as tests run concurrently.
     let [library, manifest] = ["libfaults.so", "faults.json"].map(|name| folder.join(name));
     let own = tempfile::tempdir_in(&folder).expect("a temporary folder");
     let made = own.path().join("libfaults.so");
@@ -90,7 +90,7 @@ fn prepare() -> Option<Driver> {
     })
 }
 
-/// Returns lavapipe's library and its Vulkan version, from its manifest.
+/// Returns lavapipe's library and Vulkan version.
 fn lavapipe() -> Option<(PathBuf, String)> {
     let mut manifests = Vec::new();
     for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
@@ -141,7 +141,7 @@ impl TestFolder {
         TestFolder::with_file("scene.toml", scene)
     }
 
-    /// Returns a command that runs the program on the driver with these faults.
+    /// Returns a command on the driver with these faults.
     pub fn command_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wgray"));
         command
@@ -153,7 +153,7 @@ impl TestFolder {
         command
     }
 
-    /// Runs the program and checks that it leaves no files except an image.
+    /// Runs the program, which must leave no files except an image.
     pub fn run_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Ran {
         let out = self.path("out.exr");
         for name in ["out.exr", "log"] {

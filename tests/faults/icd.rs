@@ -46,9 +46,9 @@ const RTLD_NODELETE: c_int = 0x1000;
 static SUBMITS: AtomicU64 = AtomicU64::new(0);
 static SUBMITS_OF_DEVICE: AtomicU64 = AtomicU64::new(0);
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// True once a function has returned the loss: every later call returns it, too.
+/// A function has returned the loss; all later calls do, too.
 static LOST: AtomicBool = AtomicBool::new(false);
-/// True if the device is lost, but the function of `FAULTS_LOSE_IN` has not been called yet.
+/// The device is lost, but the function of `FAULTS_LOSE_IN` has not been called.
 static LOST_UNTOLD: AtomicBool = AtomicBool::new(false);
 /// Number of device creations still to fail.
 static TO_REFUSE: AtomicI64 = AtomicI64::new(-1);
@@ -63,7 +63,6 @@ fn log(line: &str) {
     let _ = file.and_then(|mut file| writeln!(file, "{line}"));
 }
 
-/// Returns a function of the wrapped driver.
 fn of_driver(name: &CStr) -> *mut c_void {
     let path = std::env::var("FAULTS_DRIVER").expect("FAULTS_DRIVER names a driver");
     let path = CString::new(path).expect("a path");
@@ -97,12 +96,12 @@ pub unsafe extern "system" fn vk_icdGetInstanceProcAddr(instance: Handle, name: 
     unsafe { replaced(name, real(instance, name)) }
 }
 
-/// Functions that replace those of the driver: names, static for the driver's function, replacement and its type.
+/// Replacements of driver functions: names, static for the driver's function, replacement and its type.
 macro_rules! replacements {
     ($($name:literal $($other:literal)* => $place:ident, $function:ident: fn($($ty:ty),*) -> $result:ty;)*) => {
         $(static $place: AtomicPtr<c_void> = AtomicPtr::new(null_mut());)*
 
-        /// Returns the replacement of a function of the driver, or the function itself.
+        /// Returns the replacement of a function, or the function itself.
         unsafe fn replaced(name: *const c_char, real: Function) -> Function {
             if real.is_null() {
                 return real;
@@ -185,7 +184,7 @@ unsafe extern "system" fn allocate_memory(device: Handle, info: *const Allocatio
     unsafe { real::allocate_memory()(device, info, host, out) }
 }
 
-/// Returns true if a submit loses the device; `number` counts over the process, `of_device` over the device.
+/// Returns true if a submit loses the device; `number` counts in the process, `of_device` on the device.
 fn loses(number: u64, of_device: u64) -> bool {
     let Ok(which) = std::env::var("FAULTS_LOSE") else {
         return false;
@@ -204,7 +203,7 @@ fn lose(by: &str) -> Code {
     DEVICE_LOST
 }
 
-/// Returns true if `by` is the function that returns the pending loss first.
+/// Returns true if `by` returns the pending loss first.
 fn tells(by: &str) -> bool {
     LOST_UNTOLD.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == by)
 }
@@ -232,7 +231,7 @@ unsafe fn submit(queue: Handle, forward: impl FnOnce() -> Code) -> Code {
     if !loses(number, of_device) {
         return forward();
     }
-    // The wrapped driver finishes all work before the loss is returned, so that its objects can be released safely.
+    // The wrapped driver first finishes all work, so that its objects can be released.
     let at_once = std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first != "submit");
     let code = if at_once { forward() } else { SUCCESS };
     unsafe { real::queue_wait_idle()(queue) };
@@ -251,7 +250,7 @@ unsafe extern "system" fn queue_submit_2(queue: Handle, count: u32, submits: Han
     unsafe { submit(queue, || real::queue_submit_2()(queue, count, submits, fence)) }
 }
 
-/// Returns the loss if the device is lost, and forwards the call otherwise.
+/// Returns the loss if the device is lost; otherwise forwards the call.
 fn asked(by: &str, forward: impl FnOnce() -> Code) -> Code {
     if LOST.load(SeqCst) {
         return DEVICE_LOST;

@@ -20,7 +20,7 @@ fn render(scene: &Scene, device: Device) -> Picture {
     wgray::render(scene, &options).expect("an image")
 }
 
-/// Renders in the child process that [`pictures_survive`] starts; otherwise does nothing.
+/// Renders in the child process that [`pictures_survive`] starts.
 #[test]
 fn in_a_process_of_its_own() {
     let Ok(file) = std::env::var(FILE) else { return };
@@ -29,7 +29,7 @@ fn in_a_process_of_its_own() {
     let picture = render(&scene, Device::Gpu);
     assert!(picture.device().name.starts_with("llvmpipe"));
     assert_eq!(picture.pixels(), expected.pixels());
-    // The callback copies the image from the device after each dispatch.
+    // The callback copies the image after each dispatch.
     let options = Options {
         device: Device::Gpu,
         ..Options::default()
@@ -48,7 +48,7 @@ fn in_a_process_of_its_own() {
 fn pictures_survive() {
     let Some(driver) = driver() else { return };
     let place = TestFolder::of(SCENE);
-    // The first image loses its samples; the second, after 6 submits, its samples and a readback.
+    // The first image loses its samples; the second, after 6 submits, samples and a readback.
     for (lose, losses) in [("2", 1), ("2,7,10", 3), ("999", 0)] {
         let log = place.path("log");
         let _ = std::fs::remove_file(&log); // of the previous run

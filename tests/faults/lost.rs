@@ -8,16 +8,15 @@ use crate::test_folder::TestFolder;
 
 use super::driver::{Ran, SCENE, driver};
 
-/// The functions that may return a loss first.
 const WAYS: [&str; 3] = ["submit", "status", "wait"];
 
-/// Number of submits of [`SCENE`]: the warm-up, the samples, the film, the first hits, and their readback.
+/// Submits of [`SCENE`]: warm-up, samples, film, first hits, readback.
 const SUBMITS: usize = 5;
 
 const GPU: [&str; 2] = ["--device", "gpu"];
 const AUTO: [&str; 2] = ["--device", "auto"];
 
-/// Checks for `reopened` warnings about a re-opened device, followed only by the lines `rest`.
+/// Checks for `reopened` warnings, followed only by the lines `rest`.
 fn warned(ran: &Ran, reopened: usize, rest: &[&str]) {
     let lines = ran.lines();
     assert_eq!(lines.len(), reopened + rest.len(), "{}", ran.stderr);
@@ -47,7 +46,7 @@ fn without_faults_the_driver_renders_as_lavapipe_does() {
         );
         assert!(ran.picture == Some(expected.clone()), "{device:?}");
     }
-    // Negative control: another seed gives another image.
+    // Negative control: another seed.
     let other = place.run_on(driver, &["--device", "gpu", "--seed", "7"], &[]);
     assert!(other.code == 0 && other.picture != Some(expected));
 }
@@ -83,11 +82,11 @@ fn a_device_lost_several_times_is_reopened_each_time() {
     assert_eq!((twice.code, twice.count("lost")), (0, 2), "{}", twice.stderr);
     warned(&twice, 2, &[]);
     assert!(twice.picture == Some(expected.clone()));
-    // Two losses in the samples and, once these are complete, two in the first hits: at the last submit but one and
-    // after the warm-up that follows. Four losses in a row would exceed the limit.
+    // Two losses in the samples, then two in the first hits: at the last submit but one and after the following
+    // warm-up. Four losses in a row would exceed the limit.
     let hits = twice.count("submit") - 1;
     let lose = format!("2,4,{hits},{}", hits + 2);
-    // The number of submits before the first hits depends on timing, so that a run on a busy machine may miss them.
+    // The number of submits before the first hits depends on timing, so a run may miss them.
     let mut runs = (0..5).map(|_| place.run_on(driver, &GPU, &[("FAULTS_LOSE", &lose)]));
     let ran = runs.find(|ran| (ran.code, ran.count("lost")) == (0, 4));
     let ran = ran.unwrap_or_else(|| panic!("{lose}: no run of five survived four losses"));
@@ -95,7 +94,7 @@ fn a_device_lost_several_times_is_reopened_each_time() {
     assert!(ran.picture == Some(expected));
 }
 
-/// Losses in the middle of an image with many dispatches.
+/// Losses in the middle of many dispatches.
 #[test]
 fn a_long_render_survives() {
     let Some(driver) = driver() else { return };
@@ -119,7 +118,7 @@ fn a_permanently_lost_device_is_an_error_or_the_cpu_renders() {
     let Some(driver) = driver() else { return };
     let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
-    // Each run waits for some seconds, hence they run in parallel.
+    // In parallel, as each run waits for some seconds.
     let never = |lose: &str, device: &str| {
         let place = TestFolder::of(SCENE);
         let faults = [("FAULTS_LOSE", lose), ("FAULTS_REFUSE", "99")];
@@ -165,7 +164,7 @@ fn repeated_losses_reach_a_limit() {
     let Some(driver) = driver() else { return };
     let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
-    // In the warm-up the device never becomes ready. In the samples it does, and each loss is reported.
+    // In the warm-up the device never becomes ready; in the samples each loss is reported.
     let again = |lose: &str, reopened: usize| {
         let place = TestFolder::of(SCENE);
         let ran = place.run_on(driver, &GPU, &[("FAULTS_LOSE", lose)]);
@@ -190,7 +189,7 @@ fn repeated_losses_reach_a_limit() {
     });
 }
 
-/// wgpu panics when it drops the queue of a device whose driver returns these codes.
+/// On these codes, wgpu panics when it drops the queue.
 #[test]
 fn a_panic_on_dropping_a_lost_device_is_caught() {
     let Some(driver) = driver() else { return };
@@ -270,7 +269,7 @@ fn waiting_for_a_device_can_be_interrupted() {
 /// Environment variable with the number of random cases.
 const CASES: &str = "WGRAY_TEST_FAULTS";
 
-/// Injects random faults into devices that can or cannot be re-opened. `scripts/test-slow faults` runs many cases.
+/// `scripts/test-slow faults` runs many cases.
 #[test]
 fn random_faults_do_not_change_the_image() {
     let Some(driver) = driver() else { return };
@@ -302,8 +301,7 @@ fn random_faults_do_not_change_the_image() {
     assert!(losses as u64 >= cases, "{losses} losses in {cases} renders");
 }
 
-/// Returns losses a few submits apart, failing device creations after each, and sometimes a lack of memory from some
-/// allocation on.
+/// Returns losses a few submits apart, failing device creations after each, and sometimes a lack of memory.
 fn at_random(draws: &mut Draws) -> Vec<(&'static str, String)> {
     let mut submit = 1 + draws.below(5);
     let mut lose = submit.to_string();
@@ -322,7 +320,6 @@ fn at_random(draws: &mut Draws) -> Vec<(&'static str, String)> {
     faults
 }
 
-/// A deterministic random number generator.
 struct Draws(u64);
 
 impl Draws {

@@ -7,7 +7,6 @@ use super::driver::{Ran, SCENE, driver};
 const ADVICE: &str = "; render a crop or a smaller image, or use the CPU \
                       (--crop, --size, --device cpu)\n";
 
-/// Checks for a single out-of-memory error that contains `parts`.
 fn told(ran: &Ran, parts: &[&str]) {
     assert_eq!((ran.code, ran.picture.is_some()), (7, false), "{}", ran.stderr);
     assert!(ran.stderr.starts_with("error: llvmpipe"), "{}", ran.stderr);
@@ -51,7 +50,7 @@ fn a_film_that_does_not_fit_is_reported_with_its_size() {
     assert!(ran.picture == Some(expected));
 }
 
-/// Fails each allocation in turn: those of opening the device, of the film and of the readbacks.
+/// Each allocation of the device, the film and the readbacks fails in turn.
 #[test]
 fn exhausted_memory_is_reported_or_the_cpu_renders() {
     let Some(driver) = driver() else { return };

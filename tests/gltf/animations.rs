@@ -36,7 +36,6 @@ fn animate<const N: usize>(
     );
 }
 
-/// Returns the triangles of the transformed [`QUAD`].
 fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
     let p = QUAD.map(|corner| map(DVec3::from_array(corner)).to_array());
     [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
@@ -132,7 +131,7 @@ fn rotations_on_splines_are_normalized() {
     let (a, b) = (DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::Z, 2.0));
     let keys = [[0.0; 4], a.to_array(), [0.0; 4], [0.0; 4], b.to_array(), [0.0; 4]];
     let builder = moving("rotation", "CUBICSPLINE", &[0.0, 1.0], &keys);
-    // Zero tangents: both values have weight 1/2.
+    // Both values have weight 1/2.
     let half = (a + b).normalize();
     let known = move |_: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| half * p) };
     assert_at(&builder, "turn-cubic", known, &[0.5]);
@@ -276,7 +275,7 @@ fn morph_target_weights_may_be_animated() {
     assert_corners(&scene, &quad_by(|p| p + DVec3::new(1.0, 0.5, 0.0)));
 }
 
-/// Returns a strip whose lower corners follow the first joint and whose upper ones follow the second.
+/// Returns a strip whose lower corners follow the first joint, the upper ones the second.
 fn arm(component: Component) -> Builder {
     let mut builder = Builder::new();
     let points = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 2.0, 0.0], [1.0, 2.0, 0.0]];

@@ -76,7 +76,7 @@ pub const QUAD: [[f64; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0,
 pub const QUAD_UVS: [[f64; 2]; 4] = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
 pub const QUAD_INDICES: [u32; 6] = [0, 1, 2, 0, 2, 3];
 
-/// Returns columns and rows of an accessor type. Matrix columns start at multiples of 4 bytes.
+/// Returns columns and rows. Matrix columns start at multiples of 4 bytes.
 fn shape(kind: &str) -> (usize, usize) {
     match kind {
         "SCALAR" => (1, 1),
@@ -168,7 +168,7 @@ impl Builder {
         )
     }
 
-    /// Adds a vertex attribute with `min` and `max` and 4-byte alignment. Returns the accessor.
+    /// Adds a vertex attribute with `min` and `max`, 4-byte aligned. Returns the accessor.
     pub fn attribute<const N: usize>(&mut self, component: Component, normalized: bool, values: &[[f64; N]]) -> usize {
         let kind = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][N];
         let stored = |value: f64| match (component, normalized) {
@@ -214,7 +214,7 @@ impl Builder {
         self.attribute(Component::F32, false, values)
     }
 
-    /// Adds floats that are not a vertex attribute, such as keys of an animation. Returns the accessor.
+    /// Adds floats that are not a vertex attribute, such as animation keys. Returns the accessor.
     pub fn samples<const N: usize>(&mut self, values: &[[f64; N]]) -> usize {
         let index = self.floats(values);
         let view = self.get("accessors")[index]["bufferView"].as_u64().expect("a view") as usize;
@@ -237,7 +237,7 @@ impl Builder {
         index
     }
 
-    /// Adds positions, normals and texture coordinates of [`QUAD`]. Returns the attributes.
+    /// Adds the attributes of [`QUAD`] and returns them.
     pub fn quad_attributes(&mut self) -> Value {
         let position = self.floats(&QUAD);
         let normal = self.floats(&[[0.0, 0.0, 1.0]; 4]);
@@ -336,8 +336,7 @@ impl Builder {
         file
     }
 
-    /// Writes `NAME.glb` or `NAME.gltf` and returns its path. `WGRAY_TEST_GLTF` is a folder for a copy for
-    /// `scripts/check-gltf`.
+    /// Writes `NAME.glb` or `NAME.gltf`. `WGRAY_TEST_GLTF` is a folder for a copy for `scripts/check-gltf`.
     pub fn write(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
         if let Some(kept) = std::env::var_os("WGRAY_TEST_GLTF") {
             self.write_into(Path::new(&kept), name, packing);

@@ -71,7 +71,6 @@ fn the_files_camera_is_where_its_node_is() {
         let wide = perspective["aspectRatio"].is_number();
         let builder = seen_by(json!({ "type": "perspective", "perspective": perspective }));
         let scene = load(&builder, name);
-        // The camera's aspect ratio applies.
         assert_eq!((scene.width, scene.height), (720, if wide { 360 } else { 720 }));
         let camera = scene.camera;
         assert_near(to_file(camera.position).to_array(), [1.0, 2.0, 5.0]);
@@ -130,7 +129,7 @@ fn a_file_without_a_camera_is_framed() {
                 most = most.max((to.dot(to_file(axis)) / away / (fov / 2.0).tan()).abs());
             }
         }
-        // The model is inside of the image and covers at least half of its extent.
+        // Inside the image, over at least half of its extent.
         assert!(most < 1.0 && most > 0.5, "{scale:?}: {most}");
         assert!(to_file(camera.forward).z < 0.0, "{:?}", camera.forward);
     }

@@ -16,7 +16,6 @@ fn load(file: &Path, strict: bool) -> Result<Scene, String> {
     Scene::load_with(file, &overrides).map_err(|error| error.to_string())
 }
 
-/// Returns the number of triangles of all meshes.
 fn triangles(scene: &Scene) -> usize {
     let meshes = wgray_render::pack::pack(scene).bvh.meshes;
     meshes.iter().map(|mesh| mesh.triangles.len()).sum()
@@ -102,7 +101,7 @@ fn triangles_without_a_position_are_left_out() {
             builder.root_node(json!({ "mesh": mesh }));
             let whole = builder.quad(None);
             builder.root_node(json!({ "mesh": whole }));
-            // JSON has no NaN, so that the bounds are those of the valid vertices.
+            // JSON has no NaN: the bounds are those of the valid vertices.
             builder.get("accessors")[position]["min"] = json!([-1, -1, 0]);
             builder.get("accessors")[position]["max"] = json!([9, 9, 0]);
             let file = builder.write_unsound(place.folder(), "positions", Packing::Binary);
@@ -148,7 +147,7 @@ fn a_node_may_have_any_scale() {
             "{scale}: {wide}"
         );
     }
-    // Triangles that a node scales beyond the coordinate limit are left out.
+    // Scaled beyond the coordinate limit.
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh }));

@@ -8,7 +8,6 @@ use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES, QUAD_UVS};
 use super::read::{assert_all, assert_corners, corners, pixels, refusal, scene, scene_with, triangles};
 use crate::test_folder::TestFolder;
 
-/// Triangle corners of [`QUAD`].
 const QUAD_CORNERS: [[[f64; 3]; 3]; 2] = [[QUAD[0], QUAD[1], QUAD[2]], [QUAD[0], QUAD[2], QUAD[3]]];
 
 fn quad() -> Builder {
@@ -32,7 +31,6 @@ fn a_buffer_in_the_file_beside_it_and_in_a_data_uri_is_the_same() {
                 assert_eq!((uv.x, uv.y), ((corner.x + 1.0) / 2.0, (1.0 - corner.y) / 2.0));
             }
         }
-        // The files of the scene include a separate buffer.
         let beside = usize::from(packing == Packing::Beside);
         assert_eq!(scene.files.len(), 1 + beside, "{:?}", scene.files);
     }
@@ -58,7 +56,7 @@ fn rounded(component: Component, value: f64) -> f64 {
 
 #[test]
 fn positions_may_be_whole_numbers_of_each_type() {
-    // The scale of the node dequantizes, as in files of quantization tools.
+    // Quantization tools scale the node in this way.
     for component in [Component::I8, Component::U8, Component::I16, Component::U16] {
         for normalized in [false, true] {
             let signed = matches!(component, Component::I8 | Component::I16);
@@ -213,7 +211,6 @@ fn points_and_lines_are_left_out_and_said() {
             .collect::<Vec<_>>()
             .join("\n");
         assert!(notes.contains(word) && notes.contains(".glb"), "{notes:?}");
-        // A file without triangles is an error.
         builder.get("meshes")[0]["primitives"] = json!([other]);
         let message = refusal(&builder, "");
         assert!(message.contains("triangle"), "{message}");
@@ -248,7 +245,7 @@ fn sparse_accessors_replace_what_is_there_or_zeros() {
         accessor["min"] = json!(end(f64::min));
         accessor["max"] = json!(end(f64::max));
         let position = builder.add("accessors", accessor);
-        // Without a base accessor two corners are at the origin, so that only one triangle remains.
+        // Without a base accessor two corners are at the origin: one triangle remains.
         let order: &[u32] = if based { &QUAD_INDICES } else { &[0, 1, 3] };
         let indices = builder.indices(order);
         let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });
@@ -315,7 +312,6 @@ fn without_normals_triangles_are_flat() {
     }
 }
 
-/// Returns an unlit quad with vertex colors.
 fn colored<const N: usize>(component: Component, colors: &[[f64; N]; 4], alpha: &str) -> Builder {
     let mut builder = Builder::new();
     let material = builder.unlit(json!({ "baseColorFactor": [1, 0.5, 1, 1] }));
@@ -335,7 +331,7 @@ fn vertex_colors_of_each_type_are_factors_of_the_base_color() {
         // `OPAQUE` ignores alpha.
         let four = colored(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "OPAQUE");
         assert_all(&scene(&four, &format!("colors-{component:?}-4")), [0.2, 0.2, 0.8]);
-        // Alpha below the cutoff: the white environment is visible.
+        // Below the cutoff: the white environment.
         let mask = colored(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "MASK");
         assert_all(&scene(&mask, &format!("colors-{component:?}-mask")), [1.0, 1.0, 1.0]);
     }
@@ -384,7 +380,7 @@ fn morph_targets_are_added_by_their_weights() {
     for normal in triangles(&by_mesh).iter().flat_map(|triangle| triangle.normals) {
         assert!(normal.distance(bent) < 1e-5, "{normal}, not {bent}");
     }
-    // Weights of the node override those of the mesh.
+    // Those of the node override those of the mesh.
     builder.get("nodes")[node]["weights"] = json!([1.0, -0.5]);
     assert_corners(&scene(&builder, "morph-node"), &known(1.0, -0.5));
     // Instances have independent weights.

@@ -39,7 +39,7 @@ fn candelas_are_intensity() {
 fn lux_are_irradiance() {
     let light = json!({ "type": "directional", "intensity": 3, "color": [1, 0.5, 0.25] });
     match &scene(&lit(light), "light-directional").lights[..] {
-        // Emission is along -z of the node, which points down.
+        // -z of the node points down.
         [Light::Directional { direction, color }] => {
             assert_near(to_file(*direction).to_array(), [0.0, -1.0, 0.0]);
             assert_near(color.to_array(), [3.0, 1.5, 0.75]);
@@ -108,7 +108,7 @@ fn a_rough_white_surface_under_lux_has_the_closed_form_radiance() {
     let lights = json!([{ "type": "directional", "intensity": 5 }, { "type": "point", "intensity": 12 }]);
     builder.set("extensions", json!({ "KHR_lights_punctual": { "lights": lights } }));
     builder.root_node(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
-    // Far enough for an irradiance that is uniform to 1e-4.
+    // The irradiance is uniform to 1e-4.
     builder.root_node(json!({ "translation": [0, 0, 100], "extensions": { "KHR_lights_punctual": { "light": 1 } } }));
     builder.get("extensions")["KHR_lights_punctual"]["lights"][1]["intensity"] = json!(20_000);
     let place = TestFolder::with_file("a", "");

@@ -20,7 +20,6 @@ fn quad_of(material: Value) -> Builder {
     builder
 }
 
-/// Returns a dielectric with one extension.
 fn extended(extension: &str, values: Value) -> Value {
     json!({
         "pbrMetallicRoughness": { "metallicFactor": 0 },
@@ -44,7 +43,6 @@ fn defaults_match_the_specification() {
         assert_eq!(plain_color(material.emission), [0.0; 3]);
         assert_eq!(principled.alpha_mode, AlphaMode::Opaque);
         assert_eq!(material.normal_map, None);
-        // Defaults of extensions.
         assert_eq!(principled.ior, 1.5);
         assert_eq!(plain(principled.specular), 1.0);
         assert_eq!(plain_color(principled.specular_color), [1.0; 3]);
@@ -222,7 +220,6 @@ fn smooth_metal_in_a_white_environment_has_its_base_color() {
     assert_all(&scene(&quad_of(metal), "metal"), [0.25, 0.5, 0.75]);
 }
 
-/// Returns an unlit quad of alpha 0.4 before a white environment.
 fn veil(mode: &str, cutoff: Option<f64>) -> Scene {
     let mut builder = Builder::new();
     let material = builder.unlit(json!({ "baseColorFactor": [0.25, 0.5, 0.75, 0.4] }));

@@ -16,7 +16,7 @@ const { MeshoptDecoder, MeshoptEncoder } = createRequire(path.join(process.cwd()
 await Promise.all([MeshoptDecoder.ready, MeshoptEncoder.ready]);
 
 let state = 1;
-// Returns an integer below `count` from a 32-bit linear congruential generator, the same in every run.
+// Returns an integer below `count`, by a linear congruential generator.
 function random(count) {
 	state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
 	return Math.floor((state / 2 ** 32) * count);
@@ -82,7 +82,7 @@ function attributes(kind, stride, count, level, version) {
 	line(`${kind}-${stride}-${count}-${level}-v${version}`, "ATTRIBUTES", "NONE", stride, count, stream);
 }
 
-// Returns the triangles of a grid, row by row, and `strays` random triangles between them.
+// Returns the triangles of a grid by row, with `strays` random ones between them.
 function grid(side, strays) {
 	const indices = [];
 	for (let y = 0; y < side; y++) {
@@ -106,7 +106,7 @@ function indices(name, all, mode, stride) {
 	line(name, mode, "NONE", stride, typed.length, encode(bytes, typed.length, stride));
 }
 
-// Returns random unit vectors, some along an axis. Vectors of three dimensions get 1 or -1 as fourth component.
+// Returns random unit vectors, some along an axis, with a fourth component of 1 or -1 if of three dimensions.
 function units(count, dimensions) {
 	const values = [];
 	for (let i = 0; i < count; i++) {

@@ -10,7 +10,6 @@ use wgray::scene::{Geometry, Reflection, Scene, Shape};
 use super::build::{Builder, Component, QUAD};
 use super::read::{assert_corners, corners, plain_color, refusal, scene, scene_by, triangles};
 
-/// Returns the triangles of the transformed [`QUAD`].
 fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
     let p = QUAD.map(|corner| map(DVec3::from_array(corner)).to_array());
     [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
@@ -82,7 +81,7 @@ fn meshes_flattened_along_their_normal_are_kept() {
         builder.root_node(json!({ "mesh": mesh, "translation": [0, 0, 2], "scale": scale }));
         scene(&builder, "flattened")
     };
-    // Flattened along its normal, or below the minimum scale of an instance.
+    // Flattened along the normal, or below the minimum scale of an instance.
     for (scale, by) in [([1.0, 1.0, 0.0], 1.0), ([1e-7; 3], 1e-7), ([-1e-7; 3], -1e-7)] {
         let scene = flattened(scale);
         assert_corners(&scene, &quad_by(|p| p * by + 2.0 * DVec3::Z));
@@ -169,7 +168,6 @@ fn instance_rotations_may_be_normalized_integers() {
     assert_corners(&scene(&builder, "gpu-instancing-i16"), &[first, second].concat());
 }
 
-/// Returns two scenes with one quad each, and a node outside of both.
 fn two_scenes() -> Builder {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
@@ -257,7 +255,7 @@ fn a_file_may_be_translated_rotated_and_scaled() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh, "translation": [1, 0, 0] }));
-    // In scene coordinates, whose z is the y of the file.
+    // z of the scene is y of the file.
     let keys = "scale = 2\nrotate = { axis = [0, 0, 1], degrees = 90 }\ntranslate = [0, 0, 5]";
     let turn = DMat3::from_axis_angle(DVec3::Y, std::f64::consts::FRAC_PI_2);
     let known = quad_by(|p| turn * (2.0 * (p + DVec3::X)) + 5.0 * DVec3::Y);

@@ -11,7 +11,7 @@ use super::build::{Builder, Packing};
 use super::read::triangles;
 use crate::test_folder::TestFolder;
 
-/// A spike of length 3 along an axis of the file, from the origin.
+/// A spike of length 3 along an axis, from the origin.
 fn spike(place: &TestFolder, axis: DVec3, has_camera: bool) -> PathBuf {
     let mut builder = Builder::new();
     let side = axis.any_orthonormal_vector() * 0.25;
@@ -60,7 +60,7 @@ fn any_axis_can_point_up() {
         let triangle = triangles(&scene)[0].corners;
         // In the coordinates of an upright file.
         assert!(triangle[2].distance(DVec3::Y * 3.0) < 1e-6, "{name}: {triangle:?}");
-        // The camera frames the model in its new orientation.
+        // Frames the model in its new orientation.
         let camera = scene.camera;
         assert!(camera.position.z > 0.0 && camera.position.z < 3.0, "{name}: {camera:?}");
         assert_eq!(camera.forward.z, 0.0, "{name}");
@@ -97,7 +97,7 @@ fn the_ground_lies_below_the_model() {
         let gap = low - center.z;
         assert!(gap > 0.0 && gap < 1e-3, "{up}: {center}");
         assert!(radius > 10.0, "{radius}");
-        // The camera frames only the model, not the ground.
+        // Frames the model, not the ground.
         let without = Presentation {
             ground: false,
             ..presentation
@@ -163,7 +163,7 @@ fn the_automatic_camera_is_adjusted() {
         ..Presentation::default()
     };
     assert_eq!(load(&file, up, None).unwrap_err(), format!("up: {rule}"));
-    // The ground can be combined with any camera.
+    // With any camera.
     let ground = Presentation {
         ground: true,
         ..Presentation::default()

@@ -50,12 +50,12 @@ pub fn to_file(p: DVec3) -> DVec3 {
     DVec3::new(p.x, p.z, -p.y)
 }
 
-/// Loads the scene of a file, with additional keys of its shape.
+/// Loads the scene with additional keys of its shape.
 pub fn scene_with(file: &Path, keys: &str) -> Scene {
     try_scene(file, keys).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Loads it as [`scene_with`] does, or returns the error.
+/// Loads as [`scene_with`], or returns the error.
 pub fn try_scene(file: &Path, keys: &str) -> Result<Scene, String> {
     let folder = file.parent().expect("a folder");
     let name = file.file_name().expect("a name").to_string_lossy();
@@ -70,13 +70,13 @@ pub fn scene(builder: &Builder, name: &str) -> Scene {
     scene_with(&builder.write(place.folder(), name, Packing::Binary), "")
 }
 
-/// Loads it as [`scene`] does, with additional keys.
+/// Loads as [`scene`], with additional keys.
 pub fn scene_by(builder: &Builder, name: &str, keys: &str) -> Scene {
     let place = TestFolder::with_file("a", "");
     scene_with(&builder.write(place.folder(), name, Packing::Binary), keys)
 }
 
-/// Returns the error message of an invalid file or invalid keys.
+/// Returns the error message.
 pub fn refusal(builder: &Builder, keys: &str) -> String {
     let place = TestFolder::with_file("a", "");
     let file = builder.write_unsound(place.folder(), "bad", Packing::Binary);

@@ -12,7 +12,6 @@ const GREEN: [u8; 4] = [0, 255, 0, 255];
 const BLUE: [u8; 4] = [0, 0, 255, 255];
 const WHITE: [u8; 4] = [255; 4];
 
-/// Adds an unlit, textured quad.
 fn pictured(builder: &mut Builder, info: Value) {
     let material = builder.unlit(json!({ "baseColorTexture": info }));
     let mesh = builder.quad(Some(material));
@@ -107,7 +106,7 @@ fn ktx2_file(name: &str) -> Vec<u8> {
     std::fs::read(crate::sources::path(&format!("tests/textures/ktx2/{name}"))).expect("a file")
 }
 
-/// Returns an unlit quad with an image; for KTX2 through `KHR_texture_basisu`.
+/// Returns an unlit quad; for KTX2 through `KHR_texture_basisu`.
 fn with_image(bytes: &[u8], kind: &str, more: &Value) -> Builder {
     let mut builder = Builder::new();
     let image = builder.image(bytes, kind);
@@ -240,7 +239,6 @@ fn missing_texture_coordinates_are_noted() {
     assert!(notes.iter().any(|note| note.message.contains(message)), "{notes:?}");
 }
 
-/// Returns a quad with a transformed texture of four colors.
 fn transformed(name: &str, transform: Value) -> Scene {
     let mut builder = Builder::new();
     builder.uses("KHR_texture_transform");
@@ -289,7 +287,7 @@ fn texture_transforms_are_those_of_the_extension() {
     );
 }
 
-/// A material with a constant texture, and its untextured equivalent.
+/// A constant texture and its untextured equivalent.
 struct Row {
     name: &'static str,
     texel: [u8; 4],
@@ -310,7 +308,7 @@ fn rows() -> Vec<Row> {
     };
     // The component that 128 encodes.
     let half: f64 = 128.0 / 255.0 * 2.0 - 1.0;
-    // Emissive materials are delta-specular, as NEE samples textured emission differently.
+    // Delta-specular, as NEE samples textured emission differently.
     vec![
         row(
             "base-color",
@@ -451,7 +449,6 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-/// Returns a tilted quad under a directional light from the upper right.
 fn leaning(name: &str, texel: [u8; 4], material: &Value) -> Scene {
     let mut builder = Builder::new();
     builder.uses("KHR_lights_punctual");
@@ -491,7 +488,7 @@ fn constant_textures_equal_plain_values() {
         // Textured anisotropy uses a coarser multiple-scattering table.
         let bound = if row.name.starts_with("anisotropy") { 0.01 } else { 1e-5 };
         assert!(far(&textured, &plain) < bound, "{}: {textured:?} {plain:?}", row.name);
-        // Control: the compared images differ visibly.
+        // Control: the images differ visibly.
         assert!(far(&white, &plain) > 0.1, "{}: {white:?} {plain:?}", row.name);
     }
 }
@@ -516,7 +513,7 @@ fn occlusion_is_ignored_and_said() {
     );
 }
 
-/// Returns the shading normal of a quad with a constant normal map, in file coordinates.
+/// Returns the shading normal in file coordinates.
 fn bent(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -> [f64; 3] {
     let mut builder = Builder::new();
     builder.uses("KHR_texture_transform");
@@ -567,7 +564,7 @@ fn normal_maps_lean_as_their_texels_say() {
         None,
         [0.5 * x, 0.5 * y, z],
     );
-    // Mirrored and rotated texture coordinates.
+    // Mirrored and rotated.
     check(
         "normal-mirrored",
         json!({}),
@@ -582,7 +579,7 @@ fn normal_maps_lean_as_their_texels_say() {
         None,
         [y, -x, z],
     );
-    // Tangents of the file take precedence.
+    // Those of the file take precedence.
     check(
         "normal-tangent",
         json!({}),

@@ -231,7 +231,7 @@ fn images_that_grow_a_thousandfold_are_told() {
     );
 }
 
-/// A Zstandard block of 24,000 bytes that decodes to 1.5 GB, and headers with more texels than the file.
+/// 24,000 bytes that decode to 1.5 GB, and headers with more texels than the file.
 #[test]
 fn ktx2_files_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
@@ -428,7 +428,6 @@ fn what_acts_on_a_terminal_is_shown() {
         assert_eq!((ran.code, ran.said.lines().count()), (3, 1), "{text:?}: {}", ran.said);
         assert!(!ran.said.contains('\u{202e}'), "{}", ran.said);
     }
-    // Control characters in the name of the file.
     let name = "a\u{1b}[31m\nerror: b.toml";
     fs::copy(folder.join("plain.toml"), folder.join(name)).unwrap();
     let ran = run(folder, &["check", name]);

@@ -17,7 +17,6 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Result of a run.
 struct Ran {
     code: i32,
     said: String,
@@ -85,7 +84,6 @@ fn run(folder: &Path, arguments: &[&str]) -> Ran {
     }
 }
 
-/// Renders a scene with 8 x 6 pixels.
 fn render(folder: &Path, scene: &str) -> Ran {
     render_with(folder, scene, &[])
 }

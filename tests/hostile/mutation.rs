@@ -39,7 +39,6 @@ const TEXTS: [&[u8]; 16] = [
     b"../../../../etc/passwd",
 ];
 
-/// Overwrites, removes, inserts or truncates bytes.
 fn bytes_changed(bytes: &mut Vec<u8>, random: &Random) {
     let below = |count: usize| random.below(count.max(1) as u32) as usize;
     for _ in 0..1 + below(4) {
@@ -72,7 +71,7 @@ fn bytes_changed(bytes: &mut Vec<u8>, random: &Random) {
     }
 }
 
-/// Returns a mutated file, from its values if possible.
+/// Mutates a file, by its values if possible.
 fn mutated(kind: &Kind, random: &Random) -> Vec<u8> {
     if let Some((values, written)) = kind.values.as_ref().filter(|_| !random.once_in(3)) {
         let mut values = values.clone();
@@ -90,7 +89,7 @@ fn mutated(kind: &Kind, random: &Random) -> Vec<u8> {
 
 #[test]
 fn changed_files_are_read_or_told() {
-    // The default is small; the seeds are fixed.
+    // Small by default; the seeds are fixed.
     let count: usize = std::env::var("WGRAY_TEST_HOSTILE").map_or(8, |count| count.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

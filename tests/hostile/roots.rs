@@ -30,7 +30,6 @@ fn place() -> (tempfile::TempDir, PathBuf) {
     (outer, folder)
 }
 
-/// Returns references to a secret file.
 fn names(outer: &Path, ending: &str) -> Vec<String> {
     let secret = outer.join(format!("secret.{ending}"));
     let absolute = secret.display().to_string();
@@ -169,7 +168,6 @@ fn a_mesh_reads_no_file_outside_the_asset_root() {
             ran.said
         );
     }
-    // Textures of a material.
     for name in names(outer.path(), "png") {
         fs::write(folder.join("a.obj"), mesh("in.mtl")).unwrap();
         fs::write(folder.join("in.mtl"), format!("{material}map_Kd {name}\n")).unwrap();

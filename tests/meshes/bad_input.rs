@@ -183,7 +183,6 @@ fn invalid_files_are_reported() {
     }
 }
 
-/// Returns an ASCII PLY file.
 fn ply(vertex: &str, face: &str, lines: &str) -> String {
     format!("ply\nformat ascii 1.0\n{vertex}{face}end_header\n{lines}")
 }
@@ -349,7 +348,7 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     files
 }
 
-/// Checks the invariants of a mesh, or of an error message. Returns true if the file is undamaged.
+/// Checks the invariants of a mesh or an error message. Returns true if undamaged.
 fn check(name: &str, result: Result<Mesh, String>) -> bool {
     match result {
         Ok(mesh) => {
@@ -395,7 +394,7 @@ fn truncated_files_are_meshes_or_errors() {
 const MTL: &str = "# all\nnewmtl a\nKa 1 1 1\nKd 0.5 0.25 \\\n0.125\nKs 0.5\nNs 20\nd 0.5\nillum 2\nmap_Kd -s 2 2 a.png\n\
                    newmtl b c\r\nKe 1 0 0\r\nTr 1\r\nNi 1.5\r\nmap_Bump -bm 1 b.png\r\n";
 
-/// Checks the scene of a mesh with an MTL file. Returns true if both materials are defined.
+/// Returns true if both materials are defined.
 fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
     std::fs::write(folder.join("a.mtl"), mtl).unwrap();
     let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b c\nf 3/1 2/1 1/1\n";

@@ -7,7 +7,6 @@ use wgray::scene::Scene;
 use crate::gltf::build::{Builder, Packing, QUAD};
 use crate::random::Random;
 
-/// Returns the bounding box of points that were computed independently.
 fn around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
         (low.min(p), high.max(p))
@@ -28,7 +27,7 @@ const HEAD: &str = "image = { width = 4, height = 4 }\n\
                     camera = { position = [0, -5, 0], look_at = [0, 0, 0], fov = 40 }\n\
                     materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }\n";
 
-/// Returns an OBJ file with random triangles around a point, and their vertices.
+/// Returns an OBJ file of random triangles, and its vertices.
 fn cloud(random: &Random, center: DVec3, size: f64) -> (String, Vec<DVec3>) {
     let coordinate = || size * random.between(-1.0, 1.0);
     let points: Vec<DVec3> = (0..30)

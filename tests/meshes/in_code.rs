@@ -35,7 +35,6 @@ fn scene(mesh: Arc<Mesh>) -> Result<Scene, String> {
         .map_err(|problem| problem.to_string())
 }
 
-/// Returns the depth at the center of the image.
 fn depth(mesh: &Arc<Mesh>) -> f32 {
     let options = Options {
         device: Device::Cpu,

@@ -19,7 +19,6 @@ fn write(folder: &Path, mtl: &str) {
     clear.save(folder.join("clear.png")).unwrap();
 }
 
-/// Returns the material of a mesh with this MTL file, and the notes.
 fn material(mtl: &str) -> (Material, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), mtl);
@@ -70,7 +69,7 @@ fn defaults_are_a_rough_surface_without_highlights() {
         );
         assert_eq!(material.emission, Color::BLACK);
     }
-    // A higher exponent, with a sharper highlight, is a smoother surface.
+    // A higher exponent is a smoother surface.
     let roughness = |exponent: f64| match principled(&material(&format!("Ks 1\nNs {exponent}\n")).0).roughness {
         Value::Plain(roughness) => roughness,
         other => panic!("{other:?}"),
@@ -97,8 +96,7 @@ fn maps_replace_values() {
     assert!(matches!(principled.metallic, Value::Texture(_, Channel::R)));
     assert!(matches!(principled.alpha, Value::Texture(_, Channel::A)));
     assert_eq!(principled.alpha_mode, AlphaMode::Blend);
-    // The texels of the normal map and of `metallic` are linear and share a texture; colors are sRGB and need another
-    // one.
+    // Linear texels share a texture; sRGB colors need another one.
     let Value::Texture(metallic, _) = principled.metallic else {
         unreachable!("it is a texture")
     };

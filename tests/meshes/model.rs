@@ -14,7 +14,6 @@ fn load(path: &Path) -> Result<(Scene, Description), String> {
     Scene::load_described(path, &Overrides::default()).map_err(|error| error.to_string())
 }
 
-/// Returns the mean alpha: the fraction of the image that the model covers.
 fn coverage(scene: &Scene) -> f64 {
     let options = Options {
         device: Device::Cpu,
@@ -124,7 +123,7 @@ fn the_description_of_a_mesh_is_the_same_scene() {
     assert_eq!((&again.materials, &again.camera), (&scene.materials, &scene.camera));
     assert_eq!(again.render, scene.render);
     assert_eq!(scene.material_names, ["red", "default"]);
-    // Files that the mesh refers to are files of the scene, too.
+    // Files that the mesh refers to belong to the scene.
     let has = |name: &str| scene.files.iter().any(|file| file.ends_with(name));
     assert!(has("a.obj") && has("a.mtl"), "{:?}", scene.files);
     assert!(matches!(scene.shapes[0].geometry, Geometry::Mesh { .. }));
@@ -207,7 +206,7 @@ fn files_with_names_in_another_case_are_found_or_suggested() {
     let (scene, _) = load(&folder.path().join("a.obj")).unwrap();
     assert_eq!(scene.notes, Vec::<String>::new());
     assert_eq!(scene.material_names, ["red"]);
-    // The same with a folder whose name differs in case, next to a folder of the exact name.
+    // Another case, next to a folder of the exact name.
     fs::create_dir_all(folder.path().join("Sub/M.mtl")).unwrap();
     write("Sub/m.mtl", "newmtl red\nKd 1 0 0\n");
     write(

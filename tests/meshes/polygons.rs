@@ -8,7 +8,6 @@ use wgray::mesh::Mesh;
 use super::{corners, load};
 use crate::random::Random;
 
-/// Returns an OBJ file with one polygon.
 fn polygon(points: &[DVec3]) -> String {
     let vertices = points.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
     let face = (1..=points.len()).map(|i| format!(" {i}"));
@@ -19,7 +18,6 @@ fn flat(points: &[[f64; 2]]) -> Vec<DVec3> {
     points.iter().map(|[x, y]| DVec3::new(*x, *y, 0.0)).collect()
 }
 
-/// Returns the area vectors of the triangles.
 fn areas(mesh: &Mesh) -> Vec<DVec3> {
     let area = |[a, b, c]: [[f64; 3]; 3]| {
         let [a, b, c] = [a, b, c].map(DVec3::from);
@@ -205,7 +203,7 @@ fn random_corners_are_meshes_or_errors() {
     for round in 0..400 {
         let count = 3 + round % 90;
         let scale = [1.0, 1e-6, 1e8, 1e-30][round % 4];
-        // Few distinct values, so that many points coincide or are collinear.
+        // Few distinct values: many points coincide or are collinear.
         let coordinate = || match round % 3 {
             0 => f64::from(random.below(4)) * scale,
             _ => random.between(-1.0, 1.0) * scale,

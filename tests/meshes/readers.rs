@@ -130,7 +130,7 @@ fn obj_corners_may_have_any_form() {
                 vn 0 0 2\nf 1 2 \\\n 3\nf -4/1 -2/3/1 \\\r\n  4//1\ncurv 0 1 \\\n 2 3\ns off\nl 1 2\n";
     let mesh = load("a.obj", text, None).unwrap();
     assert_eq!(corners(&mesh), TWO_TRIANGLES);
-    // A corner without texture coordinates does not share its vertex with one that has them.
+    // A corner without texture coordinates needs its own vertex.
     assert_eq!(mesh.positions.len(), 6);
     let uvs: Vec<[f32; 2]> = mesh.uvs.iter().map(|uv| uv.to_array()).collect();
     assert_eq!(uvs[3..], [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]);
@@ -311,7 +311,7 @@ fn material_files_may_have_paths_of_other_machines() {
         assert_eq!(mesh.notes, Vec::<String>::new(), "{named}");
         assert_eq!(mesh.libraries[0].materials[0].name, expected, "{named}");
     }
-    // A plain file name is only looked up in the folder of the mesh.
+    // A plain file name is only looked up in the mesh's folder.
     std::fs::write(&path, format!("mtllib c.mtl\n{SQUARE}f 1 2 3\n")).unwrap();
     let mesh = Mesh::load(&path, None).unwrap();
     assert!(

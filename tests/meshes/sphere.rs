@@ -11,7 +11,6 @@ const CENTER: DVec3 = DVec3::new(0.0, 0.0, 1.3);
 const LIGHT: DVec3 = DVec3::new(0.3, 0.2, -1.0);
 const OUTSIDE: &str = "[0.5, -6, 3.5]";
 
-/// Returns the sphere above a floor, under a directional light.
 fn above_floor(form: &Form, normals: &str, camera: &str) -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("sphere.obj"), form.obj(Some(&form.points), None)).expect("a mesh");
@@ -46,7 +45,6 @@ fn above_floor(form: &Form, normals: &str, camera: &str) -> Packed {
     scene(&text, folder.path())
 }
 
-/// Returns the distance at which a ray enters a sphere.
 fn entry(origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
     let to = origin - CENTER;
     let b = to.dot(direction);
@@ -110,7 +108,6 @@ fn found(form: &Form, inner: f64, normals: &str) -> Found {
     found
 }
 
-/// Returns the radius of the inscribed sphere.
 fn inner(form: &Form) -> f64 {
     let height = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| form.points[i as usize]);
@@ -135,7 +132,7 @@ fn a_fine_triangle_mesh_approximates_a_sphere() {
         (0, 0, 0),
         "{result:?}"
     );
-    // Control: a coarse mesh fails these bounds without normals, and satisfies its own with normals.
+    // Control: a coarse mesh fails these bounds, and with normals satisfies its own.
     let coarse = Form::icosphere(2);
     let wrong = found(&coarse, fine_inner, "flat");
     assert!(
@@ -150,7 +147,7 @@ fn a_fine_triangle_mesh_approximates_a_sphere() {
     );
 }
 
-/// Checks that no light passes a triangle from behind, at any angle.
+/// From behind, at any angle.
 #[test]
 fn no_light_enters_a_closed_mesh() {
     for detail in [1, 2, 4] {

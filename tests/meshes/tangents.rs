@@ -20,7 +20,7 @@ use crate::textures::write_exr;
 /// The tangent-space normal of the map.
 const LEAN: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 
-/// Returns a mesh with a constant, tilted normal map, and additional lines for texture and shape.
+/// Returns a mesh with a constant, tilted normal map.
 fn leaning(obj: &str, texture: &str, shape: &str) -> Packed {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("mesh.obj"), obj).unwrap();
@@ -71,7 +71,7 @@ const PLACES: [Vec2; 7] = [
     Vec2::new(0.0, 0.4),
 ];
 
-/// Returns the maximum errors in degrees of interpolated and of per-triangle tangents.
+/// Returns the maximum errors in degrees: interpolated tangents, per triangle.
 fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> [f64; 2] {
     let i = &packed.bvh.instances[0];
     let to_world = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
@@ -94,7 +94,6 @@ fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> 
     worst
 }
 
-/// Returns the partial derivatives by central differences.
 fn derivatives(at: impl Fn(f64, f64) -> DVec3, u: f64, v: f64) -> [DVec3; 2] {
     let h = 1e-5;
     [
@@ -133,7 +132,7 @@ fn tangents_match_the_surface() {
     }
 }
 
-/// Returns the mapped normals with interpolated and with per-triangle tangents.
+/// Returns the mapped normals: interpolated tangents, per triangle.
 fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     let hit = hit(packed, slot, b);
     let prim = fetch_hit_primitive(packed, hit);
@@ -155,8 +154,8 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     [found, mapped_normal(by_triangle, texture, LEAN)]
 }
 
-/// Returns the maximum differences in degrees between normals across edges and seams, with interpolated and with
-/// per-triangle tangents, and the number of edges.
+/// Returns the maximum angles in degrees between normals across edges and seams (interpolated tangents, per triangle),
+/// and the number of edges.
 fn jumps(packed: &Packed, is_looked_at: impl Fn(Vec3) -> bool) -> ([f32; 2], usize) {
     let mesh = &packed.bvh.meshes[0];
     let mut sides: HashMap<_, Vec<[Vec3; 2]>> = HashMap::new();
@@ -272,10 +271,9 @@ fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
     }
 }
 
-/// Tangents are averaged across a seam only if the repeating texture continues there.
 #[test]
 fn tangents_are_averaged_only_across_continuous_textures() {
-    // Two sheets that meet at x = 1; the right one has a rotated and translated texture.
+    // Two sheets that meet at x = 1; the right one has another texture transform.
     let directions = |turn: f64, shift: f64| {
         let sheet = |left: f64| Sheet::of(2, 2, |u, v| [DVec3::new(left + u, v, 0.0), DVec3::Z]);
         let (mut whole, right) = (sheet(0.0), sheet(1.0));
@@ -327,7 +325,7 @@ fn only_smooth_meshes_with_normal_maps_have_tangents() {
     }
 }
 
-/// Degenerate, canceling and extreme texture coordinates give unit normals.
+/// Also canceling and extreme ones.
 #[test]
 fn degenerate_texture_coordinates_give_unit_normals() {
     let size = |factor: f64| move |[u, v]: [f64; 2]| [u * factor, v * factor];

@@ -26,7 +26,7 @@ use crate::random::Random;
 use crate::random_scenes::any_scene;
 use crate::scenes;
 
-/// Returns the corners of a triangle in object space.
+/// Returns the corners in object space.
 fn corners(scene: &Packed, i: &Instance, slot: usize) -> [Vec3; 3] {
     let mesh = &scene.bvh.meshes[i.mesh as usize];
     let triangle = mesh.triangles[slot];
@@ -125,7 +125,7 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) 
     bits
 }
 
-/// Random rays from and to points on triangles, edges, vertices and corners of boxes.
+/// Random rays from and to points on triangles, edges, vertices and box corners.
 struct Aims<'a> {
     scene: &'a Packed,
     random: &'a Random,
@@ -296,10 +296,9 @@ fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
     [hits, shadows, met, dark]
 }
 
-/// A BVH build: from boxes to nodes and the order of the boxes.
+/// From boxes to nodes and the order of the boxes.
 type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<bvh::Node>, Vec<u32>);
 
-/// Returns the scene with other BVHs.
 fn with_trees(scene: &Packed, tree: Builder) -> Packed {
     let mut scene = scene.clone();
     let boxes: Vec<Aabb> = scene
@@ -340,7 +339,6 @@ fn built(boxes: &[Aabb], most_in_leaf: u32) -> (Vec<bvh::Node>, Vec<u32>) {
     (tree.nodes, tree.order)
 }
 
-/// Returns a BVH of random subsets in random slots.
 fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
     let empty: bvh::Node = bytemuck::Zeroable::zeroed();
     let (mut nodes, mut order) = (vec![empty], Vec::new());
@@ -411,7 +409,7 @@ fn too_small(boxes: &[Aabb]) -> (Vec<bvh::Node>, Vec<u32>) {
     (nodes, order)
 }
 
-/// Returns spheres and instances of random triangles: mirrored, sheared, tiny, grouped, or of glass without shadows.
+/// Returns spheres and instances of random triangles: mirrored, sheared, tiny, grouped, or glass without shadows.
 fn soups() -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     let random = Random::new(11);
@@ -474,7 +472,7 @@ fn bvhs_miss_no_hit_and_no_shadow() {
     }
 }
 
-/// Returns how many rays and shadow blocks differ between two scenes.
+/// Returns how many rays and shadow blocks differ.
 fn differing_between(a: &Packed, b: &Packed, rays: u32) -> [u32; 2] {
     let random = Random::new(3);
     let aims = Aims::new(a, &random);

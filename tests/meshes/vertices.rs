@@ -20,10 +20,8 @@ const QUAD: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1
 /// A camera above, whose image is the square.
 const DOWN: &str =
     "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
-/// An oblique camera.
 const ASIDE: &str = "camera = { position = [0.4, -2.2, 1.9], look_at = [0, 0, 0], fov = 60 }\n";
 const SHAPE: &str = "[[shapes]]\ntype = 'mesh'\nfile = 'quad.obj'\nmaterial = 'm'\n";
-/// Colors of the vertices.
 const COLORS: [[f32; 4]; 4] = [
     [1.0, 0.0, 0.25, 1.0],
     [0.5, 0.5, 0.25, 0.0],
@@ -31,7 +29,7 @@ const COLORS: [[f32; 4]; 4] = [
     [0.5, 0.5, 0.25, 1.0],
 ];
 
-/// Returns a scene of 20 x 20 pixels after editing its meshes.
+/// Returns a scene of 20 x 20 pixels.
 fn scene(folder: &Path, samples: u32, text: &str, edit: impl Fn(&mut Mesh)) -> Packed {
     std::fs::write(folder.join("quad.obj"), QUAD).unwrap();
     let text = format!(
@@ -85,7 +83,7 @@ fn place(i: usize) -> (f64, f64) {
 #[test]
 fn colors_of_vertices_are_interpolated() {
     let folder = tempfile::tempdir().unwrap();
-    // Emission is directly visible. A linear color has its mean at the center of a pixel, except on the diagonal.
+    // A linear color has its mean at the center of a pixel, except on the diagonal.
     let emission = "materials.m = { type = 'principled', base_color = [0, 0, 0], specular = 0, emission = [2, 2, 2], vertex_colors = 'emission' }\n";
     let base = "environment = { color = [1, 1, 1] }\n\
                 materials.m = { type = 'principled', metallic = 0, specular = 0, vertex_colors = 'base_color' }\n";
@@ -181,7 +179,7 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
                 }
             }
             let mean = found.iter().map(|pixel| pixel[0]).sum::<f64>() / 400.0;
-            // The mean alpha of two triangles; both contain the ends of the diagonal.
+            // The mean of two triangles; both contain the ends of the diagonal.
             let alpha = 0.8 * (2.0 * (1.0 + 0.5) + 0.0 + 1.0) / 6.0;
             assert!((mean - (1.0 - alpha)).abs() < 0.01, "{mode:?}: {mean} {alpha}");
             assert!(means(&render(&opaque, mode)).iter().all(|pixel| pixel[0] == 0.0));
@@ -191,7 +189,7 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
 
 #[test]
 fn emission_from_vertex_colors_lights_like_plain_emission() {
-    // A floor lit by constant emission, or by equal emission from vertex colors; with equal samples.
+    // Constant emission, or equal vertex colors; equal samples.
     let folder = tempfile::tempdir().unwrap();
     let text = |keys: &str| {
         format!(
@@ -234,7 +232,6 @@ fn emission_from_vertex_colors_lights_like_plain_emission() {
     }
 }
 
-/// Adds three texture coordinate sets.
 fn with_sets(mesh: &mut Mesh) {
     let set = |map: fn(Vec2) -> Vec2| mesh.uvs.iter().copied().map(map).collect::<Vec<_>>();
     mesh.more_uvs = vec![
@@ -277,7 +274,7 @@ fn textures_use_their_set_of_coordinates() {
             .map(|set| scene(folder.path(), 4, &text(set, filter, keys), with_sets))
             .collect();
         for set in 0..4 {
-            // A mesh with only these coordinates. Roughness is removed, as its coordinates would differ.
+            // Only these coordinates; without roughness, whose coordinates would differ.
             let without = |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
             let first = |mesh: &mut Mesh| {
                 with_sets(mesh);
@@ -457,7 +454,7 @@ fn invalid_factors_and_sets_are_reported() {
 #[test]
 fn only_camera_rays_skip_back_faces() {
     let folder = tempfile::tempdir().unwrap();
-    // A wall that occludes a floor from an area light behind the camera, whichever side faces it.
+    // Occludes an area light behind the camera, whichever side faces it.
     let text = |height: f64, side: &str, transform: &str| {
         format!(
             "camera = {{ type = 'orthographic', position = [0, 0, {height}], look_at = [0, 0, 0], up = [0, 1, 0], height = 1.5 }}\n\
@@ -481,7 +478,6 @@ fn only_camera_rays_skip_back_faces() {
         let packed = find("double_sided = false");
         let expected = find(if seen { "double_sided = true" } else { "visible = false" });
         let other = find(if seen { "visible = false" } else { "double_sided = true" });
-        // Kernels with a BVH take seconds to compile.
         let ways = match transform == turned {
             true => exact_modes()
                 .into_iter()
@@ -496,7 +492,7 @@ fn only_camera_rays_skip_back_faces() {
                 0,
                 "{height} {transform} {mode:?}"
             );
-            // Below the wall the floor is always visible.
+            // Below the wall the floor is visible.
             assert!(
                 height < 1.0 || differing(&picture, &reference(&other)) > 300,
                 "{height} {transform} {mode:?}"
@@ -510,7 +506,7 @@ fn only_camera_rays_skip_back_faces() {
 
 #[test]
 fn a_mesh_keeps_its_own_tangents() {
-    // A normal map tilted along u, and tangents that contradict the coordinates.
+    // Tilted along u; the tangents contradict the coordinates.
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| [0.8, 0.6, 0.9]);
     let text = format!(

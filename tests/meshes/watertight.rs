@@ -35,7 +35,7 @@ fn placed(obj: &str, place: &str) -> Packed {
     )
 }
 
-/// A packed mesh in world space in double precision.
+/// A mesh in world space in double precision.
 struct Solid {
     corners: Vec<[DVec3; 3]>,
     center: DVec3,
@@ -80,7 +80,6 @@ impl Solid {
         }
     }
 
-    /// Returns a random triangle from a random corner on.
     fn triangle(&self, random: &Random) -> [DVec3; 3] {
         let mut corners = self.corners[random.below(self.corners.len() as u32) as usize];
         corners.rotate_left(random.below(3) as usize);
@@ -120,7 +119,7 @@ fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -
         },
     };
     let d = ray.direction.as_dvec3();
-    // Ray parameters nearest to the center and to the target. Rounding may move the hit behind the target.
+    // Nearest to the center and to the target. Rounding may move the hit behind the target.
     let to_center = (solid.center - origin.as_dvec3()).dot(d) / d.length_squared();
     let to_target = (target - origin.as_dvec3()).dot(d) / d.length_squared();
     let slack = 30.0 * solid.rounding / d.length();
@@ -218,7 +217,7 @@ fn a_hole_in_a_mesh_is_found() {
     }
 }
 
-/// Negative control: the intersection test of standalone triangles is not watertight.
+/// Negative control.
 #[test]
 fn standalone_triangles_are_not_watertight() {
     let form = Form::icosphere(2);
@@ -236,8 +235,7 @@ fn standalone_triangles_are_not_watertight() {
     assert_eq!([false, true].map(|inside| passing(&mesh, 64_000, inside)), [0, 0]);
 }
 
-/// Checks a mesh that is not convex: rays at an edge whose triangles face them must hit there or before, rays from
-/// inside anywhere.
+/// Not convex: rays at an edge whose triangles face them must hit there or before, rays from inside anywhere.
 #[test]
 fn no_ray_passes_through_the_knot() {
     let knot = std::fs::read_to_string(sources::path("scenes/meshes/knot.obj")).expect("the knot");
@@ -264,7 +262,7 @@ fn no_ray_passes_through_the_knot() {
     assert!(outside.1 > 10 && inside.1 > 10, "{outside:?} {inside:?}");
 }
 
-/// Returns the numbers of rays and of those that pass, from outside and from inside.
+/// Returns the numbers of rays and of those that pass, from outside and inside.
 fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
     let side = f64::from(scene.bvh.instances[0].side);
     let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize() * side;

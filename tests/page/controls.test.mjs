@@ -120,7 +120,7 @@ test("without a connection nothing can be downloaded, and the zoom bar stays opa
   await page.locator("#zoom", { hasText: /^\d+%$/ }).waitFor();
   await studio.start(studio.port);
   await page.locator("#save-png[href]").waitFor();
-  // A control that is disabled for another reason stays disabled.
+  // Disabled for another reason.
   for (const id of ["#reset-look", "#undo-write", "#reset-sliders", "#save"]) assert.ok(await page.locator(id).isDisabled(), id);
 });
 

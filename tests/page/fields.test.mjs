@@ -52,7 +52,7 @@ async function choose(page, name) {
   await page.locator("#object-name", { hasText: name }).waitFor();
 }
 
-// Records each change that the page requests from now on.
+// Records the changes requested from now on.
 async function listen(page) {
   await page.evaluate(() => {
     const send = WebSocket.prototype.send;
@@ -83,7 +83,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await page.keyboard.type("5");
   await page.keyboard.press("Enter");
   await written("center = [0, 0, 0.75]");
-  // A removed box discards its text, and the keys that follow have no effect.
+  // A removed box discards its text; the keys that follow have no effect.
   const sent = await listen(page);
   await box(page, "materials.grey.shininess", 1).focus();
   await page.keyboard.press("Control+a");
@@ -93,7 +93,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await page.keyboard.type("5r");
   assert.deepEqual(await sent(), []);
   assert.equal(studio.read("scene.toml").match(/shininess = 16/g).length, 2);
-  // A number that moves from the defaults to the values of the file keeps its focus, and the list stays open.
+  // A number that moves from the defaults to the values of the file keeps its focus; the list stays open.
   await choose(page, "render");
   const absent = page.locator('[data-name="render"] .absent');
   await absent.locator("> summary").click();
@@ -104,7 +104,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await there.waitFor();
   assert.ok(await isFocused(there));
   assert.ok(await absent.evaluate((node) => node.open));
-  // Removed from the file by keys, it moves back with the focus.
+  // Removed by keys, it moves back with the focus.
   await page.locator('[data-path="render.seed"]').getByRole("button", { name: "default" }).focus();
   await page.keyboard.press("Enter");
   await there.waitFor({ state: "detached" });
@@ -143,7 +143,7 @@ test("a half-typed number of a shader stays while sliders come and go, and slide
   mark(`override wide: f32 = 0.05; // 0..0.2\n${LEVEL}`);
   await page.locator("#sliders input[max='0.2']").waitFor();
   assert.equal(await slider(page, "early").count(), 0);
-  // A slider that is removed while its number is typed discards it.
+  // A removed slider discards its half-typed number.
   await sent();
   await number(page, "wide").focus();
   await page.keyboard.press("Control+a");
@@ -169,7 +169,6 @@ test("a finger that scrolls changes nothing, one that drags or taps does", async
       await new Promise((resolve) => requestAnimationFrame(resolve));
     }
   });
-  // Presses a control with a finger, moves the finger, and releases it.
   const swipe = async (control, dx, dy) => {
     await control.evaluate((node) => scrollBy(0, node.getBoundingClientRect().top - 680));
     await atRest();
@@ -199,7 +198,7 @@ test("a finger that scrolls changes nothing, one that drags or taps does", async
     assert.equal((await sent()).length, 1);
     await settled(page);
   }
-  // After the release boxes follow the file, and another object can be shown.
+  // Afterwards boxes follow the file, and another object can be shown.
   const radius = box(page, "shapes[0].radius", 1);
   await swipe(radius, 5, -96);
   studio.write("scene.toml", SCENE.replace("radius = 0.5", "radius = 0.35"));
@@ -227,7 +226,7 @@ test("keys act on the control that has the focus", async () => {
   await page.waitForFunction(() => Number(document.querySelector('[data-control="shapes[0].radius 1"]').value) < 0.01);
   await page.locator("#object-find").focus();
   for (const key of ["Home", "r", "5", " "]) await page.keyboard.press(key);
-  // Camera keys act only while the image has the focus.
+  // Camera keys need the focus of the image.
   for (const control of ["#transform", "#help summary", "#copy", "#exposure-number"]) {
     await page.locator(control).focus();
     for (const key of ["Home", "f", "r"]) await page.keyboard.press(key);
@@ -349,7 +348,7 @@ test("a count of cells steps from square to square", async () => {
   await field.focus();
   await page.keyboard.press("PageUp");
   await count(169); // ten squares up
-  // A typed number is sent as it is; the error stays until a valid one is typed.
+  // Sent as typed; the error stays until a valid one is typed.
   const error = page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" });
   await field.fill("5");
   await page.keyboard.press("Enter");
@@ -387,7 +386,7 @@ test("the focus of a control that is disabled or removed stays near, and returns
   assert.ok(await isAround("undo-write"));
   await page.keyboard.press("Tab");
   assert.ok(await isFocused(page.locator("#redo-write")), "what is beside it is the next");
-  // Focused elements that are hidden: the button beside a field, the canvas of another view.
+  // Hidden with the focus: the button beside a field, the canvas of another view.
   await slider(page, "level").focus();
   await page.keyboard.press("ArrowRight");
   await page.getByRole("button", { name: "Reset level" }).focus();
@@ -400,13 +399,12 @@ test("the focus of a control that is disabled or removed stays near, and returns
   await page.keyboard.press("1");
   await page.locator("[data-part=second] canvas").waitFor({ state: "hidden" });
   assert.ok(await isFocused(canvas(page)));
-  // A focused element that is removed.
+  // Removed with the focus.
   await page.keyboard.press("b");
   await page.getByRole("button", { name: "Delete view 1" }).focus();
   await page.keyboard.press("Enter");
   assert.ok(await isFocused(page.locator("#bookmarks")));
-  // Without a connection all controls are disabled. Afterwards the same control has the focus, unless the user has
-  // moved the focus.
+  // Without a connection all controls are disabled; then the same control has the focus, unless the user moved it.
   for (const [moves, wanted] of [[[], "#pause"], [["Tab"], "#save-png"]]) {
     await page.locator("#pause").focus();
     await studio.stop();
@@ -417,13 +415,13 @@ test("the focus of a control that is disabled or removed stays near, and returns
     await page.locator("#badge.live").waitFor({ state: "attached" });
     assert.ok(await isFocused(page.locator(wanted)), wanted);
   }
-  // Focusing the button that opens a file scrolls the panel only.
+  // Focusing the button scrolls the panel only.
   await page.evaluate(() => document.querySelectorAll("aside details").forEach((details) => (details.open = true)));
   await page.locator("#reference-file").focus();
   assert.equal(await page.evaluate(() => scrollY), 0);
   const button = await page.locator("label[for=reference-file]").boundingBox();
   assert.ok(button.y >= 0 && button.y + button.height <= 800, `${button.y}`);
-  // After a click beside all controls nothing regains the focus.
+  // After a click beside all controls nothing regains focus.
   await page.locator("#restart").focus();
   await page.locator("h1").click();
   await studio.stop();

@@ -21,7 +21,6 @@ afterEach(async () => {
 
 const box = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
 
-// Waits until the scene file contains a text.
 async function holds(text) {
   const deadline = Date.now() + LONGEST;
   while (!studio.read("scene.toml").includes(text)) {
@@ -30,7 +29,7 @@ async function holds(text) {
   }
 }
 
-// Clicks a point of the image, given as fractions of its canvas.
+// Clicks a point, in fractions of the canvas.
 async function click(page, x, y) {
   const area = await canvas(page).boundingBox();
   await page.mouse.click(area.x + area.width * x, area.y + area.height * y);
@@ -49,7 +48,7 @@ test("a click shows the object, and its controls write to the scene file", async
   const lines = page.locator("#object-groups > details").first().locator("pre");
   const number = SCENE.split("\n").indexOf("[[shapes]]") + 1;
   assert.match(await lines.innerText(), new RegExp(`^ *${number}  \\[\\[shapes\\]\\]\\n`));
-  // A slider moved by keys: the box, the file and the shown lines follow.
+  // By keys: the box, the file and the shown lines follow.
   await box(page, "shapes[0].radius").focus();
   await page.keyboard.press("ArrowLeft");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
@@ -65,7 +64,6 @@ test("a click shows the object, and its controls write to the scene file", async
   await holds("color = [0.25, 0.1, 0.1]");
   await box(page, "materials.red.color").fill("#ffffff");
   await holds("color = [1, 1, 1]");
-  // Another material replaces the shown one.
   await page.locator("#undo-write", { hasText: "materials.red.color" }).waitFor();
   await box(page, "shapes[0].material").selectOption("grey");
   await holds('center = [0, 0, 0.5]\nradius');
@@ -84,7 +82,7 @@ test("changes of the file are undone and redone by keys", async () => {
   await box(page, "shapes[0].radius", 1).fill("0.25");
   await page.keyboard.press("Enter");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
-  // In a text box these keys belong to the browser.
+  // Keys of the browser in a text box.
   await canvas(page).focus();
   await page.keyboard.press("Control+z");
   await page.locator("#redo-write", { hasText: "shapes[0].radius" }).waitFor();
@@ -128,7 +126,7 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
   await x.scrollIntoViewIfNeeded();
   const area = await x.boundingBox();
   const [left, top] = [area.x + area.width / 2, area.y + area.height / 2];
-  // Ten pixels are one step, a tenth of the position's magnitude; with Shift, a hundred pixels are.
+  // Ten pixels are one step, a tenth of the magnitude; with Shift, a hundred.
   await page.mouse.move(left, top);
   await page.mouse.down();
   for (const dx of [5, 20, 60, 100]) await page.mouse.move(left + dx, top);
@@ -156,7 +154,7 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
   // A click focuses the box for typing.
   await page.mouse.click(left, top);
   assert.equal(await x.evaluate((box) => box === document.activeElement), true);
-  // A held key is one undo step, too.
+  // A held key is one undo step.
   for (let i = 0; i < 4; i++) await page.keyboard.down("ArrowUp");
   await page.keyboard.up("ArrowUp");
   await holds("position = [0.4, -4, 1]");
@@ -170,7 +168,7 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
     await settled(page);
   }
   assert.equal(studio.read("scene.toml"), SCENE);
-  // A key held right after a click is one undo step, too.
+  // Also right after a click.
   await x.evaluate(async (box) => {
     const fire = (Kind, type, more) => box.dispatchEvent(new Kind(type, { bubbles: true, ...more }));
     fire(PointerEvent, "pointerdown", { button: 1 });
@@ -214,7 +212,7 @@ test("drags, keys and sliders send no value out of range", async () => {
   for (let i = 0; i < 7; i++) await page.keyboard.press("PageDown");
   await holds("color = [0, 0.8, 0.8]");
   await settled(page);
-  // A lens has 0 or at least 3 blades: steps skip the numbers between.
+  // 0 or at least 3 blades: steps skip the numbers between.
   await choose(page, "camera");
   await page.click("details.absent > summary");
   await box(page, "camera.blades", 1).focus();
@@ -234,7 +232,7 @@ test("drags, keys and sliders send no value out of range", async () => {
     const [low, high] = path.endsWith("radius") ? [1e-9, 1e9] : [0, 1e6];
     for (const x of [value].flat()) assert.ok(x >= low && x <= high, `${path}: ${x}`);
   }
-  // A typed number is checked by the scene's parser, which reports the error.
+  // The scene's parser checks it.
   await choose(page, "lights[0]");
   await red.fill("-1");
   await page.keyboard.press("Enter");
@@ -302,7 +300,7 @@ test("other viewers' changes of a vector survive a drag of one of its numbers", 
   await page.mouse.up();
   await holds("center = [0.04, 0.5, 0.75]");
   await settled(page);
-  // Quick successive changes are all written, each as its own undo step.
+  // Each of quick changes is its own undo step.
   const notes = await page.evaluate(() => {
     const boxes = [0, 1, 2].map((i) => document.querySelector(`[data-control="shapes[0].center ${i}"]`));
     boxes.forEach((box, i) => {

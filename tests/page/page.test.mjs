@@ -72,7 +72,6 @@ test("a broken shader shows file and line and keeps the image, a fixed one recov
   studio.mendShader();
   await page.locator("#problems h2").waitFor({ state: "detached" });
   await showsRendered(page, studio);
-  // The terminal shows the error too.
   assert.match(studio.said, new RegExp(`error: ${place.replaceAll(".", "\\.")}\\d+: .*simple`));
   assert.doesNotMatch(studio.said, /\x1b/, "a pipe gets no colours");
 });
@@ -304,7 +303,7 @@ test("the page fits 360 pixels, in light and dark", async () => {
       assert.ok(box.x >= 0 && box.x + box.width <= 360, `${id}: ${JSON.stringify(box)}`);
     }
     studio.breakShader();
-    // A partly written file may have caused another problem before.
+    // Another problem of a partly written file may precede.
     const problem = page.locator("#problems article", { hasText: "simple" });
     await problem.waitFor();
     const box = await problem.boundingBox();
@@ -322,7 +321,7 @@ test("pages of other origins are rejected", async () => {
   const page = await context.newPage();
   const answer = await page.goto(`http://evil.example:${studio.port}/`);
   assert.equal(answer.status(), 403);
-  // A WebSocket of another page. Control: the same code on the own page connects.
+  // A WebSocket of another page. Control: the same on the own page connects.
   const connects = (url) =>
     new Promise((resolve) => {
       const socket = new WebSocket(url);
@@ -426,7 +425,7 @@ test("a save is undone, and keeps line ends and a byte-order mark", async () => 
   assert.equal(studio.read("scene.toml"), text_of(SCENE));
   await page.locator("#save:enabled").waitFor();
   assert.equal(await text(page, "#camera-text"), camera, "the view stays");
-  // A file that was edited since cannot be undone.
+  // Edited since: cannot be undone.
   await page.click("#save");
   await page.locator("#undo").waitFor();
   studio.edit("scene.toml", "fov = 40", "fov = 41");

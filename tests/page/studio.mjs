@@ -12,7 +12,7 @@ const ROOT = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..")
 export const PROGRAM = process.env.WGRAY_PROGRAM;
 const { chromium } = createRequire(path.join(process.env.WGRAY_PAGE_MODULES, "/"))("playwright-core");
 
-// Timeout in milliseconds for anything that the tests wait for, even on a busy machine.
+// Timeout in milliseconds of all waits, even on a busy machine.
 export const LONGEST = 40_000;
 
 export const SCENE = `# a small scene
@@ -65,7 +65,7 @@ tangent = [1, 0, 0]
 const KERNEL = "shaders/kernels/render.wgsl";
 const RADIANCE = "path_value(path)";
 
-// A folder with a scene and shaders, and the program that watches it.
+// A folder with scene and shaders, and the program that watches it.
 export class Studio {
   constructor() {
     this.folder = fs.mkdtempSync(path.join(os.tmpdir(), "wgray-page-"));
@@ -109,14 +109,13 @@ export class Studio {
     return this.read(KERNEL).split("\n").findIndex((line) => line.includes("simple")) + 1;
   }
 
-  // Returns the PNG file that `wgray render` makes of the scene, as bytes.
+  // Returns the PNG bytes that `wgray render` makes.
   render() {
     const out = this.path("rendered.png");
     this.renderTo(out);
     return [...fs.readFileSync(out)];
   }
 
-  // Renders the scene to a file.
   renderTo(file, more = []) {
     execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", file, "--quiet", ...more], { stdio: "pipe" });
   }
@@ -126,7 +125,7 @@ export class Studio {
     execFileSync(PROGRAM, ["diff", a, b], { stdio: "pipe" });
   }
 
-  // Starts the program; resolves once it has printed the page's address.
+  // Starts the program; resolves once it has printed the address.
   async start(port = 0, more = [], scene = "scene.toml") {
     const args = ["dev", scene, "--shaders", "shaders", "--listen", `127.0.0.1:${port}`, ...more];
     this.program = spawn(PROGRAM, args, { cwd: this.folder, stdio: ["ignore", "inherit", "pipe"] });
@@ -194,13 +193,13 @@ export async function visit(browser, studio, options = {}) {
   return page;
 }
 
-// Serves the page's files from the folder WGRAY_PAGE, so that they are tested without a build.
+// Serves the page from the folder WGRAY_PAGE, without a build.
 function fromDisk(route) {
   const file = path.join(process.env.WGRAY_PAGE, path.basename(new URL(route.request().url()).pathname) || "index.html");
   return fs.existsSync(file) ? route.fulfill({ path: file }) : route.continue();
 }
 
-// Waits until the page shows a finished image later than a revision; returns its revision.
+// Waits for a finished image later than a revision; returns its revision.
 export async function finished(page, after = 0) {
   const handle = await page.waitForFunction((after) => {
     const { revision, done } = document.getElementById("panels").dataset;
@@ -209,8 +208,8 @@ export async function finished(page, after = 0) {
   return handle.jsonValue();
 }
 
-// Waits until all commands of the page, and at least `commands` commands of all viewers, are executed and shown;
-// returns the number of executed commands.
+// Waits until all commands of the page, and at least `commands` of all viewers, are executed and shown; returns the
+// number of executed commands.
 export async function settled(page, commands = 0) {
   await page.waitForFunction((commands) => window.isSettled(commands), commands);
   return page.evaluate(() => Number(document.getElementById("panels").dataset.executed));
@@ -220,20 +219,18 @@ export function revision(page) {
   return page.evaluate(() => Number(document.getElementById("panels").dataset.revision));
 }
 
-// Returns the canvas of a part of the image.
 export const canvas = (page, part = "picture") => page.locator(`[data-part=${part}] canvas`);
 
-// Returns the `nth` input of the control for a value of the selected object.
+// Returns the `nth` input for a value of the selected object.
 export const control = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
 
-// Selects an object by its name.
 export async function choose(page, name) {
   await page.fill("#object-find", name);
   await page.keyboard.press("Enter");
   await page.locator("#object-name", { hasText: name }).waitFor();
 }
 
-// Records the messages that a page sends from now on; the returned function takes those recorded since its last call.
+// Records the messages of a page; the returned function takes those since its last call.
 export async function listen(page, isWanted = () => true) {
   await page.evaluate(() => {
     const send = WebSocket.prototype.send;
@@ -281,7 +278,7 @@ export function same(seen, wanted, what = "the images differ") {
   assert.fail(`${what}: ${seen.slice(0, 2)} and ${wanted.slice(0, 2)} pixels, ${places.length} bytes differ, the first at ${first}: ${a[first]} and ${b[first]}`);
 }
 
-// Waits until the page shows the image that `wgray render` makes.
+// Waits until the page shows the image of `wgray render`.
 export async function showsRendered(page, studio) {
   const wanted = await decoded(page, studio.render());
   const deadline = Date.now() + LONGEST;

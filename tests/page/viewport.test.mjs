@@ -23,14 +23,13 @@ afterEach(async () => {
 const text = (page, selector) => page.locator(selector).innerText();
 const camera = (page) => text(page, "#camera-text");
 
-// Returns the window position of an image point, given from 0 to 1 along each side.
+// Returns the window position of an image point from 0 to 1.
 async function at(page, x, y, part = "picture") {
   const box = await canvas(page, part).boundingBox();
   const { left, top, scale } = await canvas(page, part).evaluate((canvas) => ({ ...canvas.dataset }));
   return [box.x + Number(left) + 120 * x * Number(scale), box.y + Number(top) + 90 * y * Number(scale)];
 }
 
-// Waits until the camera's text differs from `last`, and returns it.
 const moved = (page, last) =>
   page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, last).then(() => settled(page)).then(() => camera(page));
 
@@ -157,7 +156,7 @@ test("two fingers pan and dolly, a tap reads a pixel", async () => {
   const near = await moved(page, start);
   const height = (text) => Number(/position = \[[^,]*, ([^,]*)/.exec(text)[1]);
   assert.ok(Math.abs(height(near)) < 0.7 * Math.abs(height(start)), near);
-  // Touch targets are large enough, and the image stays in view.
+  // Touch targets are large enough; the image stays in view.
   const small = await page.evaluate(() => [...document.querySelectorAll("aside button, aside select, aside summary, aside input[type=number], #toolbar span, #zooming button")]
     .filter((control) => control.checkVisibility()).map((control) => [control.id || control.textContent, control.getBoundingClientRect()])
     .filter(([, box]) => box.height < 44 || box.width < 44).map(([name, box]) => `${name}: ${box.width} x ${box.height}`));
@@ -323,7 +322,7 @@ test("rendering can be paused, limited, reduced in resolution and saved as files
   await page.locator("#samples", { hasText: /^64 of 64$/ }).waitFor();
 });
 
-// Returns the texts of the page with less contrast than WCAG 2.1 requires.
+// Returns the texts with less contrast than WCAG 2.1 requires.
 const CONTRASTS = () => {
   const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
   const over = (colors) => {
@@ -382,7 +381,6 @@ test("a drag is shown at 20 frames per second, to eleven viewers too", async (t)
       if (revision !== window.seen.at(-1)?.[0]) window.seen.push([revision, performance.now()]);
     }).observe(document.getElementById("panels"), { attributes: true, attributeFilter: ["data-revision"] });
   });
-  // Measures the intervals between frames during a drag.
   const drag = async () => {
     await page.evaluate(() => (window.seen = []));
     const start = Date.now();

@@ -63,7 +63,7 @@ fn a_blended_sphere_is_crossed_twice() {
 fn shadows_scale_with_alpha() {
     let lit = |alpha: f64, light: &str| {
         let material = black(&format!("alpha = {alpha}, alpha_mode = 'blend'"));
-        // The camera is below the blended surface and sees its shadow on the floor.
+        // Below the surface, with its shadow on the floor.
         let text = format!(
             "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
              materials.surface = {material}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{}{light}",
@@ -88,7 +88,7 @@ fn shadows_scale_with_alpha() {
 
 #[test]
 fn transparent_surfaces_do_not_change_mis_weights() {
-    // A light that NEE and BSDF sampling find, with and without a fully transparent surface before it.
+    // Found by NEE and BSDF sampling, with and without a fully transparent surface.
     let with = |has_surface: bool| {
         let shape = if has_surface {
             square(0.5, 4.0, "surface")
@@ -110,7 +110,7 @@ fn transparent_surfaces_do_not_change_mis_weights() {
     }
 }
 
-/// Returns a leaf above a floor: a quad with a disk in its alpha channel.
+/// Returns a quad above a floor, with a disk in its alpha channel.
 fn leaf(folder: &std::path::Path, mode: &str, way_in: &str) -> Packed {
     let size = 64u32;
     let texel = |x: u32, y: u32| {

@@ -46,7 +46,7 @@ fn without_bounces_only_emission_is_visible() {
 
 #[test]
 fn scaling_a_scene_does_not_change_radiance() {
-    // Scaled by 1e-6 and 1e6, radiance differs only by rounded coordinates.
+    // Radiance differs only by rounded coordinates.
     let room = |s: f64| {
         format!(
             "camera = {{ position = [0, {}, {s}], look_at = [0, 0, {s}], fov = 40 }}\n\
@@ -105,7 +105,7 @@ fn touching_and_grazing_lights_give_finite_values() {
 
 #[test]
 fn long_paths_terminate() {
-    // A closed mirror without absorption: each path reaches the maximum depth.
+    // Without absorption each path reaches the maximum depth.
     let text = |color: &str| {
         format!(
             "camera = {{ position = [0.3, 0, 0], look_at = [1, 0.1, 0], fov = 40 }}\nmaterials.m = {{ type = 'mirror', tint = {color} }}\n\
@@ -164,7 +164,7 @@ fn reflectances_above_one_are_clamped() {
 
 #[test]
 fn glass_with_shading_normals_creates_no_energy() {
-    // White-furnace tests: a cube and a coarse sphere of glass with smooth normals, and spheres with normal maps.
+    // White furnace: a cube and a coarse sphere of glass with smooth normals, and normal maps.
     let folder = tempfile::tempdir().expect("a folder");
     let cube = crate::meshes::forms::Form::cube();
     let ball = crate::meshes::forms::Form::icosphere(1);

@@ -39,7 +39,7 @@ fn direction(cosine: f64, longitude: f64) -> Vec3 {
     DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
 }
 
-/// Returns wo from normal to grazing; along the tangent, across, and in between.
+/// Returns wo from normal to grazing, in several azimuths.
 fn viewers() -> Vec<Vec3> {
     let mut all = vec![Vec3::Z];
     for cosine in [0.8, 0.4, 0.04] {
@@ -50,7 +50,6 @@ fn viewers() -> Vec<Vec3> {
     all
 }
 
-/// Returns a material as evaluated from one side.
 fn seen(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Material {
     let surface = Surface {
         position: Vec3::ZERO,
@@ -321,8 +320,8 @@ fn matched_indices_do_not_reflect() {
 
 #[test]
 fn glass_around_the_camera_absorbs_over_the_whole_path() {
-    // From inside, through a transparent or camera-invisible surface, to the glass boundary and an emitter behind it:
-    // exp(-a d) times the Fresnel transmittance at normal incidence times n^2.
+    // From inside, through a transparent or camera-invisible surface, to the glass boundary and an emitter: exp(-a d)
+    // times the Fresnel transmittance at normal incidence times n^2.
     let (a, d) = (0.4_f64, 2.0);
     let wall = |z: f64, material: &str| {
         format!(

@@ -29,7 +29,6 @@ fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> [f32; 3]) -> Image
     }
 }
 
-/// Returns a scene with an environment map, and further environment keys.
 fn around(image: &Image, more: &str, (samples, depth): (u32, u32), rest: &str) -> Packed {
     described(&format!("file = 'around'{more}"), Some(image), (samples, depth), rest)
 }
@@ -221,7 +220,6 @@ fn a_white_map_equals_a_constant_color() {
     }
 }
 
-/// An environment map with emitters and materials of several kinds.
 const EMITTERS: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5], fov = 40 }\n\
     materials.source = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
     materials.gloss = { type = 'phong', diffuse = [0.4, 0.4, 0.4], specular = [0.5, 0.5, 0.5], shininess = 12, ambient = [0, 0, 0] }\n\
@@ -281,7 +279,7 @@ fn the_light_of_map_and_lights_adds_up() {
     let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for mode in both() {
         let sum = |packed: Packed| mean(&render(&packed, mode));
-        // The rectangle light occludes in all three images.
+        // The rectangle light occludes in all three.
         let hidden = lights.split("[[lights]]").last().unwrap_or_default();
         let plate = format!("[[lights]]{}", hidden.replace("color = [3, 3, 3]", "color = [0, 0, 0]"));
         let of_image = sum(around(&image, "", (1024, 3), &format!("{dark}{plate}")));
@@ -299,7 +297,7 @@ fn the_light_of_map_and_lights_adds_up() {
 
 #[test]
 fn the_floor_occludes_light_from_below() {
-    // The floor has nothing below it, so it would cast no shadow of area lights. The lower half of the ball is lit from
+    // The floor has nothing below it: it would cast no shadow of area lights. The lower half of the ball is lit from
     // below only.
     let below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
     let floors = [
@@ -409,7 +407,6 @@ fn all_backends_give_the_same_bits() {
     }
 }
 
-/// Samples the environment map at a surface.
 fn samples(packed: &Packed, normal: Vec3, count: u32) -> impl Iterator<Item = Vec3> {
     let light = packed
         .lighting

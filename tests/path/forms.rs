@@ -8,7 +8,6 @@ use crate::pictures::{both, means, render};
 /// A camera that looks roughly along +x.
 const INSIDE: &str = "camera = { position = [0.1, 0, 0.05], look_at = [1, 0, 0.2], fov = 60 }\n";
 
-/// Returns an orthographic camera that looks straight down.
 fn above(x: f64, y: f64, z: f64, height: f64) -> String {
     format!(
         "camera = {{ type = 'orthographic', position = [{x}, {y}, {z}], look_at = [{x}, {y}, 0], up = [0, 1, 0], height = {height} }}\n"
@@ -321,7 +320,7 @@ fn a_glass_slab_transmits_by_fresnel_and_beer() {
 
 #[test]
 fn radiance_in_glass_is_the_square_of_its_index() {
-    // With uniform radiance 1 outside, radiance in glass is n^2; internal reflections add the same radiance.
+    // With radiance 1 outside, radiance in glass is n^2; internal reflections add the same.
     let text = format!(
         "{INSIDE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = 1.5 }}\n\
          [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 3\n"

@@ -7,7 +7,7 @@ use wgray_render::records::{NO_INDEX, Packed};
 use crate::pictures::{both, differing, exact_modes, means, reference, render};
 use crate::scenes;
 
-/// Returns an emitter before a wall, and a mirror that shows it.
+/// Returns an emitter before a wall, and a mirror of it.
 fn room(integrator: &str, light: &str) -> Packed {
     let (wall, depth) = match integrator {
         "path" => ("type = 'diffuse', color = [0.5, 0.5, 0.5]", 4),

@@ -48,8 +48,7 @@ fn selection_is_by_power_and_one_quarter_uniform() {
     assert!(chi_square < 15.0 + 6.0 * (2.0_f64 * 15.0).sqrt(), "{chi_square}");
 }
 
-/// A weak directional light, or a spot light a million times as strong that faces away, does not keep a point light
-/// from being sampled.
+/// A weak directional light, or a spot light a million times as strong that faces away.
 #[test]
 fn lights_without_local_effect_do_not_starve_others() {
     let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 1]\ncolor = [1, 1, 1]\n";
@@ -66,8 +65,8 @@ fn lights_without_local_effect_do_not_starve_others() {
 
 #[test]
 fn all_kinds_of_emitters_light_equally() {
-    // The same square as a light, a rectangle, two triangles, a nearly flat box, and with a constant texture; alone and
-    // among others.
+    // The same square as a light, rectangle, two triangles, flat box, and with a constant texture; alone and among
+    // others.
     let square = "center = [0, 0, 1]\nsize = [1, 1]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n";
     let emissive = "materials.s = { type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4] }\n";
     let textured = "textures.t = { type = 'checker', even = [4, 4, 4], odd = [4, 4, 4] }\n\

@@ -19,7 +19,6 @@ const CAMERA: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.3], f
 const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
-/// Returns light `i` of a scene with all kinds.
 fn light(i: u32, random: &Random) -> String {
     let coordinate = |scale: f64, from: f64| from + scale * random.unit();
     let (x, y, z) = (coordinate(2.0, -1.0), coordinate(2.0, -1.0), coordinate(0.8, 0.2));
@@ -47,7 +46,6 @@ fn lights(count: u32) -> Vec<String> {
     (0..count).map(|i| light(i, &random)).collect()
 }
 
-/// An emitter in the light tree.
 struct Leaf {
     density: f32,
     instance: u32,
@@ -102,7 +100,7 @@ fn selection_frequencies_and_hit_pdfs_match_the_tree() {
                 if counts[i] == 0 {
                     continue;
                 }
-                // A directional light outside of the tree scales the PDFs of all leaves.
+                // A directional light outside of the tree scales all PDFs.
                 let primitive = packed.lighting.lights[leaf.index as usize].primitive;
                 if primitive != NO_INDEX {
                     let hit = Hit {
@@ -122,7 +120,7 @@ fn selection_frequencies_and_hit_pdfs_match_the_tree() {
                     kinds += 1.0;
                 }
             }
-            // 64 stratified samples each: well below independent samples.
+            // 64 stratified samples: well below independent ones.
             assert!(
                 kinds > 5.0 && chi_square < kinds + 6.0 * (2.0_f64 * kinds).sqrt(),
                 "{chi_square} of {kinds}"
@@ -142,7 +140,7 @@ fn many_lights_are_the_sum_of_single_ones() {
             .collect();
         let camera = "camera = { type = 'orthographic', position = [0, 0, 0.05], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
                       materials.m = { type = 'diffuse', color = [0.7, 0.7, 0.7] }\n";
-        // Rectangle lights occlude, so single-light images would not add up.
+        // Rectangle lights occlude: single-light images would not add up.
         let all: Vec<String> = all.into_iter().filter(|light| !light.contains("rectangle")).collect();
         let of = |samples: u32, lights: &[String]| scene(samples, 1, &format!("{camera}{FLOOR}{}", lights.concat()));
         let mut expected = [0.0; 3];

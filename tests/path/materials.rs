@@ -21,7 +21,7 @@ struct Lobes {
     whole: bool,
 }
 
-/// Returns the factor that undoes the scaling of transmitted radiance by the squared index.
+/// Returns the factor that undoes the scaling of transmission by the squared index.
 fn per_index(material: &Material, wi: Vec3) -> f64 {
     if wi.z < 0.0 && material.kind == ROUGH_GLASS {
         f64::from(material.ior).powi(2)
@@ -64,7 +64,6 @@ impl Lobes {
         Material { loss, ..self.material }
     }
 
-    /// Samples a microfacet BSDF with weight and PDF.
     fn facet_sample(&self, wo: Vec3, u: Vec2, random: f32) -> Option<LobeSample> {
         match self.material.kind {
             METAL => Some(metal_sample(&self.seen(wo), wo, u)),
@@ -89,7 +88,6 @@ impl Lobes {
         [METAL, ROUGH_GLASS, THIN].contains(&self.material.kind)
     }
 
-    /// Returns the directional albedo.
     fn albedo(&self, wo: Vec3) -> f64 {
         integral(wo, |wi| {
             if wi.z > 0.0 || self.has_facets() {
@@ -193,7 +191,7 @@ fn viewers() -> Vec<Vec3> {
     [1.0, 0.9, 0.5, 0.1, 0.01].map(|cosine| direction(cosine, 0.7)).to_vec()
 }
 
-/// Integrates over all directions, with finer cells around the mirrored one or, for wide lobes, the normal.
+/// Integrates over all directions, finer around the mirrored one or, for wide lobes, the normal.
 fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
     let (rings, spokes) = (1500, 600);
     let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
@@ -314,8 +312,7 @@ fn pdfs_integrate_to_one() {
     }
 }
 
-/// Returns Pearson's chi-square of sampled directions and its degrees of freedom. Cells with small expected counts are
-/// merged.
+/// Returns Pearson's chi-square of sampled directions, with small cells merged, and its degrees of freedom.
 fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 200_000;
     const HEIGHTS: usize = 40;
@@ -332,7 +329,7 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
     };
     let mut counts = vec![0.0; HEIGHTS * LONGITUDES];
     for i in 0..SAMPLES {
-        // Independent: low-discrepancy sequences are too even for this test.
+        // Independent, as low-discrepancy sequences are too even.
         let bits = wgray_render::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
         let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray_render::cpu::rng::unit_float);
         let Some(wi) = lobes.sample(wo, Vec2::new(a, b), c) else {
@@ -410,7 +407,7 @@ fn mean_sample_weights_equal_the_albedo() {
                     let weight = f64::from(lobes.eval(wo, wi).x) / f64::from(pdf);
                     sum += weight * per_index(&lobes.material, wi);
                     if let Some(found) = lobes.facet_sample(wo, u, random) {
-                        // The sample's own weight and PDF agree, except for rounding at grazing angles.
+                        // Weight and PDF agree, except for rounding at grazing angles.
                         let off = (f64::from(found.weight.x) - weight).abs() / weight.max(1e-3);
                         let density = f64::from((found.pdf - pdf).abs() / pdf);
                         let grazing = wi.z.abs() < 0.02 || wo.z < 0.02;

@@ -18,7 +18,7 @@ use wgray_render::records::Packed;
 
 use crate::scenes;
 
-/// Returns a path-traced scene of 16 x 16 pixels with `samples` samples each; `rest` is the remaining text.
+/// Returns 16 x 16 path-traced pixels with `samples` samples each; `rest` is the remaining text.
 pub fn scene(samples: u32, depth: u32, rest: &str) -> Packed {
     scenes::parse(&format!(
         "image = {{ width = 16, height = 16 }}\n{rest}\n\

@@ -96,7 +96,7 @@ fn grid() -> Vec<(String, Material)> {
     all
 }
 
-/// Integrates over the sphere, with finer cells around the mirrored and refracted directions.
+/// Integrates over the sphere, finer around the mirrored and refracted directions.
 fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
     let (rings, spokes) = (900, 240);
     let mut sum = 0.0;
@@ -402,7 +402,6 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
     }
 }
 
-/// Returns a sphere lit from above.
 fn picture_of(keys: &str, textures: &str) -> wgray_render::records::Packed {
     super::scene(
         16,

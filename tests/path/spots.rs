@@ -6,7 +6,7 @@ use super::mean;
 use crate::pictures::{both, means, render};
 use crate::scenes;
 
-/// Returns a white floor of 3 x 3 units, seen from above in 16 x 16 pixels.
+/// Returns a white floor of 3 x 3 units in 16 x 16 pixels, from above.
 fn floor(integrator: &str, light: &str) -> Packed {
     let material = match integrator {
         "path" => "type = 'diffuse', color = [1, 1, 1]",
@@ -20,7 +20,7 @@ fn floor(integrator: &str, light: &str) -> Packed {
     ))
 }
 
-/// Returns the documented formula at a floor point, for a spot light of color 1 above (0.2, 0.1, 0) that points down.
+/// Returns the documented formula for a spot light of color 1 above (0.2, 0.1, 0) that points down.
 fn expected(at: [f64; 2], height: f64, cone: f64, inner: f64, is_path: bool) -> f64 {
     let (x, y) = (at[0] - 0.2, at[1] - 0.1);
     let distance = (x * x + y * y + height * height).sqrt();

@@ -8,7 +8,7 @@ use crate::{adapter, sources};
 
 const FILE: &str = "integrators/path.wgsl";
 
-/// Strategies by the seed of the camera, so that a scene needs one kernel.
+/// Strategies by the seed of the camera: a scene needs one kernel.
 const MIS: u32 = 0;
 const LIGHT: u32 = 1;
 const BSDF: u32 = 2;
@@ -17,7 +17,6 @@ const WRONG: u32 = 3;
 /// Emission that the camera sees directly.
 const DIRECT: u32 = 4;
 
-/// Returns shaders with the strategies.
 fn shaders_with_strategies() -> Shaders {
     const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
     const OF_BSDF: &str = "power_heuristic(state.pdf, emitter_pdf(prim, from_previous, density, ray, surface.normal))";
@@ -97,7 +96,7 @@ fn light_and_bsdf_sampling_agree() {
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
     ];
     let many = many_lamps();
-    // The last shape and the many lights are combined with all materials, each other shape with one.
+    // The last shape and the many lights get all materials, each other shape one.
     let (with_one, number_of_many) = (shapes.len() - 1, shapes.len());
     let shapes = shapes.into_iter().chain([many.as_str()]);
     for (i, shape) in shapes.enumerate() {

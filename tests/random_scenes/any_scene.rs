@@ -28,7 +28,6 @@ pub fn packed(d: &Description) -> Packed {
     pack(&d.validate_with(&beside).unwrap_or_else(|problem| panic!("{problem}")))
 }
 
-/// Settings of the integrator `path`.
 #[derive(Clone, Debug)]
 struct OfPaths {
     materials: [MaterialDescription; 3],

@@ -20,7 +20,6 @@ use crate::{patterns, rounding, sources};
 /// Number of scenes. If set, each run has different ones.
 const CASES: &str = "WGRAY_TEST_CASES";
 
-/// Compares both backends.
 fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
     let packed = any_scene::packed(d);
     let cpu = reference(&packed);
@@ -46,7 +45,6 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns a minimized failing scene and the reason.
 fn failing(cases: u32, shrinks: u32, always_the_same: bool, shaders: &Shaders) -> Option<(Description, String)> {
     let config = Config {
         cases,
@@ -92,7 +90,7 @@ fn random_scenes_are_the_same_on_gpu_and_cpu() {
     println!("{number} random scenes, each from buffers and as constants: every pixel has the same bits");
 }
 
-/// Enough samples per pixel that some drivers would terminate the loops of a dispatch.
+/// Enough samples that some drivers would terminate the loops of a dispatch.
 #[test]
 fn random_scenes_of_many_samples_are_the_same() {
     if !adapter::device().is_some_and(bit_exact) {
@@ -118,8 +116,8 @@ fn random_scenes_of_many_samples_are_the_same() {
     }
 }
 
-/// Without guaranteed bits, all scenes together are within the tolerances: plain WGSL, devices other than software
-/// Vulkan, imprecise quotients and square roots. Direct light only: after a bounce, one ulp may change the path.
+/// All scenes together are within the tolerances: plain WGSL, devices other than software Vulkan, imprecise quotients
+/// and square roots. Direct light only: after a bounce, one ulp may change the path.
 #[test]
 fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     let Some(device) = adapter::device() else { return };
@@ -166,7 +164,7 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     assert!(shifted.judge().is_err(), "the comparison cannot fail");
 }
 
-/// Checks that a change of one ulp in a constant is detected, and that the reported scene is valid.
+/// In a constant; the reported scene is valid.
 #[test]
 fn random_scenes_detect_a_difference_of_one_ulp() {
     if !adapter::device().is_some_and(bit_exact) {
@@ -180,7 +178,7 @@ fn random_scenes_detect_a_difference_of_one_ulp() {
     assert_eq!(wgray_render::pack::pack(&scene), any_scene::packed(&d));
 }
 
-/// Random scenes cover every type of the parser, except these.
+/// Every type of the parser, except these.
 #[test]
 fn random_scenes_cover_every_type() {
     const NEVER: &[(&str, &str)] = &[

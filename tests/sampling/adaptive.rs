@@ -97,7 +97,7 @@ fn a_crop_is_a_part_of_the_whole() {
     }
 }
 
-/// Returns the sample count from pilot samples of the neighbors in double precision; `None` if rounding decides.
+/// Returns the sample count from the neighbors' pilot samples in double precision; `None` if rounding decides.
 fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> Option<u32> {
     let (mut squares, mut neighbors, mut deviations, mut fourth) = (0.0, 0.0, 0.0, 0.0);
     for (dx, dy) in [(0, -1), (-1, 0), (1, 0), (0, 1)] {

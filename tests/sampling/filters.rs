@@ -27,7 +27,6 @@ fn filtered_scene(kind: PixelFilterKind, radius: f64) -> Packed {
     })
 }
 
-/// Returns a validated filter.
 fn checked(kind: PixelFilterKind, radius: f64) -> wgray::scene::PixelFilter {
     let mut description = scenes::scene("cornell.toml");
     let radius = Some(radius);
@@ -101,7 +100,7 @@ fn tables_have_the_moments_of_their_filters() {
                     (found - expected).abs() < 3e-3 * radius.powi(power),
                     "{kind:?} of radius {radius}, moment {power}: {found}, not {expected}"
                 );
-                // Control: the moments of another filter differ.
+                // Control: another filter.
                 for other in KINDS.into_iter().filter(|other| *other != kind) {
                     let expected = moment(other, power) / moment(other, 0) * radius.powi(power);
                     assert!(
@@ -183,7 +182,7 @@ fn images_of_every_filter_are_the_same_on_cpu_and_gpu() {
         }
         films.push(expected);
     }
-    // Control: the images of different filters differ.
+    // Control: other filters.
     for (i, film) in films.iter().enumerate() {
         assert!(films[..i].iter().all(|other| differing(film, other) > 100));
     }

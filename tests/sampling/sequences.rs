@@ -41,7 +41,7 @@ const SOBOL_POINTS: [[u32; 2]; 32] = [
     [17, 1],
     [1, 17],
 ];
-/// Returns the Sobol' index of point `i` of scipy, which is in Gray code order.
+/// Returns the Sobol' index of scipy's point `i`, in Gray code order.
 fn gray(i: u32) -> u32 {
     i ^ (i >> 1)
 }
@@ -51,7 +51,6 @@ const HALTON_3: [u32; 12] = [
     0, 4782969, 9565938, 1594323, 6377292, 11160261, 3188646, 7971615, 12754584, 531441, 5314410, 10097379,
 ];
 
-/// Returns keys of many pixels.
 fn keys(count: u32) -> impl Iterator<Item = UVec2> {
     (0..count).map(|i| sample_key(UVec2::new(i % 13, i / 13), 3, i % 5))
 }
@@ -183,8 +182,8 @@ fn halton_points_have_one_in_each_third_of_a_third() {
     assert!(largest * 6.969_171_6e-8 < 1.0);
 }
 
-/// Returns the star discrepancy, max |fraction of points in [0, a) x [0, b) - a b|. Boxes that end at points, open and
-/// closed, suffice.
+/// Returns the star discrepancy, max |fraction of points in [0, a) x [0, b) - a b|, over open and closed boxes that end
+/// at points.
 fn star_discrepancy(points: &[Vec2]) -> f64 {
     let n = points.len() as f64;
     let mut by_x: Vec<Vec2> = points.to_vec();
@@ -239,7 +238,7 @@ fn star_discrepancies_keep_their_bounds() {
             .collect::<Vec<_>>(),
     );
     assert!((grid - (1.0 / n - 0.25 / (n * n))).abs() < 1e-6, "{grid}");
-    // One point per cell: each of the 2n - 1 cells that a box cuts contributes one point at most.
+    // One point per cell: each of the 2n - 1 cells that a box cuts contributes at most one.
     assert!(most(discrepancies(JITTERED, 32, 1024)) <= (2.0 * n - 1.0) / (n * n));
     // A (0, m, 2)-net in base 2: (m + 1) / 2^m (Niederreiter, "Random Number Generation and Quasi-Monte Carlo Methods",
     // 1992, theorem 4.6).

@@ -29,7 +29,7 @@ fn scene(size: u32, height: f64, sampling: Sampling, content: &str) -> Packed {
     ))
 }
 
-/// Returns white dots of 0.2 pixels, one in each square of `spacing` pixels.
+/// Returns white dots of 0.2 pixels, one per square of `spacing` pixels.
 fn dots(spacing: u32, sampling: Sampling) -> Packed {
     let size = 20;
     let mut content = String::new();
@@ -54,7 +54,6 @@ fn dots(spacing: u32, sampling: Sampling) -> Packed {
     scene(size, f64::from(size), sampling, &content)
 }
 
-/// Returns thin, slightly tilted lines with decreasing distances.
 fn lines(sampling: Sampling) -> Packed {
     let mut content = String::new();
     let mut y = -11.0;
@@ -136,7 +135,6 @@ fn brightness(film: &Film) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Returns the mean and its standard error.
 fn estimate(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -41,7 +41,7 @@ fn scenes(folder: &Path) -> Vec<(String, Packed)> {
     scenes
 }
 
-/// Returns smooth meshes with normal maps: coordinates around the mesh, and mirrored in its middle.
+/// Returns smooth meshes with normal maps: coordinates around, and mirrored.
 fn meshes(folder: &Path) -> String {
     let around = Sheet::torus(12, 8);
     let mut mirrored = around.clone();
@@ -173,7 +173,7 @@ fn images_are_the_same_on_gpu_and_cpu() {
     }
 }
 
-/// Negative control: without ray differentials the image changes.
+/// Negative control: without ray differentials.
 #[test]
 fn a_wrong_footprint_is_noticed() {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");

@@ -137,7 +137,7 @@ fn links_that_leave_the_folder_are_rejected() {
     Scene::load_with(folder.path().join("s.toml"), &overrides).unwrap();
 }
 
-/// Copies a PNG with another size in its header, which is checked before decoding.
+/// Copies a PNG with another size in its header, checked before decoding.
 fn forge_size(from: &Path, to: &Path, width: u32, height: u32) {
     let mut png = std::fs::read(from).unwrap();
     png[16..20].copy_from_slice(&width.to_be_bytes());
@@ -175,7 +175,7 @@ fn the_total_size_of_images_is_limited() {
         "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the textures before it 1.0 MiB; \
          the limit is 1024.0 MiB"
     );
-    // The image is decoded, as its size is within the limit, and is found to be truncated.
+    // Within the limit, so decoded, and found to be truncated.
     assert!(error(&texture("b", "fits.png", "ewa")).contains("is damaged or truncated"));
 }
 
@@ -448,7 +448,7 @@ fn the_command_line_ends_with_exit_code_3() {
     assert_eq!(good.status.code(), Some(0), "{good:?}");
 }
 
-/// Checks every documented key that accepts a texture channel: only images have an alpha channel, from their file.
+/// In every documented key for a texture channel.
 #[test]
 fn only_images_have_an_alpha_channel() {
     let folder = tempfile::tempdir().unwrap();

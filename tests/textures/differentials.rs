@@ -154,7 +154,6 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, HitDifferenti
     }
 }
 
-/// Compares all pixels with this many bounces.
 fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
     let exact = Exact {
         scene,
@@ -169,7 +168,7 @@ fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
             };
             let end = exact.end(at.as_dvec2());
             let known = (surface.position.as_dvec3() - end).length() < 1e-3 * end.length().max(1.0);
-            // Far away, f32 positions are inaccurate at grazing angles.
+            // Far away, f32 is inaccurate at grazing angles.
             if depth != bounces || !known || end.length() > 30.0 {
                 continue;
             }
@@ -263,7 +262,7 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
     assert!(compared > 500, "{compared}");
 }
 
-/// Control: without the derivative of the normal, curved mirrors are wrong.
+/// Control: without the derivative of the normal.
 #[test]
 fn a_curved_mirror_needs_its_curvature() {
     let scene = over_plane(PERSPECTIVE, &ellipsoid("mirror"));

@@ -81,7 +81,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
             }
         }
     }
-    // Not all of them: clamped footprints beyond the edge do not see the texel.
+    // Clamped footprints beyond the edge do not see the texel.
     assert!(varied > 800, "{varied}");
 }
 
@@ -173,7 +173,6 @@ fn coordinates_wrap_as_specified_beyond_the_image() {
     }
 }
 
-/// Writes and returns random texels.
 fn noise(folder: &Path, width: u32, height: u32) -> Vec<f64> {
     let numbers = Random::new(5);
     let texels: Vec<f32> = (0..width * height).map(|_| numbers.unit() as f32).collect();
@@ -259,7 +258,7 @@ fn wide_footprints_average_the_whole_image() {
     }
 }
 
-/// EWA keeps detail across long footprints, which trilinear filtering blurs.
+/// Trilinear filtering blurs it.
 #[test]
 fn ewa_keeps_detail_across_a_long_footprint() {
     let folder = tempfile::tempdir().unwrap();
@@ -292,7 +291,7 @@ fn texel_at(texels: &[f64], x: i64, y: i64) -> f64 {
     texels[(y.rem_euclid(128) * 128 + x.rem_euclid(128)) as usize]
 }
 
-/// Integrates the bilinear interpolation over the parallelogram around p, in texels.
+/// Integrates the bilinear interpolation over a parallelogram, in texels.
 fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     let points = |edge: DVec2| (edge.length() * 1.5).ceil().max(16.0);
     let (columns, rows) = (points(dx), points(dy));
@@ -308,7 +307,6 @@ fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     sum / (columns * rows)
 }
 
-/// Evaluates EWA over the finest level.
 fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     let edges = DMat2::from_cols(dx, dy);
     let m = edges * edges.transpose() + DMat2::IDENTITY;
@@ -326,8 +324,8 @@ fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     sum / total
 }
 
-/// Documented: EWA over the pyramid has at most 1.4 times the error of EWA over the finest level, at any aspect and
-/// angle. Control: trilinear is nearly always worse.
+/// Documented: at most 1.4 times the error of EWA over the finest level, at any aspect and angle. Control: trilinear is
+/// nearly always worse.
 #[test]
 fn ewa_over_the_pyramid_is_nearly_that_of_the_finest_level() {
     let folder = tempfile::tempdir().unwrap();
@@ -401,7 +399,7 @@ fn ewa_over_the_pyramid_is_nearly_that_of_the_finest_level() {
     assert!(worse > cases / 2, "{worse} of {cases}");
 }
 
-/// The cost is bounded for any image shape.
+/// The cost is bounded for any shape.
 #[test]
 fn ewa_is_bounded_for_flat_images() {
     let folder = tempfile::tempdir().unwrap();
@@ -431,7 +429,7 @@ fn ewa_is_bounded_for_flat_images() {
     assert!(seconds < 20.0, "{seconds} s"); // minutes without the bound
 }
 
-/// 8-bit texels are exact, and levels keep the mean: a white texel in the dark is never lost.
+/// 8-bit texels are exact: a white texel in the dark is never lost.
 #[test]
 fn mip_levels_of_8_bit_images_keep_the_mean() {
     let folder = tempfile::tempdir().unwrap();
@@ -500,7 +498,7 @@ fn the_ellipse_of_a_footprint_has_its_conjugate_diameters() {
     assert!(clamped > 100);
 }
 
-/// Beyond a clamped edge only its color is visible, at any distance and footprint size.
+/// At any distance and footprint size.
 #[test]
 fn beyond_a_clamped_edge_only_its_color_is_visible() {
     let folder = tempfile::tempdir().unwrap();

@@ -7,7 +7,7 @@ use super::write_png;
 
 const SIDE: u32 = 512;
 
-/// Returns a texel of a grid of tiles: 64 texels wide, with dark joints and fine lines, some colored.
+/// Returns a texel of tiles: 64 texels wide, with dark joints and fine lines, some colored.
 fn grid(x: u32, y: u32) -> [u8; 3] {
     if x % 64 < 4 || y % 64 < 4 {
         return [30, 30, 40];
@@ -24,7 +24,7 @@ fn grid(x: u32, y: u32) -> [u8; 3] {
 
 const BUMP_SIDE: u32 = 64;
 
-/// Returns a texel of a normal map: a low dome in the middle of a plane.
+/// Returns a normal map's texel: a low dome in a plane.
 fn bump(x: u32, y: u32) -> [u8; 3] {
     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(BUMP_SIDE) * 2.0 - 1.0;
     let (u, v) = (at(x), -at(y));

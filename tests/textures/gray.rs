@@ -5,7 +5,6 @@ use wgray::scene::{Overrides, Scene, Texels, TextureKind};
 
 const SIZE: (usize, usize) = (3, 2);
 
-/// Writes a file whose values depend on channel and texel.
 fn write(path: &std::path::Path, names: &[&str], sample: impl Fn(Vec<f32>) -> FlatSamples) {
     let texels = SIZE.0 * SIZE.1;
     let channels = names.iter().enumerate().map(|(i, name)| {

@@ -13,7 +13,7 @@ use wgray_render::records::Packed;
 use super::{scene, write_exr};
 use crate::random::Random;
 
-/// Returns a scene of shapes with a constant normal map, (x, y, z) / |(x, y, z)|.
+/// Returns shapes with the constant normal map (x, y, z) / |(x, y, z)|.
 fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
     let folder = tempfile::tempdir().unwrap();
     let texel = normal * 0.5 + 0.5;
@@ -51,7 +51,7 @@ fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
     scene(&text, folder.path())
 }
 
-/// Returns the mapped normal of a primitive for a ray from `origin` to `target`.
+/// Returns the mapped normal for a ray from `origin` to `target`.
 fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 {
     let ray = Ray {
         origin,
@@ -103,7 +103,7 @@ fn red_and_green_tilt_along_the_tangent_and_the_bitangent() {
 fn texture_rotations_rotate_the_normals() {
     let n = Vec3::new(0.6, 0.0, 0.8);
     let above = Vec3::new(0.3, 0.2, 3.0);
-    // After a rotation by 90 degrees, u of the texture is along -v of the surface, regardless of the scale.
+    // Rotated by 90 degrees, u of the texture is along -v of the surface, regardless of the scale.
     let turned = normal(
         &shapes(n, "rotate = 90\nscale = [3, 0.5]", 1.0),
         2,
@@ -157,8 +157,8 @@ fn mirrors_reject_normals_that_reflect_into_the_surface() {
     assert_eq!(usable_normal(surface, away), surface.normal);
 }
 
-/// Checks that the geometric normal limits the lighting: a shading normal that is tilted towards a light behind the
-/// surface receives no light. Shadow rays cannot detect this, as a flat surface does not occlude its own points.
+/// A shading normal tilted towards a light behind the surface receives no light. Shadow rays cannot detect this, as a
+/// flat surface does not occlude its own points.
 #[test]
 fn a_bent_normal_sees_no_light_from_behind() {
     let map = shapes(Vec3::new(0.9, 0.0, 0.3).normalize(), "", 1.0);

@@ -166,7 +166,7 @@ fn slanted_checkers_have_their_contrast() {
     }
 }
 
-/// Degenerate, infinite and NaN footprints give 0 to 1.
+/// Degenerate, infinite and NaN footprints.
 #[test]
 fn footprints_without_an_area_give_values_from_0_to_1() {
     let numbers = Random::new(12);

@@ -30,7 +30,6 @@ fn reflectances_match_the_fresnel_equations() {
         assert_eq!(reflectance(f64::from(degrees), 1.0), 0.0);
         let entering = reflectance(f64::from(degrees), 1.5);
         let refracted = (f64::from(degrees).to_radians().sin() / 1.5).asin().to_degrees();
-        // From the other side.
         assert!((entering - reflectance(refracted, 1.0 / 1.5)).abs() < 1e-4);
     }
 }
@@ -115,7 +114,6 @@ fn clear_glass_of_index_1_is_invisible() {
     let seen = |material: &str| cpu_picture(&ball("[0.1, 0.2, 0.3]", material, ROOM));
     let clear = seen("type = 'glass'\nior = 1");
     let dense = seen("type = 'glass'\nior = 1.3");
-    // Without the ball.
     let nothing = {
         let mut scene = ball("[0.1, 0.2, 0.3]", "type = 'glass'\nior = 1", ROOM);
         let keep = scene.counts.primitives[ELLIPSOID as usize].x as usize;
@@ -234,7 +232,7 @@ fn glass_casts_a_shadow_unless_it_is_transparent() {
     assert_eq!(floor("transparent", "type = 'mirror'"), 0.0);
 }
 
-/// After the splits, random branches have the mean of following both.
+/// After the splits, as if both were followed.
 #[test]
 fn branches_chosen_at_random_have_the_right_mean() {
     // A geometric series of reflections between the plates.

@@ -48,7 +48,7 @@ pub unsafe extern "C" fn render(text: *mut u8, len: usize) -> *const u32 {
 mod tests {
     use super::*;
 
-    /// Compares the pixels with `pixels.f32`, or writes the file if `WGRAY_TEST_RECORD` is set.
+    /// Compares with `pixels.f32`, or writes it if `WGRAY_TEST_RECORD` is set.
     #[test]
     fn a_native_build_renders_the_recorded_pixels() {
         let bytes: Vec<u8> = pixels(include_str!("scene.toml"))

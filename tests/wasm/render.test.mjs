@@ -8,9 +8,9 @@ import { test } from "node:test";
 const here = (name) => readFileSync(new URL(name, import.meta.url));
 const module = new WebAssembly.Module(readFileSync(process.env.WGRAY_WASM));
 
-// The module only imports the clock (crate web-time through wasm-bindgen). On web pages the tool `wasm-bindgen`
-// generates these imports; here they are written by hand. A JavaScript object is a handle; handles from 128 to
-// `statics_end` are never dropped, and all of them stand for `performance`.
+// The module only imports the clock (crate web-time through wasm-bindgen). On web pages `wasm-bindgen` generates these
+// imports. A JavaScript object is a handle; those from 128 to `statics_end` are never dropped, and all stand for
+// `performance`.
 const intrinsics = [
     [/_now_/, () => performance.now()],
     [/static_accessor|performance/, () => 1024],

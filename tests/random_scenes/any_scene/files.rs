@@ -10,11 +10,10 @@ use crate::meshes::forms::Form;
 use crate::random::Random;
 use crate::textures::write_exr;
 
-/// Environment maps of random scenes, next to the meshes: name, width and height.
+/// Environment maps next to the meshes: name, width and height.
 pub const AROUND: &[(&str, u32, u32)] = &[("dot.exr", 1, 1), ("odd.exr", 5, 3), ("wide.exr", 64, 32)];
 
-/// Mesh files: name, whether they have texture coordinates, and whether they have normals. They are next to the scenes
-/// that failing tests write.
+/// Mesh files: name, has texture coordinates, has normals. Next to the scenes that failing tests write.
 pub const MESHES: &[(&str, bool, bool)] = &[
     ("soup.obj", true, false),
     ("slivers.obj", false, false),
@@ -24,7 +23,7 @@ pub const MESHES: &[(&str, bool, bool)] = &[
     ("painted.ply", true, true),
 ];
 
-/// Creates the folder of random scenes and their meshes at the first call, and returns it.
+/// Returns the folder of random scenes and their meshes, created at the first call.
 pub fn folder() -> &'static Path {
     static FOLDER: OnceLock<&Path> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -44,7 +43,7 @@ pub fn folder() -> &'static Path {
                 "painted.ply" => painted(&form, &normals, &uvs, &random),
                 _ => form.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs)),
             };
-            // A rename is atomic, so that concurrent readers see a complete file.
+            // Atomic: concurrent readers see a complete file.
             let draft = folder.join(format!("{name}.{}", std::process::id()));
             fs::write(&draft, text).expect("a place for a mesh");
             fs::rename(&draft, folder.join(name)).expect("a place for a mesh");
@@ -59,7 +58,7 @@ pub fn folder() -> &'static Path {
     })
 }
 
-/// Returns a PLY file with vertex colors, whose components are partly 0 or above 1.
+/// Returns a PLY file with vertex colors, partly 0 or above 1.
 fn painted(form: &Form, normals: &[DVec3], uvs: &[[f64; 2]], random: &Random) -> String {
     let names = [
         "x", "y", "z", "nx", "ny", "nz", "u", "v", "red", "green", "blue", "alpha",
@@ -84,7 +83,6 @@ fn painted(form: &Form, normals: &[DVec3], uvs: &[[f64; 2]], random: &Random) ->
     text
 }
 
-/// Returns a sphere with randomly displaced vertices.
 fn bumpy(random: &Random) -> Form {
     let mut form = Form::icosphere(2);
     form.points.iter_mut().for_each(|p| *p *= random.between(0.4, 1.3));

@@ -66,7 +66,6 @@ pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
     }
 }
 
-/// Scales and translates a mesh.
 fn placed(
     translate: &mut Option<DVec3>,
     factors: &mut Option<Scale>,

@@ -4,7 +4,7 @@ use glam::DVec3;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// Generates coordinates, often from a few values, so that objects touch, coincide or are coplanar.
+/// Generates coordinates, often from a few values, so that objects touch or coincide.
 pub fn coordinate() -> impl Strategy<Value = f64> {
     prop_oneof![
         3 => select(&[0.0, 0.5, -0.5, 1.0, -1.0][..]),
