@@ -1,14 +1,13 @@
-// Adaptive sampling: the variance of a pixel, and its sample count from its neighbors' pilot samples.
+// Adaptive sampling: variance, and sample counts from neighbors' pilot samples.
 
-// Returns a pixel's moments after a sample; `sum` is the pixel's weighted sum before it. xyz are sums of squared
-// deviations from the mean, w is the sample count. Welford's update for weighted samples ("Note on a Method for
-// Calculating Corrected Sums of Squares and Products", Technometrics 4(3), 1962).
+// Returns a pixel's moments after a sample; `sum` is the weighted sum before it. xyz are sums of squared deviations
+// from the mean, w the sample count. Weighted update by Welford ("Note on a Method for Calculating Corrected Sums of
+// Squares and Products", Technometrics 4(3), 1962).
 fn moments_with(moments: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     return moments + vec4f(squared_deviation(sum, sample), 1.0);
 }
 
-// Returns the increment of the sum of squared deviations, clamped at 0, since weights of mixed sign can make it
-// negative.
+// Returns the increment of the squared deviations, clamped at 0, since weights of mixed sign can make it negative.
 fn squared_deviation(sum: vec4f, sample: vec4f) -> vec3f {
     let before = sample.rgb - mean_of(sum) * sample.w;
     let after = sample.rgb - mean_of(sum + sample) * sample.w;
@@ -27,8 +26,8 @@ fn variance_of_mean(sum: vec4f, moments: vec4f) -> vec3f {
     return moments.rgb * scale;
 }
 
-// Returns a pixel's squared standard error as displayed: the mean over the channels, each scaled by the squared slope
-// of the display curve x^(1/2.2), x in 0.01..1.
+// Returns the squared standard error as displayed: the mean over the channels, scaled by the squared slope of the
+// display curve x^(1/2.2), x in 0.01..1.
 fn display_variance(sum: vec4f, moments: vec4f) -> f32 {
     let mean = mean_of(sum);
     let variance = variance_of_mean(sum, moments);
@@ -44,8 +43,8 @@ fn display_slope_squared(value: f32) -> f32 {
     return slope * slope;
 }
 
-// Adds a sample to a pixel's pilot statistics: y sums squared deviations over samples and channels, z their squares
-// over samples.
+// Adds a sample to the pilot statistics: y sums squared deviations over samples and channels, z their squares over
+// samples.
 fn pilot_add(pilot: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     let deviation = squared_deviation(sum, sample);
     let total = deviation.x + deviation.y + deviation.z;
@@ -57,9 +56,9 @@ fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
     return vec4f(display_variance(sum, moments), pilot.y, pilot.z, 1.0);
 }
 
-// Returns a pixel's sample count from its neighbors' pilot statistics over `first` samples each. Doubles the count
-// until the mean squared error is small enough, as long as the variance estimate is reliable: its effective sample size
-// y^2 / z is 1 if a single sample deviates, and the full count if half of them do.
+// Returns a sample count from neighbors' pilot statistics over `first` samples each. Doubles it until the mean squared
+// error is small enough, as long as the variance is reliable: its effective sample size y^2 / z is 1 if a single sample
+// deviates, and the full count if half of them do.
 fn samples_wanted(pilot_sum: vec4f, first: u32, squared_error: f32, most: u32) -> u32 {
     if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
         return most;

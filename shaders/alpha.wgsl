@@ -1,10 +1,10 @@
-// Surfaces with alpha. Acceptance depends on pixel, sample, bounce and hit only, not on the BVH's traversal order.
+// Surfaces with alpha. Acceptance depends on pixel, sample, bounce and hit, not on traversal order.
 
-// Purposes of rays. Each has its own decisions at the same surface.
+// Purposes of rays, with separate decisions at a surface.
 const RAY_BSDF: u32 = 0u;
 const RAY_SHADOW: u32 = 1u;
 
-// Returns true if the surface accepts the ray that hit it.
+// Returns true if the hit surface accepts the ray.
 fn alpha_accepts(material: Material, pixel: vec2u, sample: u32, bounce: u32, purpose: u32, hit: Hit, side: f32) -> bool {
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, sample));
     let face = select(0u, 1u, side > 0.0);
@@ -32,7 +32,6 @@ fn with_opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) ->
     return material;
 }
 
-// Returns the fraction of rays that a surface accepts.
 fn opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> f32 {
     let material = with_opacity_at(before, prim, hit, uv);
     let whole = select(0.0, 1.0, material.opacity >= material.cutoff);
@@ -40,7 +39,7 @@ fn opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> f32 
     return select(share, 1.0, material.alpha_mode == OPAQUE);
 }
 
-// Variant of `is_occluded` for surfaces with alpha; true after more than MAX_ALPHA_SKIPS skipped ones.
+// Variant of `is_occluded` with alpha; true after more than MAX_ALPHA_SKIPS skipped surfaces.
 fn is_occluded_alpha(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32, pixel: vec2u, sample: u32,
              bounce: u32) -> bool {
     if before {
@@ -71,8 +70,8 @@ fn is_occluded_alpha(before: bool, surface: Surface, to: vec3f, t_max: f32, targ
     return true;
 }
 
-// Returns the first hit, beginning with `first`, that is opaque or whose opacity is at least its cutoff (MASK) or 0.5
-// (BLEND); the next hit after MAX_ALPHA_SKIPS others. t is measured from the origin of `ray`.
+// Returns the first hit from `first` on that is opaque or whose opacity is at least its cutoff (MASK) or 0.5 (BLEND);
+// the next hit after MAX_ALPHA_SKIPS others. t is measured from the origin of `ray`.
 fn skip_transparent(ray: Ray, first: Hit) -> Hit {
     var hit = first;
     var continued = ray;

@@ -1,11 +1,11 @@
-// The bindings of every kernel, in groups by how often they change. Binding 1 of group 0 is the output of the kernel,
-// which declares it.
+// The bindings of every kernel, in groups by how often they change. Each kernel declares its output, binding 1 of group
+// 0.
 
 // Changed by every dispatch.
 @group(0) @binding(0) var<uniform> params: DispatchParams;
 @group(0) @binding(2) var<storage, read_write> completion: Completion;
 
-// Changed with the scene: camera, settings, materials, lights and textures.
+// Changed with the scene.
 @group(1) @binding(0) var<uniform> camera: Camera;
 @group(1) @binding(1) var<uniform> environment: Environment;
 @group(1) @binding(2) var<uniform> counts: Counts;

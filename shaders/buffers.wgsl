@@ -1,11 +1,11 @@
-// Scene access in storage buffers, and loops over the primitives outside the BVH. Their callers for each kind are
-// generated (crates/render/src/gpu/dispatch.rs).
+// Scene access in storage buffers, and loops over the primitives outside the BVH, called by generated functions
+// (crates/render/src/gpu/dispatch.rs).
 
 fn load_primitive(i: u32) -> Primitive {
     return primitives[i];
 }
 
-// Returns the number of area lights, which come first (x), and of all lights (y).
+// Returns the number of area lights, which come first (x), and of all (y).
 fn light_counts() -> vec2u {
     return counts.lights;
 }
@@ -19,8 +19,7 @@ fn closest_of(kind: u32, before: Hit, ray: Ray, origin_prim: u32, inside_prim: u
     return hit;
 }
 
-// Returns true if `before`, or if a primitive except `target_prim` occludes the segment from the surface to
-// `t_max * to`.
+// Returns true if `before`, or if a primitive except `target_prim` occludes the segment to `t_max * to`.
 fn is_occluded_by(kind: u32, before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let range = counts.primitives[kind];
     var occluded = before;
@@ -34,7 +33,7 @@ fn emitter_count() -> u32 {
     return counts.emitters.y;
 }
 
-// Returns a mask of the at most 32 primitives in `first..end` that may occlude a light: bit i is `first + i`.
+// Returns a mask of up to 32 primitives in `first..end` that may occlude a light: bit i is `first + i`.
 fn shadow_candidates(first: u32, end: u32, frustum: ShadowFrustum) -> u32 {
     var candidates = 0u;
     for (var i = 0u; i < 32u && first + i < end; i++) {
@@ -43,7 +42,7 @@ fn shadow_candidates(first: u32, end: u32, frustum: ShadowFrustum) -> u32 {
     return candidates;
 }
 
-// Loads a shadow caster whose kind is known at compile time.
+// Loads a shadow caster of a kind known at compile time.
 fn load_blocker(kind: u32, i: u32) -> Primitive {
     return primitives[i];
 }

@@ -1,15 +1,15 @@
-// Traversal of the BVH over the items of the scene, mesh instances and standalone primitives, and of the BVHs over the
-// triangles of meshes. Hits do not depend on the BVHs (docs/decisions/trees.md).
+// Traversal of the BVHs over items (mesh instances and standalone primitives) and over mesh triangles. Hits do not
+// depend on the BVHs (docs/decisions/trees.md).
 
-// Pending children of a node, per level. x: index of the first child node; y: bits 0 to 7 mark the slots that are
-// nodes, bits 8 to 15 those pending, in visiting order.
+// Pending children of a node, per level. x: first child node; y: bits 0 to 7 mark slots of nodes, bits 8 to 15 pending
+// ones, in visiting order.
 struct TraversalStack {
     octant: u32,
     depth: u32,
     pending: array<vec2u, BVH_MAX_DEPTH>,
 }
 
-// Global, since software Vulkan zeroes variables of functions for each ray, which takes a fifth of the time.
+// Global, since software Vulkan zeroes function variables for each ray, which takes a fifth of the time.
 var<private> tlas_stack: TraversalStack;
 var<private> blas_stack: TraversalStack;
 
@@ -19,7 +19,7 @@ fn traversal_begin(walk: ptr<private, TraversalStack>, octant: u32) {
     (*walk).pending[0] = vec2u(0u, 1u | (256u << octant)); // the root, as the only child
 }
 
-// Returns the index of the next node in its BVH. One must be pending.
+// Returns the next node. One must be pending.
 fn pop_node(walk: ptr<private, TraversalStack>) -> u32 {
     let top = (*walk).depth - 1u;
     let group = (*walk).pending[top];
@@ -31,7 +31,7 @@ fn pop_node(walk: ptr<private, TraversalStack>) -> u32 {
     return group.x + countOneBits(group.y & ((1u << slot) - 1u));
 }
 
-// Pushes the hit children that are nodes, and returns those that are leaves.
+// Pushes the hit nodes, and returns the hit leaves.
 fn push_children(walk: ptr<private, TraversalStack>, node: Node, passed: u32) -> u32 {
     let inner = node.scales >> 24u;
     let inner_in_order = in_order(passed & inner, (*walk).octant);
@@ -46,7 +46,7 @@ fn item_pad(origin: vec3f) -> f32 {
     return counts.item_padding.x * (largest(origin) + counts.item_padding.y);
 }
 
-// Returns the nearer of `before` and the nearest hit among the items.
+// Returns the nearer of `before` and the nearest hit on items.
 fn closest_in_bvh(before: Hit, ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     var hit = before;
     let s = slabs(ray.origin, ray.direction, item_pad(ray.origin));
@@ -71,14 +71,14 @@ fn closest_of_item(before: Hit, item: BvhItem, ray: Ray, s: Slabs, origin_prim: 
     if !interval_hits(interval, hit.t) {
         return hit;
     }
-    // A loop instead of an `if`: software Vulkan executes both sides of a branch, but skips a loop.
+    // A loop instead of an `if`: software Vulkan executes both sides of a branch, but skips loops.
     for (var once = has_kind(item, INSTANCE); once; once = false) {
         hit = closest_of_mesh(hit, item.index, ray, max(interval.x, 0.0), origin_prim);
     }
     return closest_of_primitive_item(hit, item, ray, interval.x, origin_prim, inside_prim);
 }
 
-// Returns true if an item is of a kind; false at compile time if no item of the scene is.
+// Returns false at compile time if no item of the scene is of the kind.
 fn has_kind(item: BvhItem, kind: u32) -> bool {
     if (TLAS_KINDS & (1u << kind)) == 0u {
         return false;
@@ -92,13 +92,13 @@ fn standalone_hit(kind: u32, i: u32, ray: Ray, near: f32, origin_prim: vec2u, in
     return Hit(select(INFINITE_T, t, i != standalone_prim(origin_prim)), 0u, i, 0u, vec2f(0.0));
 }
 
-// Returns an upper bound, rounding included, of the distance beyond `start` of hits nearer than t.
+// Returns an upper bound of the distance beyond `start` of hits nearer than t.
 fn remaining_t_max(start: f32, t: f32) -> f32 {
     return (t - start) + t * 4.7683716e-7;
 }
 
-// Returns the nearer of `before` and the nearest hit on instance `number`. The ray is traced from distance `start`,
-// near the mesh, for precision.
+// Returns the nearer of `before` and the nearest hit on instance `number`, traced from distance `start`, near the mesh,
+// for precision.
 fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, origin_prim: vec2u) -> Hit {
     var hit = before;
     let i = load_instance(number);
@@ -138,19 +138,19 @@ fn ray_pair(origin: vec3f, first: vec3f, second: vec3f, pad: f32) -> RayPair {
     return RayPair(array(first, second), array(slabs(origin, first, pad), slabs(origin, second, pad)));
 }
 
-// Returns the children whose boxes a ray of the pair hits that is not yet occluded.
+// Returns the children hit by a ray of the pair that is not yet occluded.
 fn children_hit_by_pair(node: Node, pair: RayPair, occluded: u32, t_max: f32) -> u32 {
     return children_hit(node, pair.s[0], select(t_max, -1.0, (occluded & 1u) != 0u))
         | children_hit(node, pair.s[1], select(t_max, -1.0, (occluded & 2u) != 0u));
 }
 
-// Returns the mask of the samples of a block that any item occludes from a surface, together with the bits of `before`.
+// Returns the mask of a block's samples that items occlude, or with bits in `before`.
 fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlock) -> u32 {
     let all = select((1u << block.count) - 1u, 0xffffffffu, block.count >= 32u);
     var bits = before & all;
     let to = segments_to_light(light, surface.ray_origin);
     let pad = item_pad(surface.ray_origin);
-    // Usually no shadow ray hits any child of the root.
+    // Usually all rays miss the root's children.
     let interval = interval_to_light(surface.ray_origin, to, pad);
     let some = children_in_interval(load_node(0u), interval, light.t_max) != 0u;
     var wanted = select(0u, all & ~bits, some);
@@ -173,7 +173,7 @@ fn segments_to_two(to: LightSegments, block: SampleBlock, samples: vec2u) -> arr
     return array(segment(to, block_sample(block, samples.x)), segment(to, block_sample(block, samples.y)));
 }
 
-// Returns the mask, bits 0 and 1, of two samples that any item occludes.
+// Returns the mask of two samples, bits 0 and 1, that items occlude.
 fn occluded_pair(surface: Surface, to: LightSegments, light: Light, block: SampleBlock, samples: vec2u, pad: f32) -> u32 {
     let directions = segments_to_two(to, block, samples);
     let pair = ray_pair(surface.ray_origin, directions[0], directions[1], pad);
@@ -197,7 +197,6 @@ fn occluded_pair(surface: Surface, to: LightSegments, light: Light, block: Sampl
     return occluded;
 }
 
-// Returns the samples in the mask `may` that an item occludes.
 fn occluded_by_item(item: BvhItem, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
     var bits = 0u;
     for (var once = has_kind(item, INSTANCE) & (may != 0u); once; once = false) {
@@ -219,8 +218,8 @@ fn occluded_by_item(item: BvhItem, may: u32, surface: Surface, light: Light, blo
     return bits;
 }
 
-// Returns the samples in the mask `may` that triangles of instance `number` occlude, except that of the surface. Bits
-// outside of `may` are set too.
+// Returns the samples in the mask `may` that instance `number` occludes, except the surface's own triangle. Other bits
+// are set too.
 fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
     let i = load_instance(number);
     let origin = point_to_mesh(i, surface.ray_origin);
@@ -256,8 +255,7 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
     return occluded;
 }
 
-// Returns true if `before`, or if any item except `target_prim` occludes the segment from a surface to `t_max` times
-// `to`.
+// Returns true if `before`, or if any item except `target_prim` occludes the segment to `t_max` times `to`.
 fn is_occluded_by_bvh(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     var occluded = before;
     let s = slabs(surface.ray_origin, to, item_pad(surface.ray_origin));
@@ -289,7 +287,7 @@ fn is_occluded_by_item(item: BvhItem, surface: Surface, to: vec3f, t_max: f32, t
     return occluded | is_occluded_by_primitive_item(item, surface, to, t_max, target_prim);
 }
 
-// Returns true if a triangle of instance `number`, except that of the surface, occludes the segment.
+// Returns true if instance `number`, except the surface's own triangle, occludes the segment.
 fn is_occluded_by_mesh(number: u32, surface: Surface, to: vec3f, t_max: f32) -> bool {
     let i = load_instance(number);
     let origin = point_to_mesh(i, surface.ray_origin);

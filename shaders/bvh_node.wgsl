@@ -1,7 +1,7 @@
 // A node of an 8-wide BVH with quantized child boxes: Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on
 // GPUs Through Compressed Wide BVHs", HPG 2017, section 3.
 
-// Unpacks the quantized coordinates of four children.
+// Unpacks coordinates of four children.
 fn steps(word: u32) -> vec4f {
     return vec4f(f32(word & 0xffu), f32((word >> 8u) & 0xffu), f32((word >> 16u) & 0xffu), f32(word >> 24u));
 }
@@ -18,13 +18,12 @@ fn smaller(a: vec4f, b: vec4f) -> vec4f {
     return select(b, a, a < b);
 }
 
-// Returns the mask of the intervals that are not empty and overlap [0, limit].
+// Returns the mask of nonempty intervals that overlap [0, limit].
 fn hit_bits(near: vec4f, far: vec4f, limit: f32) -> u32 {
     let passed = (near <= far) & (far >= vec4f(0.0)) & (near <= vec4f(limit));
     return select(0u, 1u, passed.x) | select(0u, 2u, passed.y) | select(0u, 4u, passed.z) | select(0u, 8u, passed.w);
 }
 
-// Returns the mask of the children whose boxes the ray hits.
 fn children_hit(node: Node, s: Slabs, limit: f32) -> u32 {
     let first = four_hit(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
                             vec3u(node.high_x.x, node.high_y.x, node.high_z.x), s, limit);
@@ -48,7 +47,7 @@ fn four_hit(node: Node, low: vec3u, high: vec3u, s: Slabs, limit: f32) -> u32 {
     return hit_bits(near, far, limit);
 }
 
-// Returns the mask of the children whose boxes any ray of the interval may hit.
+// Returns the mask of children that any ray of the interval may hit.
 fn children_in_interval(node: Node, f: RayInterval, limit: f32) -> u32 {
     let first = four_in_interval(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
                             vec3u(node.high_x.x, node.high_y.x, node.high_z.x), f, limit);
@@ -76,14 +75,14 @@ fn four_in_interval(node: Node, low: vec3u, high: vec3u, f: RayInterval, limit: 
     return hit_bits(larger(larger(near_x, near_y), near_z), smaller(smaller(far_x, far_y), far_z), limit);
 }
 
-// Returns the largest t at which a ray of the interval leaves a box along an axis.
+// Returns the largest t of leaving a box along an axis.
 fn far_side(low: vec4f, high: vec4f, far_low: f32, far_high: f32) -> vec4f {
     let none = (far_low == 0.0) & (far_high == 0.0);
     return select(low * far_low + high * far_high, vec4f(INFINITE_T), none);
 }
 
-// Permutes the bits of slots to visiting order: bit i becomes that of slot i ^ octant. Bit k of an octant is set if the
-// direction is negative along axis k; bit k of a slot, if its box is on the upper side.
+// Permutes the bits of slots to visiting order: bit i becomes that of slot i ^ octant. Bit k is set in an octant for a
+// negative direction along axis k, in a slot for a box on the upper side.
 fn in_order(bits: u32, octant: u32) -> u32 {
     let by_x = select(bits, ((bits & 0x55u) << 1u) | ((bits >> 1u) & 0x55u), (octant & 1u) != 0u);
     let by_y = select(by_x, ((by_x & 0x33u) << 2u) | ((by_x >> 2u) & 0x33u), (octant & 2u) != 0u);
@@ -94,7 +93,7 @@ fn octant_of(direction: vec3f) -> u32 {
     return select(0u, 1u, direction.x < 0.0) | select(0u, 2u, direction.y < 0.0) | select(0u, 4u, direction.z < 0.0);
 }
 
-// Returns the first item and the number of items, 0 for an empty slot.
+// Returns the first item and their number, 0 for an empty slot.
 fn leaf_items(node: Node, slot: u32) -> vec2u {
     let word = select(node.leaves.x, node.leaves.y, slot >= 4u);
     let leaf = (word >> (8u * (slot & 3u))) & 0xffu;

@@ -1,6 +1,6 @@
 // Camera rays (perspective, orthographic) and their differentials.
 
-// Returns the ray through `at`, in pixels from the top left corner.
+// Returns the ray through `at`, in pixels from the top left.
 fn camera_ray(camera: Camera, at: vec2f) -> Ray {
     let offset = image_plane_offset(camera, at);
     if camera.projection == ORTHOGRAPHIC {
@@ -9,7 +9,7 @@ fn camera_ray(camera: Camera, at: vec2f) -> Ray {
     return Ray(camera.position, normalize(camera.forward + offset));
 }
 
-// Returns the ray differential for samples `spacing` pixels apart (Igehy 1999, section 3).
+// Returns the differential for samples `spacing` pixels apart (Igehy 1999, section 3).
 fn camera_differential(camera: Camera, at: vec2f, spacing: f32) -> Differential {
     return Differential(camera_derivative(camera, at, camera.right * (2.0 / f32(camera.width) * spacing)),
                         camera_derivative(camera, at, camera.up * (-2.0 / f32(camera.height) * spacing)));

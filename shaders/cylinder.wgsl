@@ -1,7 +1,7 @@
-// The capped cylinder: the surface of x^2 + y^2 <= 1, |z| <= 1 in local space. In world space the three axes are
-// perpendicular, and those of x and y have equal lengths.
+// The capped cylinder: the surface of x^2 + y^2 <= 1, |z| <= 1 in local space, whose axes are perpendicular, those of x
+// and y of equal lengths.
 
-// Returns the levels of a local point, x^2 + y^2 - 1 and |z| - 1; both are negative inside. `from_anchor` is as in
+// Returns the levels of a local point, x^2 + y^2 - 1 and |z| - 1, both negative inside; `from_anchor` as in
 // `ellipsoid_level`.
 fn cylinder_levels(q: Primitive, from_anchor: vec3f) -> vec2f {
     let side = from_anchor.x * (from_anchor.x - q.middle.x * 2.0) + from_anchor.y * (from_anchor.y - q.middle.y * 2.0) + q.level;
@@ -10,15 +10,13 @@ fn cylinder_levels(q: Primitive, from_anchor: vec3f) -> vec2f {
     return vec2f(side, max(top, bottom));
 }
 
-// Corrects the rounding of the levels of a point on the surface: the larger one becomes `on`, and the other is at most
-// `on`.
+// Corrects the rounding of levels on the surface: the larger one becomes `on`, the other at most `on`.
 fn levels_on_surface(levels: vec2f, on: f32) -> vec2f {
     let on_side = levels.x >= levels.y;
     return vec2f(select(min(levels.x, on), on, on_side), select(on, min(levels.y, on), on_side));
 }
 
-// Returns the interval of s, from x to y, where the line o + s d is inside; empty unless x < y. `levels` are those of
-// o.
+// Returns the interval of s, from x to y, where o + s d is inside; empty unless x < y. `levels` are those of o.
 fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
     // Side, with `ellipsoid_discriminant` in two dimensions.
     let a = d.x * d.x + d.y * d.y;
@@ -46,8 +44,8 @@ fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
     return vec2f(select(near, INFINITE_T, misses), select(far, -INFINITE_T, misses));
 }
 
-// Returns the distance of the nearest hit in (0, limit), else `limit`. With `from_inside` the ray starts on the surface
-// and goes inside.
+// Returns the distance of the nearest hit in (0, limit), else `limit`. With `from_inside` the ray goes inside from the
+// surface.
 fn intersect_cylinder(q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let d = vector_to_local(q, ray.direction);
@@ -58,7 +56,7 @@ fn intersect_cylinder(q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> 
     return select(limit, t, (inside.x < inside.y) & (t > 0.0) & (t < limit));
 }
 
-// Returns true if the surface intersects the local segment o + s d, s in (0, t_max).
+// Returns true if the surface cuts the local segment o + s d, s in (0, t_max).
 fn cylinder_occludes(o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     let inside = cylinder_interval(o, d, levels);
     let enters = (inside.x > 0.0) & (inside.x < t_max);
@@ -66,12 +64,12 @@ fn cylinder_occludes(o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     return (inside.x < inside.y) & (enters | leaves);
 }
 
-// Returns true if a point of the surface lies on a cap, false on the side.
+// Returns false on the side.
 fn is_on_cap(local: vec3f) -> bool {
     return local.z * local.z > local.x * local.x + local.y * local.y;
 }
 
-// Returns 1 at the end of the cylinder, -1 at its start.
+// Returns 1 at the end, -1 at the start.
 fn cap_side(local: vec3f) -> f32 {
     return select(-1.0, 1.0, local.z > 0.0);
 }
@@ -81,7 +79,7 @@ fn cylinder_gradient(local: vec3f) -> vec3f {
     return select(vec3f(local.x, local.y, 0.0), vec3f(0.0, 0.0, cap_side(local)), is_on_cap(local));
 }
 
-// Returns the change of the gradient if the point changes by d.
+// Returns the gradient's change for the offset d.
 fn cylinder_gradient_derivative(local: vec3f, d: vec3f) -> vec3f {
     return select(vec3f(d.x, d.y, 0.0), vec3f(0.0), is_on_cap(local));
 }
@@ -92,26 +90,26 @@ fn cylinder_height(q: Primitive, from_anchor: vec3f) -> f32 {
     return select(0.5 * levels.x, levels.y, is_on_cap(from_anchor - q.middle));
 }
 
-// Returns the texture coordinates. On the side: longitude, and 0 to 1 from start to end. On the caps: as on a disk;
-// mirrored on the start cap, which is seen from the other side.
+// Returns the texture coordinates. Side: longitude, and 0 to 1 from start to end. Caps: as on a disk; mirrored on the
+// start cap, seen from the other side.
 fn cylinder_uv(local: vec3f) -> vec2f {
     let cap = vec2f(0.5 * local.x + 0.5, 0.5 * (local.y * cap_side(local)) + 0.5);
     return select(vec2f(longitude(local), 0.5 * local.z + 0.5), cap, is_on_cap(local));
 }
 
-// Returns the change of `cylinder_uv` if the local point changes by d.
+// Returns the change of `cylinder_uv` for the offset d.
 fn cylinder_uv_derivative(local: vec3f, d: vec3f) -> vec2f {
     let cap = vec2f(0.5 * d.x, 0.5 * (d.y * cap_side(local)));
     let du = (local.x * d.y - local.y * d.x) / max(local.x * local.x + local.y * local.y, 1e-12);
     return select(vec2f(du * 0.15915494309189535, 0.5 * d.z), cap, is_on_cap(local));
 }
 
-// Returns the derivative of a point by u on the side or the cap.
+// Returns the derivative by u.
 fn cylinder_tangent(local: vec3f) -> vec3f {
     return select(vec3f(-local.y, local.x, 0.0) * 6.283185307179586, vec3f(2.0, 0.0, 0.0), is_on_cap(local));
 }
 
-// Returns the derivative of a point by v.
+// Returns the derivative by v.
 fn cylinder_bitangent(local: vec3f) -> vec3f {
     return select(vec3f(0.0, 0.0, 2.0), vec3f(0.0, 2.0 * cap_side(local), 0.0), is_on_cap(local));
 }

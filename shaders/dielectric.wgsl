@@ -1,4 +1,4 @@
-// Path sampling of the smooth materials `dielectric` and `glass`: Fresnel reflection or refraction.
+// Paths through smooth `dielectric` and `glass`.
 
 // Returns the Beer-Lambert transmittance over `distance`.
 fn transmittance(absorption: vec3f, distance: f32) -> vec3f {
@@ -6,12 +6,12 @@ fn transmittance(absorption: vec3f, distance: f32) -> vec3f {
     return vec3f(exp2(d.x), exp2(d.y), exp2(d.z));
 }
 
-// Returns the ratio of the index of refraction on the viewer's side to that behind the surface.
+// Returns the index of refraction on the viewer's side relative to that behind.
 fn eta_of(surface: Surface, material: Material) -> f32 {
     return select(material.ior, 1.0 / material.ior, surface.side > 0.0);
 }
 
-// Returns true if refraction leads through the surface, or on total internal reflection. Normal maps and interpolated
+// Returns true if refraction leads through the surface, or on total internal reflection. Mapped and interpolated
 // normals can bend it back to the viewer's side, where the path would count as inside.
 fn refracts_inwards(surface: Surface, material: Material, normal: vec3f) -> bool {
     let eta = eta_of(surface, material);
@@ -27,8 +27,8 @@ struct DielectricSample {
     eta: f32,              // index ratio, before to behind, if transmitted, else 1
 }
 
-// Samples reflection or refraction. Radiance scales with the squared index of refraction: Veach, "Robust Monte Carlo
-// Methods for Light Transport Simulation", thesis, 1997, section 5.2.
+// Samples reflection or refraction. Radiance scales with the squared index: Veach, "Robust Monte Carlo Methods for
+// Light Transport Simulation", thesis, 1997, section 5.2.
 fn dielectric_sample(path: Path, surface: Surface, at: HitDifferential, material: Material, random: f32) -> DielectricSample {
     let eta = eta_of(surface, material);
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);

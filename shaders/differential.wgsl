@@ -1,5 +1,5 @@
-// Ray differentials: derivatives of a ray by the image coordinates. Igehy, "Tracing Ray Differentials", SIGGRAPH 1999;
-// sections are those of that paper.
+// Ray differentials: derivatives by image coordinates. Igehy, "Tracing Ray Differentials", SIGGRAPH 1999; sections are
+// those of that paper.
 
 // Derivative by one image coordinate, times the sample spacing.
 struct Derivative {
@@ -12,16 +12,16 @@ struct Differential {
     y: Derivative,
 }
 
-// Transfers a derivative to a hit at t (section 3.1).
+// Transfers a derivative to t (section 3.1).
 fn transferred(derivative: Derivative, ray: Ray, t: f32, normal: vec3f) -> Derivative {
     let moved = derivative.position + derivative.direction * t;
     let dt = dot(moved, normal) / dot(ray.direction, normal);
     return Derivative(moved - ray.direction * dt, derivative.direction);
 }
 
-// Returns the derivative of the outward unit normal for that of the position, `dp` (section 3.2). The gradient of
-// |M (P - c)|^2 / 2 is g = M^T M (P - c), on a cylinder's side without the third row of M; with N = g / |g|,
-// dN = (dg - N (N . dg)) / |g|.
+// Returns the derivative of the outward unit normal for that of the position, `dp` (section 3.2). The gradient of |M (P
+// - c)|^2 / 2 is g = M^T M (P - c), on a cylinder's side without the third row of M; with N = g / |g|, dN = (dg - N (N
+// . dg)) / |g|.
 fn normal_derivative(q: Primitive, local: vec3f, dp: vec3f) -> vec3f {
     let dl = vector_to_local(q, dp);
     let s = solid_gradient(q.kind, local);
@@ -39,7 +39,7 @@ fn reflected_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f) -
     return Derivative(derivative.position, derivative.direction - (dn * dot(d, n) + n * d_n) * 2.0);
 }
 
-// Refracts a derivative (section 3.1): eta is the index ratio, `cosine` that of the refracted ray.
+// Refracts a derivative (section 3.1) with the index ratio eta and the refracted ray's cosine.
 fn refracted_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f, eta: f32, cosine: f32) -> Derivative {
     let d_n = dot(d, n);
     let mu = eta * d_n + cosine;
@@ -47,7 +47,7 @@ fn refracted_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f, e
     return Derivative(derivative.position, derivative.direction * eta - (dn * mu + n * dmu));
 }
 
-// A differential at a hit, before scattering, with the derivatives of the normal.
+// A differential at a hit, before scattering.
 struct HitDifferential {
     x: Derivative,
     y: Derivative,

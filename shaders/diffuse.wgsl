@@ -11,13 +11,13 @@ fn angles_at(normal: vec3f, wo: vec3f, wi: vec3f) -> Angles {
     return Angles(dot(normal, wi), dot(normal, wo), dot(wi, wo));
 }
 
-// Returns the BRDF times the cosine of wi.
+// Returns the BRDF times the cosine.
 fn diffuse_eval(material: Material, angles: Angles) -> vec3f {
     return material.diffuse * (max(angles.wi, 0.0) * 0.31830988618379067);
 }
 
-// Returns the BRDF times the cosine of wi, Lambertian at roughness 0: Fujii's Oren-Nayar model with multiple
-// scattering. Portsmouth, Kutz and Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF", 2024.
+// Returns the BRDF times the cosine, Lambertian at roughness 0: Fujii's Oren-Nayar model with multiple scattering.
+// Portsmouth, Kutz and Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF", 2024.
 fn rough_diffuse_eval(material: Material, angles: Angles) -> vec3f {
     let wi = max(angles.wi, 0.0);
     let wo = max(angles.wo, 0.0);
@@ -34,7 +34,7 @@ fn rough_diffuse_eval(material: Material, angles: Angles) -> vec3f {
     return (color * single + multiple) * (wi * 0.31830988618379067);
 }
 
-// Returns G / pi of that paper: the growth of the single-scattering albedo with roughness.
+// Returns G / pi there: the growth of the single-scattering albedo with roughness.
 fn rough_share(cosine: f32) -> f32 {
     let s = sqrt(max(1.0 - cosine * cosine, 0.0));
     let angle = atan2(s, cosine);
@@ -42,7 +42,6 @@ fn rough_share(cosine: f32) -> f32 {
     return (s * (angle - s * cosine) + 0.6666667 * (tangent - s)) * 0.31830988618379067;
 }
 
-// Returns the pdf per solid angle.
 fn diffuse_pdf(angles: Angles) -> f32 {
     return max(angles.wi, 0.0) * 0.31830988618379067;
 }

@@ -1,13 +1,13 @@
 // The ellipsoid: the unit sphere of local space.
 
-// Returns |l|^2 - 1 for a point's local position l; negative inside. Avoids cancellation near the anchor:
-// `from_anchor`, (x, y, z) (p - anchor), is short there, and `q.level` includes the 1.
+// Returns |l|^2 - 1 for a local position l; negative inside. Avoids cancellation near the anchor: `from_anchor`, (x, y,
+// z) (p - anchor), is short there, and `q.level` includes the 1.
 fn ellipsoid_level(q: Primitive, from_anchor: vec3f) -> f32 {
     return dot(from_anchor, from_anchor - q.middle * 2.0) + q.level;
 }
 
-// Returns the quarter discriminant of |o + s d|^2 = 1. It has two equal forms (Lagrange): (o.d)^2 - d.d start with
-// start = |o|^2 - 1, precise near the surface, and d.d - |o x d|^2, precise far from it.
+// Returns the quarter discriminant of |o + s d|^2 = 1, in two equal forms (Lagrange): (o.d)^2 - d.d start with start =
+// |o|^2 - 1, precise near the surface, and d.d - |o x d|^2, precise far from it.
 fn ellipsoid_discriminant(o: vec3f, d: vec3f, start: f32) -> f32 {
     let a = dot(d, d);
     let b = dot(o, d);
@@ -15,15 +15,15 @@ fn ellipsoid_discriminant(o: vec3f, d: vec3f, start: f32) -> f32 {
     return select(a - dot(moment, moment), b * b - a * start, start < 1.0);
 }
 
-// Returns the angle about the third axis, from the first towards the second, in turns.
+// Returns the angle from the first towards the second axis, in turns.
 fn longitude(local: vec3f) -> f32 {
     let turn = atan2(local.y, local.x) * 0.15915494309189535;
     return select(turn, turn + 1.0, turn < 0.0);
 }
 
-// Returns the distance of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray starts on the surface
-// and goes inside: the hit is the chord's other end. The nearer root avoids cancellation: Haines, Guenther and
-// Akenine-Moeller, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.
+// Returns the distance of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray goes inside from the
+// surface: the hit is the chord's other end. The nearer root avoids cancellation: Haines, Guenther and Akenine-Moeller,
+// "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.
 fn intersect_ellipsoid(q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let o = from_anchor - q.middle;
@@ -41,8 +41,8 @@ fn intersect_ellipsoid(q: Primitive, inside_prim: bool, ray: Ray, limit: f32) ->
     return select(limit, t, (discriminant >= 0.0) & (t > 0.0) & (t < limit));
 }
 
-// Returns true if the surface cuts the segment o + s d, s in (0, t_max): if the ends lie on different sides, or if both
-// are outside, the point nearest to the center is in between, and the line hits the sphere.
+// Returns true if the surface cuts the segment o + s d, s in (0, t_max): the ends lie on different sides, or both are
+// outside, the point nearest to the center is in between, and the line hits the sphere.
 fn ellipsoid_occludes(o: vec3f, d: vec3f, start: f32, t_max: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);

@@ -22,8 +22,7 @@ fn select_emitter(bits: vec2u) -> Emitter {
     return load_emitter(select(emitter.alias_index, first, unit_float(bits.y) < emitter.threshold));
 }
 
-// Samples the light that arrives at p from an emitter. `normal` is the normal of the surface, or 0 if light may arrive
-// from both sides.
+// Samples the light that arrives at p. `normal` is the surface's, or 0 if light may arrive from both sides.
 fn sample_emitter(chosen: EmitterSelection, p: vec3f, normal: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     if (EMITTER_KINDS & (1u << INSTANCE)) != 0u {
@@ -103,12 +102,10 @@ fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
     return LightSample(to, radiance, pdf, is_delta, light.t_max, light.primitive);
 }
 
-// Returns a hit that identifies a standalone primitive and nothing else.
 fn hit_on_primitive(primitive: u32) -> Hit {
     return Hit(0.0, 0u, primitive, 0u, vec2f(0.0));
 }
 
-// Samples an emissive triangle of a mesh.
 fn sample_face(chosen: EmitterSelection, p: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     let b = triangle_sample(u);

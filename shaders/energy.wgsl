@@ -1,6 +1,6 @@
-// Single-scattering directional albedo of microfacet lobes, from tables (`crates/render/src/pack/energy.rs`).
+// Single-scattering albedo of microfacet lobes, from tables (`crates/render/src/pack/energy.rs`).
 
-// Returns the albedo of rough glass, reflection plus transmission. Rows are by roughness, columns by the cosine of wo.
+// Returns the albedo of rough glass. Rows are by roughness, columns by the cosine of wo.
 fn single_scatter_albedo(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     let last = f32(ENERGY_SIZE - 1u);
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
@@ -15,8 +15,8 @@ fn single_scatter_albedo(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32
     return both.x + (both.y - both.x) * (column - j);
 }
 
-// Returns the albedo of an anisotropic lobe from one part of its table. Interpolates over roughness and anisotropy if
-// these are textured, and over the direction.
+// Returns the albedo of an anisotropic lobe from a part of its table, interpolated by direction and by textured
+// roughness and anisotropy.
 fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part: u32) -> f32 {
     let start = material.aniso_table - 1u;
     let rows = vec2u(texel_word(start), texel_word(start + 1u));
@@ -46,11 +46,11 @@ fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part
     return sum;
 }
 
-// Returns the albedo of rough glass from whichever table it has.
+// Returns the albedo of rough glass from its table.
 fn single_scatter_albedo_glass(material: Material, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     if ANISOTROPIC != 0u {
         if material.aniso_table != 0u {
-            // The last two parts are the two sides of glass.
+            // The last two parts are the sides of glass.
             let behind = select(2u, 0u, material.kind == ROUGH_GLASS) + select(1u, 0u, side > 0.0);
             return single_scatter_albedo_aniso(material, alpha, wo, behind);
         }
@@ -58,8 +58,8 @@ fn single_scatter_albedo_glass(material: Material, alpha: vec2f, wo: vec3f, side
     return single_scatter_albedo(material.energy, alpha, wo, side);
 }
 
-// Returns a principled material's albedos from tables, else 1: x and y of the anisotropic specular lobe as in
-// `ggx_albedo`, z as rough glass.
+// Returns a principled material's tabulated albedos, else 1: x and y of the anisotropic specular lobe as in
+// `ggx_albedo`, z of rough glass.
 fn principled_energy(material: Material, wo: vec3f, side: f32) -> vec3f {
     var found = vec3f(1.0);
     let alpha = facet_alpha(material);

@@ -1,10 +1,9 @@
 // The environment map and its importance sampling by radiance and clamped cosine.
 //
 // The map is divided into at most 32 x 32 blocks of cells. A block is chosen by its irradiance on a surface, from
-// cumulative distributions for 290 bins of normals; a cell in it by radiance alone. So the pdf is exact, and a pixel's
-// samples stay stratified over the blocks.
+// cumulative distributions for 290 bins of normals; a cell in it by radiance. So pdfs are exact, and a pixel's samples
+// stay stratified over blocks.
 
-// The light from a direction.
 struct EnvironmentEval {
     radiance: vec3f,
     pdf: f32,              // of `sample_environment`, per solid angle, including the selection
@@ -26,13 +25,13 @@ fn environment_float(at: u32) -> f32 {
     return bitcast<f32>(texel_word(at));
 }
 
-// Returns the offset of the rows' distribution for a normal. Those of the blocks in each row follow.
+// Returns the offset of the rows' distribution for a normal; the blocks' follow.
 fn block_distributions(normal: vec3f) -> u32 {
     let rows = (environment.height >> (environment.shifts >> 8u)) + 1u;
     return environment.blocks + rows * ENVIRONMENT_BLOCKS + normal_bin(normal) * (rows + 1u) * (ENVIRONMENT_BLOCKS + 1u);
 }
 
-// Finds the interval that holds u among 32, empty ones last, by binary search. `digits` extends u's 24 binary digits.
+// Finds the interval that holds u among 32, empty ones last. `digits` extends u's 24 binary digits.
 fn interval_at(distribution: u32, u: f32, digits: f32) -> Interval {
     var at = distribution;
     at += select(0u, 16u, u >= environment_float(at + 16u));
@@ -50,8 +49,8 @@ fn interval_width(distribution: u32, index: u32) -> f32 {
     return environment_float(distribution + index + 1u) - environment_float(distribution + index);
 }
 
-// Returns the bilinear radiance, and the pdf at a surface with this normal: the block's probability times the cell's
-// mean radiance over the block's integral.
+// Returns the bilinear radiance, and the pdf at a surface: the block's probability times the cell's mean radiance over
+// the block's integral.
 fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     let d = vec3f(dot(environment.x, direction), dot(environment.y, direction), dot(environment.z, direction));
     let cell = cell_towards(d, environment.width, environment.height);
@@ -72,15 +71,15 @@ fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     return EnvironmentEval(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
 }
 
-// Returns the radiance of a ray that leaves the scene, with its MIS weight; `pdf` is the ray's, `normal` its surface's.
+// Returns the weighted radiance of a ray that leaves the scene; `pdf` is the ray's, `normal` its surface's.
 fn environment_mis(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
     let eval = environment_eval(direction, normal);
     return eval.radiance * select(1.0, power_heuristic(pdf, eval.pdf), pdf > 0.0);
 }
 
-// Samples the map for a surface with this normal, or 0 if light may arrive from both sides. Inverts the distributions
-// of rows and blocks, then picks a cell by Walker's alias method; the position in the block selects the table's entry.
-// The radiance is evaluated as for other rays, so that the pdfs agree.
+// Samples the map for a surface normal, or 0 if light may arrive from both sides. Inverts the distributions of rows and
+// blocks, then picks a cell by Walker's alias method; the position in the block selects the entry. The radiance is
+// evaluated as for other rays, so that pdfs agree.
 fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
     let more = hash4(vec4u(bitcast<u32>(u.x), bitcast<u32>(u.y), 0u, 0u));
     let rows = block_distributions(normal);

@@ -1,7 +1,7 @@
-// Equirectangular mapping of the environment map, and its cells. The image's center is +x, its left and right edges are
-// -x, its upper edge is +z. A cell lies between the centers of four texels, or of two texels and a pole.
+// Equirectangular mapping of the environment map, and its cells. The center is +x, left and right edges are -x, the
+// upper edge is +z. A cell lies between the centers of four texels, or of two texels and a pole.
 
-// A point in a cell of the map, which has `width` cells per row and one row more than the image.
+// A point in a cell. Rows have `width` cells; there is one row more than in the image.
 struct EnvironmentCell {
     column: u32,
     row: u32,
@@ -9,13 +9,12 @@ struct EnvironmentCell {
     y: f32,
 }
 
-// Returns the cell that a direction points at.
 fn cell_towards(d: vec3f, width: u32, height: u32) -> EnvironmentCell {
     let u = (0.5 - atan2(d.y, d.x) * 0.15915494) * f32(width) - 0.5;
     let v = atan2(sqrt(d.x * d.x + d.y * d.y), d.z) * 0.31830987 * f32(height) + 0.5;
     let column = floor(u);
     let row = min(floor(v), f32(height));
-    // The first and the last row have half the height: `at` is 1/2 to 1 in the first, 0 to 1/2 in the last.
+    // First and last row have half the height: `at` is 1/2 to 1 in the first, 0 to 1/2 in the last.
     let at = v - row;
     let first = row == 0.0;
     let last = row == f32(height);
@@ -24,22 +23,20 @@ fn cell_towards(d: vec3f, width: u32, height: u32) -> EnvironmentCell {
     return EnvironmentCell(u32(select(f32(width) - 1.0, column, column >= 0.0)), u32(row), u - column, inside);
 }
 
-// Returns the column to the right of one, around the edge.
+// Wraps around the edge.
 fn column_after(column: u32, width: u32) -> u32 {
     return select(column + 1u, 0u, column + 1u == width);
 }
 
-// Returns 1 minus the cosine of the angle between the pole and the upper border of `row`, without the cancellation of
-// that difference near the pole.
+// Returns 1 - cos(angle) from the pole to the upper border of `row`, without cancellation near the pole.
 fn cap_above(row: u32, height: u32) -> f32 {
     let from_pole = max(f32(row) - 0.5, 0.0) / f32(height);
     let s = sine(0.5 * min(from_pole, 1.0));
     return 2.0 * s * s;
 }
 
-// Returns the bin of a normal: the nearest point of a grid on the octahedral map, which includes the axes. Cigolle et
-// al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 3(2), 2014. The last bin is for a
-// normal of 0.
+// Returns a normal's bin: the nearest point of a grid on the octahedral map, which includes the axes. Cigolle et al.,
+// "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 3(2), 2014. The last bin is for 0.
 fn normal_bin(normal: vec3f) -> u32 {
     let sum = abs(normal.x) + abs(normal.y) + abs(normal.z);
     let x = normal.x / sum;
@@ -53,8 +50,8 @@ fn normal_bin(normal: vec3f) -> u32 {
     return select(NORMAL_BINS * NORMAL_BINS, bin, sum > 0.0);
 }
 
-// Returns the direction to the point u of a cell, uniform over the solid angle if u is uniform. Its length is 1 within
-// 1 / 10^6.
+// Returns the direction to the point u of a cell, uniform over the solid angle for uniform u. Its length is 1 within 1
+// / 10^6.
 fn direction_in_cell(column: u32, row: u32, u: vec2f, width: u32, height: u32) -> vec3f {
     let turn = 1.0 - 2.0 * ((f32(column) + 0.5 + u.x) / f32(width));
     let below = row > height / 2u;

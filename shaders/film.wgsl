@@ -1,8 +1,8 @@
-// The film: consecutive parts of one vector per pixel, some of which are layers.
+// The film: consecutive parts of one vector per pixel, partly layers.
 
 @group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
 
-// Returns the layers of a pixel; the first layer is this part of the film.
+// Returns a pixel's layers; `part` is the first.
 fn stored_layers(index: u32, part: u32) -> Layers {
     let pixels = params.film_size.x * params.film_size.y;
     let first = part * pixels + index;

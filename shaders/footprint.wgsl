@@ -6,7 +6,6 @@ struct Footprint {
     dy: vec2f,
 }
 
-// Returns the footprint on q for the derivatives `dx` and `dy` of the position.
 fn surface_footprint(q: Primitive, surface: Surface, dx: vec3f, dy: vec3f) -> Footprint {
     let local = point_to_local(q, surface.position);
     return Footprint(surface.uv, uv_derivative(q, local, vector_to_local(q, dx)),
@@ -21,8 +20,8 @@ fn wrap_v(t: Texture) -> u32 {
     return t.wrap >> 2u;
 }
 
-// Transforms a footprint to the texture's coordinates. Beyond a clamped edge it has no extent across the edge, so that
-// coarse levels do not mix in distant texels.
+// Transforms a footprint to texture coordinates. It has no extent across a clamped edge, so that coarse levels do not
+// mix in distant texels.
 fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
     let dx = vec2f(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
     let dy = vec2f(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);
@@ -40,8 +39,8 @@ struct Ellipse {
     minor: f32,
 }
 
-// Returns the ellipse with the conjugate semi-axes dx and dy, the minor one at least 1 / `anisotropy` of the major one.
-// The eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
+// Returns the ellipse with conjugate semi-axes dx and dy, the minor one at least 1 / `anisotropy` of the major one. The
+// eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
 fn footprint_ellipse(dx: vec2f, dy: vec2f, anisotropy: f32) -> Ellipse {
     let p = dx.x * dx.x + dy.x * dy.x;
     let q = dx.x * dx.y + dy.x * dy.y;

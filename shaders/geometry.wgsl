@@ -1,7 +1,7 @@
-// Ray queries of integrators: closest hits, occlusion and the surface at a hit. A few primitives are tested one by one,
-// from buffers (`buffers.wgsl`) or as constants; BVHs hold all others (`bvh.wgsl`).
+// Ray queries of integrators. A few primitives are tested one by one, from buffers (`buffers.wgsl`) or as constants;
+// BVHs hold all others (`bvh.wgsl`).
 
-// Returns the closest hit except on `origin_prim`. `inside_prim` is a solid from whose surface the ray goes inside.
+// Returns the closest hit except on `origin_prim`. The ray goes inside from the solid `inside_prim`.
 fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     if TLAS_KINDS == 0u {
         return closest_primitive(ray, origin_prim.y, inside_prim.y);
@@ -9,9 +9,8 @@ fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     return closest_in_bvh(closest_primitive(ray, standalone_prim(origin_prim), standalone_prim(inside_prim)), ray, origin_prim, inside_prim);
 }
 
-// Returns the mask of a block's occluded samples. The surface's own primitive does not occlude samples above the
-// surface, unless it is a solid seen from inside. Samples in `unlit` are not tested against the BVH; their bits have no
-// meaning.
+// Returns the mask of occluded samples. The surface's own primitive does not occlude samples above it, unless it is a
+// solid seen from inside. Samples in `unlit` are not tested against the BVH; their bits have no meaning.
 fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u32) -> u32 {
     let bits = occluded_by_primitives(surface, light, block);
     if TLAS_KINDS == 0u {
@@ -20,8 +19,8 @@ fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u
     return occluded_by_bvh(bits | unlit, surface, light, block);
 }
 
-// Returns true if `before`, or if a primitive except `target_prim` occludes the segment from the surface to
-// `t_max * to`. The surface's own primitive counts as in `occluded_samples`.
+// Returns true if `before`, or if a primitive except `target_prim` occludes the segment to `t_max * to`. The surface's
+// own primitive counts as in `occluded_samples`.
 fn is_occluded(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let occluded = is_occluded_by_primitives(before, surface, to, t_max, target_prim);
     if TLAS_KINDS == 0u {
@@ -44,7 +43,6 @@ fn fetch_hit_primitive(hit: Hit) -> HitPrimitive {
     return standalone_hit_primitive(load_primitive(hit.primitive));
 }
 
-// Returns the surface at a hit.
 fn surface_of(prim: HitPrimitive, hit: Hit, ray: Ray) -> Surface {
     if is_on_mesh(hit) {
         let prim_id = vec2u(hit.instance, hit.primitive);
@@ -58,12 +56,10 @@ fn surface_of(prim: HitPrimitive, hit: Hit, ray: Ray) -> Surface {
     return with_coordinates(surface, q);
 }
 
-// Returns the untextured material.
 fn material_of(prim: HitPrimitive) -> Material {
     return load_material(prim.primitive.material);
 }
 
-// Returns the derivatives of the hit by the image coordinates.
 fn hit_differential(prim: HitPrimitive, hit: Hit, surface: Surface, ray: Ray, differential: Differential) -> HitDifferential {
     if DIFFERENTIALS == 0u {
         return HitDifferential();
@@ -74,7 +70,7 @@ fn hit_differential(prim: HitPrimitive, hit: Hit, surface: Surface, ray: Ray, di
     return arrival(prim.primitive, differential, ray, hit.t, surface);
 }
 
-// Returns the hit's footprint in texture coordinates.
+// Returns the footprint in texture coordinates.
 fn footprint_of(prim: HitPrimitive, hit: Hit, surface: Surface, at: HitDifferential) -> Footprint {
     if is_on_mesh(hit) {
         return face_footprint(prim, surface, at.x.position, at.y.position);
@@ -90,7 +86,7 @@ fn view_ray(raster: vec2f) -> Ray {
     return camera_ray(camera, raster);
 }
 
-// Moves a camera path behind the surfaces in front that are invisible to the camera.
+// Moves a path behind the first surfaces that are invisible to the camera.
 fn skip_camera_invisible(start: Path) -> Path {
     var path = start;
     for (var i = 0u; i < MAX_CAMERA_SKIPS; i++) {
@@ -112,7 +108,6 @@ fn skip_camera_invisible(start: Path) -> Path {
     return path;
 }
 
-// Returns the first hit through a pixel's center.
 fn pixel_first_hit(pixel: vec2u) -> FirstHit {
     let start = view_ray(vec2f(pixel) + 0.5);
     var path = Path(start, Differential(), vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);

@@ -1,9 +1,9 @@
-// The GGX microfacet distribution: normals, masking, sampling and albedo. In local vectors z is along the normal, x and
-// y along the axes of the two `alpha`, which are at least SMALLEST_ALPHA.
+// The GGX microfacet distribution. In local vectors z is along the normal, x and y along the axes of the two `alpha`,
+// which are at least SMALLEST_ALPHA.
 
 // Returns the density of normals, per solid angle and area: Trowbridge and Reitz, "Average irregularity representation
-// of a rough surface for ray reflection", JOSA 65(5), 1975. The tangential components of m are exact where the surface
-// is smooth; 1 - cos^2 is not.
+// of a rough surface for ray reflection", JOSA 65(5), 1975. Unlike 1 - cos^2, the tangential components of m are exact
+// on smooth surfaces.
 fn ggx_d(alpha: vec2f, m: vec3f) -> f32 {
     let x = m.x / alpha.x;
     let y = m.y / alpha.y;
@@ -11,7 +11,7 @@ fn ggx_d(alpha: vec2f, m: vec3f) -> f32 {
     return select(0.0, 0.31830988618379067 / (alpha.x * alpha.y * s * s), m.z > 0.0);
 }
 
-// Returns the length of w stretched to the hemispherical configuration.
+// Returns the length of w in the hemispherical configuration.
 fn ggx_length(alpha: vec2f, w: vec3f) -> f32 {
     let x = w.x * alpha.x;
     let y = w.y * alpha.y;
@@ -25,7 +25,7 @@ fn ggx_g1(alpha: vec2f, w: vec3f) -> f32 {
     return 2.0 * cosine / max(cosine + ggx_length(alpha, w), 1e-30);
 }
 
-// Returns the height-correlated masking-shadowing function: the same paper, equation 99.
+// Returns height-correlated masking-shadowing: equation 99 there.
 fn ggx_g2(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     let o = abs(wo.z);
     let i = abs(wi.z);
@@ -41,20 +41,20 @@ fn ggx_sample(alpha: vec2f, wo: vec3f, u: vec2f) -> vec3f {
     return select(vec3f(0.0, 0.0, 1.0), m * (1.0 / sqrt(length2)), length2 > 1e-20);
 }
 
-// Returns the pdf of `ggx_sample`, per solid angle of m.
+// Returns the pdf of `ggx_sample`, per solid angle.
 fn ggx_pdf(alpha: vec2f, wo: vec3f, m: vec3f) -> f32 {
     return 2.0 * max(dot(wo, m), 0.0) * ggx_d(alpha, m) / max(wo.z + ggx_length(alpha, wo), 1e-30);
 }
 
-// Returns the single-scattering albedo at the cosine mu, F0 x + F90 y, for the Fresnel term of Schlick, "An Inexpensive
-// BRDF Model for Physically-based Rendering", Eurographics 1994.
+// Returns the single-scattering albedo at the cosine mu, F0 x + F90 y, for Schlick's Fresnel term ("An Inexpensive BRDF
+// Model for Physically-based Rendering", Eurographics 1994).
 fn ggx_albedo(alpha: f32, mu: f32) -> vec2f {
     let length = sqrt(alpha * alpha * (1.0 - mu * mu) + mu * mu);
     return ggx_albedo_fit(alpha, mu / length, length);
 }
 
-// Approximates the albedo for two alpha: masking by the one along w, shadowing by the root mean square. Within 7 %
-// where one is 1 and the other small, within 2 % elsewhere.
+// Approximates the albedo for two alpha: masking by that along w, shadowing by the root mean square. Within 7 % where
+// one is 1 and the other small, else within 2 %.
 fn ggx_albedo_along(alpha: vec2f, w: vec3f) -> vec2f {
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
     let length = sqrt(square * (1.0 - w.z * w.z) + w.z * w.z);

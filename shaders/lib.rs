@@ -1,7 +1,6 @@
-//! The WGSL shaders of wgray as text: a table of the files, and their hash, which is part of the identity of a render
-//! on every device.
+//! The WGSL shaders of wgray as text, and their hash, part of the identity of a render on every device.
 
-/// A shader file: its name in `shaders/` and its text at build time.
+/// A shader file: name and text at build time.
 pub type File = (&'static str, &'static str);
 
 macro_rules! files {
@@ -10,7 +9,7 @@ macro_rules! files {
     };
 }
 
-/// The shared mathematics: pure functions and records, each with a twin in Rust.
+/// The shared mathematics: pure functions and records with Rust twins.
 pub static SHARED: &[File] = files![
     "math.wgsl",
     "rng.wgsl",
@@ -57,9 +56,9 @@ pub static SHARED: &[File] = files![
     "bvh_node.wgsl",
     "mesh.wgsl",
 ];
-/// Correctly rounded quotients and square roots. First in a kernel, since naga requires functions before their calls.
+/// Correctly rounded quotients and square roots: first, since naga requires functions before their calls.
 pub static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
-/// The buffers and the scene traversal, which every kernel adds to [`SHARED`].
+/// Buffers and scene traversal, in every kernel besides [`SHARED`].
 pub static KERNEL: &[File] = files![
     "bindings.wgsl",
     "completion.wgsl",
@@ -84,19 +83,19 @@ pub static PATH: &[File] = files![
     "scattering.wgsl",
     "integrators/path.wgsl"
 ];
-/// Loops that read the scene from buffers. Kernels with the scene compiled in replace them by functions with constant
-/// records.
+/// Loops that read the scene from buffers. Kernels with the scene compiled in have functions with constant records
+/// instead.
 pub static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
-/// Access to texels in a single buffer.
+/// Texels in a single buffer.
 pub static TEXELS: &[File] = files!["texels.wgsl"];
-/// The kernel that accumulates samples.
+/// Accumulates samples.
 pub static RENDER_FILE: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
-/// The kernel that accumulates samples under adaptive sampling.
+/// Accumulates samples under adaptive sampling.
 pub static ADAPTIVE_FILE: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
-/// The kernel that writes first hits.
+/// Writes first hits.
 pub static FIRST_HITS_FILE: &[File] = files!["kernels/first_hits.wgsl"];
 
-/// Returns every file, in the order in which [`hash`] reads them.
+/// Returns every file, in the order of [`hash`].
 pub fn built_in() -> impl Iterator<Item = File> {
     let scene = [
         ROUNDING_FILE,
@@ -112,12 +111,12 @@ pub fn built_in() -> impl Iterator<Item = File> {
     scene.into_iter().chain(kernels).flatten().copied()
 }
 
-/// Returns the BLAKE3 hash of the names and texts of all files, in hexadecimal.
+/// Returns the BLAKE3 hash of all names and texts, in hexadecimal.
 pub fn hash() -> String {
     hash_of(built_in())
 }
 
-/// Each name and text is preceded by its length, so that no two lists of files have the same bytes.
+/// Lengths precede names and texts, so that no two lists of files have the same bytes.
 fn hash_of<T: AsRef<str>>(files: impl Iterator<Item = (&'static str, T)>) -> String {
     let mut hasher = blake3::Hasher::new();
     for (name, text) in files {

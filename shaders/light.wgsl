@@ -1,6 +1,6 @@
-// Vectors from a point to the samples of a light, and the falloff of spot lights.
+// Vectors to the samples of a light, and the falloff of spot lights.
 
-// The vectors `towards + u a + v b` from a point to the samples of a light, with a and b in -1..1.
+// Vectors `towards + u a + v b` from a point to a light's samples, a and b in -1..1.
 struct LightSegments {
     towards: vec3f,
     u: vec3f,
@@ -11,19 +11,17 @@ fn segments_to_light(light: Light, p: vec3f) -> LightSegments {
     return LightSegments(light.center - p * light.finite, light.u, light.v);
 }
 
-// Transforms the vectors to local space.
 fn segments_to_local(q: Primitive, to: LightSegments) -> LightSegments {
     return LightSegments(vector_to_local(q, to.towards), vector_to_local(q, to.u), vector_to_local(q, to.v));
 }
 
-// Returns the vector to the sample at `at` in the unit square.
+// Returns the vector to `at` in the unit square.
 fn segment(to: LightSegments, at: vec2f) -> vec3f {
     return to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0);
 }
 
-// Returns a spot light's relative intensity, `to` being the vector to it: the square of a ramp in the cosine, as in
-// glTF's KHR_lights_punctual. 1 - cosine comes from the difference of unit vectors, which keeps the digits of small
-// angles.
+// Returns a spot light's relative intensity, `to` being the vector to it: a squared ramp in the cosine, as in glTF's
+// KHR_lights_punctual. The difference of unit vectors gives 1 - cosine with the digits of small angles.
 fn spot_falloff(light: Light, to: vec3f) -> f32 {
     let away = normalize(to) + light.normal;
     let ramp = (light.cone - 0.5 * dot(away, away)) * light.falloff;

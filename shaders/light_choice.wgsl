@@ -1,12 +1,12 @@
-// Light selection: descends the light tree to pick an emitter, and ascends it to get the pdf of a hit emitter.
+// Light selection by the light tree, and the pdf of hit emitters.
 
 struct EmitterSelection {
     emitter: Emitter,
     density: f32,          // pdf per area, including the selection; 0 if the light tree did not select
 }
 
-// Returns `emitter`, or an emitter that the light tree selects at p if the entry stands for the tree. n is as in
-// `light_importances`. Each pair of levels uses a two-dimensional point set over the pixel's samples.
+// Returns `emitter`, or what the light tree selects at p if that stands for the tree. n is as in `light_importances`.
+// Each pair of levels uses a two-dimensional point set over the pixel's samples.
 fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -> EmitterSelection {
     var chosen = EmitterSelection(emitter, 0.0);
     if emitter.index != NO_INDEX {
@@ -37,8 +37,7 @@ fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u
     return chosen;
 }
 
-// Returns the pdf per area with which `light_tree_select` at p samples a hit; 0 if not `wanted` or if the hit is not in
-// the tree.
+// Returns the pdf per area of sampling a hit by `light_tree_select` at p; 0 if not `wanted` or not in the tree.
 fn light_tree_pdf(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     var at = NO_INDEX;
     if wanted {
@@ -56,7 +55,7 @@ fn light_tree_pdf(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     return density;
 }
 
-// Returns the leaf of a hit in the light tree, encoded as `LightNode.parent`, or NO_INDEX.
+// Returns a hit's leaf, encoded as `LightNode.parent`, or NO_INDEX.
 fn light_leaf(hit: Hit) -> u32 {
     var position_in_tree = hit.primitive;
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {

@@ -1,24 +1,24 @@
-// Point samples on emitters as seen from another point, and their pdfs.
+// Samples of emitters as seen from a point, and their pdfs.
 
-// Converts the pdf `density` from area to solid angle at `to`, on a surface with this unit normal.
+// Converts the pdf `density` from area to solid angle at `to`, for a unit normal.
 fn solid_angle_pdf(density: f32, to: vec3f, normal: vec3f) -> f32 {
     let d2 = dot(to, to);
     return density * d2 * sqrt(d2) / abs(dot(normal, to));
 }
 
-// Returns an ellipsoid's area within a sixth, exact for a sphere: the root mean square of the local area scale.
+// Returns an ellipsoid's area within a sixth, exact for spheres: the root mean square of the local area scale.
 fn ellipsoid_area(q: Primitive) -> f32 {
     return 7.255197456936871 * sqrt(dot(q.x, q.x) + dot(q.y, q.y) + dot(q.z, q.z)) / abs(q.determinant);
 }
 
-// Returns the height of the cap of directions subtended by the unit sphere at a local point: 1 minus the cosine of its
-// half angle, and 2 from inside. `level` is |o|^2 - 1.
+// Returns the height of the cap of directions subtended by the unit sphere at a local point: 1 - cos(half angle), 2
+// from inside. `level` is |o|^2 - 1.
 fn ellipsoid_cap(level: f32) -> f32 {
     let sine2 = 1.0 / (1.0 + level);
     return select(2.0, sine2 / (1.0 + sqrt(max(1.0 - sine2, 0.0))), level > 0.0);
 }
 
-// Samples a vector from p to an ellipsoid, uniformly over the local directions that hit its unit sphere.
+// Samples a vector from p to an ellipsoid, uniform over the local directions to its unit sphere.
 fn ellipsoid_sample(q: Primitive, p: vec3f, u: vec2f) -> vec3f {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
@@ -32,8 +32,8 @@ fn ellipsoid_sample(q: Primitive, p: vec3f, u: vec2f) -> vec3f {
     return vector_to_world(q, direction * select(inside, outside, level > 0.0));
 }
 
-// Returns the pdf of `ellipsoid_sample`, per solid angle. Directions map from local space with the Jacobian |l|^3 / det
-// for the local image l of a unit vector.
+// Returns the pdf of `ellipsoid_sample`, per solid angle. The Jacobian from local space is |l|^3 / det for the local
+// image l of a unit vector.
 fn ellipsoid_pdf(q: Primitive, p: vec3f, wi: vec3f) -> f32 {
     let cap = ellipsoid_cap(ellipsoid_level(q, vector_to_local(q, p - q.anchor)));
     let l = vector_to_local(q, wi);
@@ -41,7 +41,7 @@ fn ellipsoid_pdf(q: Primitive, p: vec3f, wi: vec3f) -> f32 {
     return 0.15915494309189535 / cap * abs(q.determinant) / (l2 * sqrt(l2));
 }
 
-// The part of a cylinder that faces a point. Areas are relative to a cap.
+// The part that faces a point. Areas are relative to a cap.
 struct CylinderPart {
     arc: f32,              // half angle on the side in units of pi
     middle: vec2f,         // unit vector to the arc's middle
@@ -50,14 +50,13 @@ struct CylinderPart {
     start: f32,            // the same for the start cap
 }
 
-// A vector to a cylinder, and the outward normal there.
+// A vector to a cylinder, and the normal there.
 struct CylinderPoint {
     to: vec3f,
     normal: vec3f,
 }
 
-// Returns the part that faces a point: an arc of the side if the point is beside the cylinder, a cap if it is beyond
-// the cap, everything if it is inside.
+// Returns the part that faces a point: an arc of the side from beside, a cap from beyond it, everything from inside.
 fn cylinder_part(q: Primitive, o: vec3f, levels: vec2f) -> CylinderPart {
     let inside = (levels.x <= 0.0) & (levels.y <= 0.0);
     let r2 = o.x * o.x + o.y * o.y;
@@ -75,7 +74,7 @@ fn cylinder_height_ratio(q: Primitive) -> f32 {
     return sqrt(dot(q.x, q.x) / dot(q.z, q.z));
 }
 
-// Samples the part that faces p uniformly.
+// Samples the part that faces p, uniformly.
 fn cylinder_sample(q: Primitive, p: vec3f, u: vec2f) -> CylinderPoint {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
@@ -98,7 +97,7 @@ fn cylinder_sample(q: Primitive, p: vec3f, u: vec2f) -> CylinderPoint {
     return CylinderPoint(vector_to_world(q, local - o), normal);
 }
 
-// Returns the pdf of `cylinder_sample` relative to uniform samples of the whole cylinder.
+// Returns the pdf of `cylinder_sample` relative to uniform samples of the cylinder.
 fn cylinder_share(q: Primitive, p: vec3f) -> f32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let part = cylinder_part(q, from_anchor - q.middle, cylinder_levels(q, from_anchor));

@@ -1,16 +1,16 @@
 // Importance sampling of light-tree nodes: Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive
-// Tree Splitting", HPG 2018, without the splitting and with four children per node.
+// Tree Splitting", HPG 2018, without splitting and with four children per node.
 
 // Returns the mean of max(h, 0) for h uniform on [m - r, m + r].
 fn mean_above(m: vec4f, r: vec4f) -> vec4f {
     return select(max4(m, vec4f(0.0)), 0.25 * (m + r) * ((m + r) / r), abs(m) < r);
 }
 
-// Returns the importances of the children for p, up to a factor: section 4.1, where each cosine is the mean, over the
-// bounding sphere, of the height above the plane of emitter or surface, divided by the distance. The mean height is at
-// least 0.03 of the radius, since spheres are wider than their contents. A tenth of the squared radius is added to the
-// squared distance. n is the normal of the surface, or 0 if light may arrive from both sides. The result is positive
-// where light can arrive, with a margin for rounding.
+// Returns the importances of the children for p, up to a factor: section 4.1, where each cosine is the mean height,
+// over the bounding sphere, above the plane of emitter or surface, divided by the distance. It is at least 0.03 of the
+// radius, since spheres are wider than their contents. A tenth of the squared radius is added to the squared distance.
+// n is the surface normal, or 0 if light may arrive from both sides. Importances are positive where light can arrive,
+// with a margin for rounding.
 fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
     let x = node.x - p.x;
     let y = node.y - p.y;
@@ -28,14 +28,14 @@ fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
     let faces_by = max4(mean_above(facing, node.radius), least);
     let inverse = 1.0 / max4(sqrt(d2 + 0.1 * node.radius * node.radius), vec4f(1e-15));
     let value = node.intensity * (leaves_by * inverse) * (faces_by * inverse) * (inverse * inverse);
-    // The sphere adds at most pi / 2 * radius / d to the angle, which bounds the change of the cosine.
+    // The sphere adds at most pi / 2 * radius / d to the angle, a bound for the change of the cosine.
     let leaves = leaving + 1.5707964 * node.radius > (node.edge - 1e-3) * d;
     let arrives = leaves & (facing + node.radius > -1e-3 * d) & (node.intensity > vec4f(0.0));
     return select(vec4f(0.0), max4(value, vec4f(1e-36)), arrives);
 }
 
-// Returns the probabilities of the children, proportional to their importances; (1, 0, 0, 0) if all are 0. A positive
-// importance counts as at least 2^-12 of the sum, well above the resolution of random numbers.
+// Returns probabilities proportional to the importances; (1, 0, 0, 0) if all are 0. Positive ones count as at least
+// 2^-12 of the sum, well above the resolution of random numbers.
 fn light_shares(importances: vec4f) -> vec4f {
     let sum = (importances.x + importances.y) + (importances.z + importances.w);
     let least = select(vec4f(0.0), max4(importances, vec4f(sum * 0.00024414063)), importances > vec4f(0.0));
@@ -43,7 +43,7 @@ fn light_shares(importances: vec4f) -> vec4f {
     return select(shares, vec4f(1.0, 0.0, 0.0, 0.0), vec4<bool>(sum == 0.0));
 }
 
-// Returns the child that `random` in [0, 1) selects, never one with probability 0.
+// Returns the child that `random` in [0, 1) selects, never one of probability 0.
 fn light_child(shares: vec4f, random: f32) -> u32 {
     let second = shares.x + shares.y;
     let third = second + shares.z;

@@ -1,6 +1,6 @@
-// Microfacet lobes: local frame, anisotropic roughness, and GGX reflection.
+// Microfacet lobes: frame, anisotropy, and GGX reflection.
 
-// A direction sampled from a lobe, in the frame of the lobe.
+// A sampled direction, in the frame of the lobe.
 struct LobeSample {
     wi: vec3f,             // z < 0: transmitted
     weight: vec3f,         // BSDF times cosine over PDF; 0 if the path ends
@@ -16,19 +16,18 @@ fn plain_alpha(material: Material) -> vec2f {
     return vec2f(along, across);
 }
 
-// Returns true if the lobe is a delta.
 fn is_polished(material: Material) -> bool {
     return plain_alpha(material).x < SMALLEST_ALPHA;
 }
 
-// Returns the alpha of a lobe that is not a delta.
+// Returns alpha, for lobes that are not deltas.
 fn facet_alpha(material: Material) -> vec2f {
     let alpha = plain_alpha(material);
     return vec2f(max(alpha.x, SMALLEST_ALPHA), max(alpha.y, SMALLEST_ALPHA));
 }
 
 // Returns the axes of a lobe around the shading normal: the direction of texture u, rotated towards v by `rotation`
-// half turns. The axes are arbitrary without usable texture coordinates.
+// half turns; arbitrary without usable texture coordinates.
 fn lobe_frame(surface: Surface, rotation: f32) -> Tangents {
     let n = surface.shading_normal;
     let along = surface.du - n * dot(n, surface.du);
@@ -43,7 +42,7 @@ fn lobe_frame(surface: Surface, rotation: f32) -> Tangents {
 }
 
 // Returns the angle from u to v, in half turns, of a direction in red and green, where 0 to 1 encode -1 to 1
-// (KHR_materials_anisotropy); 0 for the zero vector.
+// (KHR_materials_anisotropy); 0 for zero.
 fn direction_turn(color: vec3f) -> f32 {
     return atan2(2.0 * color.y - 1.0, 2.0 * color.x - 1.0) * 0.31830988618379067;
 }
@@ -56,14 +55,14 @@ fn vector_from_lobe(frame: Tangents, n: vec3f, w: vec3f) -> vec3f {
     return frame.u * w.x + frame.v * w.y + n * w.z;
 }
 
-// Returns the microfacet normal that reflects wo to wi; the surface normal if they are opposite.
+// Returns the microfacet normal; the surface normal for opposite directions.
 fn half_vector(wo: vec3f, wi: vec3f) -> vec3f {
     let sum = wo + wi;
     let length2 = dot(sum, sum);
     return select(vec3f(0.0, 0.0, 1.0), sum * (1.0 / sqrt(length2)), length2 > 1e-20);
 }
 
-// Returns the microfacet BRDF for F = 1 times the cosine of wi: D G2 / (4 cos).
+// Returns the BRDF for F = 1 times the cosine of wi: D G2 / (4 cos).
 fn facet_eval(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     let o = abs(wo.z);
     let i = abs(wi.z);
@@ -82,8 +81,8 @@ fn facet_weight(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     return wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30);
 }
 
-// Returns the coordinates of w in an anisotropic albedo table, 0 to 1. x: the roughness in the azimuth of w, from
-// alpha.y to alpha.x, finer near alpha.y. y: the cosine, finer near 0 at low roughness.
+// Returns the position of w in an anisotropic albedo table, 0 to 1. x: the roughness in the azimuth of w, from alpha.y
+// to alpha.x, finer near alpha.y. y: the cosine, finer near 0 at low roughness.
 fn aniso_table_position(alpha: vec2f, w: vec3f) -> vec2f {
     let x = alpha.x * w.x;
     let y = alpha.y * w.y;
@@ -95,8 +94,8 @@ fn aniso_table_position(alpha: vec2f, w: vec3f) -> vec2f {
     return vec2f(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)));
 }
 
-// Returns the energy that single scattering loses, as a multiple of its albedo, reduced by the error of the fit so that
-// its compensation creates no energy.
+// Returns the energy lost by single scattering, as a multiple of its albedo, reduced by the error of the fit so that
+// compensation creates no energy.
 fn facet_loss(alpha: vec2f, wo: vec3f) -> f32 {
     let albedo = ggx_albedo_along(alpha, wo);
     return max(1.0 / (albedo.x + albedo.y) - 1.005, 0.0);

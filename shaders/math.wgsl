@@ -1,5 +1,5 @@
-// Arithmetic with the same bits on every device that rounds as IEEE 754 requires. Written out, because WGSL's built-in
-// functions become instructions that no decoration protects from contraction. Tests check each error bound.
+// Arithmetic with the same bits wherever rounding follows IEEE 754. WGSL's built-in functions are avoided, as no
+// decoration protects them from contraction. Tests check each error bound.
 
 fn dot(a: vec3f, b: vec3f) -> f32 {
     return a.x * b.x + a.y * b.y + a.z * b.z;
@@ -18,7 +18,6 @@ fn max(a: f32, b: f32) -> f32 {
     return select(b, a, a > b);
 }
 
-// Returns the maximum of each component.
 fn max4(a: vec4f, b: vec4f) -> vec4f {
     return select(b, a, a > b);
 }
@@ -27,21 +26,20 @@ fn min(a: f32, b: f32) -> f32 {
     return select(b, a, a < b);
 }
 
-// Returns x, but 0 for -0. Operates on bits, since Mesa ignores the sign of zero: it simplifies a selection of -1 or 0
-// to a negated boolean, and x + 0 to x.
+// Returns x, but 0 for -0. Operates on bits, since Mesa ignores the sign of zero: it simplifies x + 0 to x, and a
+// selection of -1 or 0 to a negated boolean.
 fn positive_zero(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
     return bitcast<f32>(select(bits, 0u, bits == 0x80000000u));
 }
 
-// Returns the largest integer that is not above x.
 fn floor(x: f32) -> f32 {
     let small = abs(x) < 8388608.0; // larger ones are whole
     let whole = f32(i32(select(0.0, x, small)));
     return select(x, select(whole, whole - 1.0, whole > x), small);
 }
 
-// Returns x^n by squaring, for n below 2^bits: within n x 2^-24 relative for x from 0 to 1.
+// Returns x^n by squaring, n below 2^bits: within n x 2^-24 relative for x from 0 to 1.
 fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     var result = 1.0;
     var square = x;
@@ -52,15 +50,15 @@ fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     return result;
 }
 
-// Returns x^y as 2^(y log2 x), for x from 0 to 1 and y > 0, within 1.7 x 2^-23 (1 + |y log2 x|) relative; 0 if x is
-// below the normal numbers.
+// Returns x^y as 2^(y log2 x), for x from 0 to 1 and y > 0, within 1.7 x 2^-23 (1 + |y log2 x|) relative; 0 for
+// subnormal x.
 fn power(x: f32, y: f32) -> f32 {
     return select(0.0, exp2(y * log2(x)), x >= 1.1754943508222875e-38);
 }
 
-// Returns the binary logarithm of a normal x > 0: the exponent, and the series of 2 artanh((m - 1) / (m + 1)) for a
-// mantissa m from sqrt(1/2) to sqrt(2) (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.1.27). Within
-// 4.5 units in the last place.
+// Returns log2 of a normal x > 0: the exponent, and the series of 2 artanh((m - 1) / (m + 1)) for a mantissa m from
+// sqrt(1/2) to sqrt(2) (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.1.27). Within 4.5 units in the
+// last place.
 fn log2(x: f32) -> f32 {
     let bits = bitcast<i32>(x);
     let exponent = (bits - 0x3f3504f3) >> 23u;
@@ -71,8 +69,8 @@ fn log2(x: f32) -> f32 {
     return f32(exponent) + s * series * 2.8853900817779268;
 }
 
-// Returns 2^x; 0 below the normal numbers, infinite from 127.5 on. Splits off the nearest integer and evaluates the
-// series of the exponential (Abramowitz and Stegun, 4.2.1). Within 1.5 units in the last place.
+// Returns 2^x; 0 below the normal numbers, infinite from 127.5 on. Splits off the nearest integer, for the series of
+// the exponential (Abramowitz and Stegun, 4.2.1). Within 1.5 units in the last place.
 fn exp2(x: f32) -> f32 {
     let p = min(max(x, -126.5), 128.0);
     let whole = i32(p + select(0.5, -0.5, p < 0.0));
@@ -83,7 +81,7 @@ fn exp2(x: f32) -> f32 {
 }
 
 // Returns the angle of (x, y) in (-pi, pi], 0 if both are 0: the series of the arctangent (Abramowitz and Stegun,
-// 4.4.42) after reduction of the argument below tan(pi / 8). Within 3.5 units in the last place.
+// 4.4.42), for arguments reduced below tan(pi / 8). Within 3.5 units in the last place.
 fn atan2(y: f32, x: f32) -> f32 {
     let large = max(abs(x), abs(y));
     let small = min(abs(x), abs(y));

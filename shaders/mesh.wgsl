@@ -1,4 +1,4 @@
-// Mesh triangles: intersection and surface properties. Object-space ray directions are not normalized, so that t is the
+// Mesh triangles: intersection and surface properties. Object-space directions keep their length, so that t is the
 // world-space distance.
 
 // The shear that maps a ray to the z axis; `axis` is the largest component of its direction.
@@ -15,7 +15,7 @@ fn shear_of(direction: vec3f) -> Shear {
     return Shear(axis, vec2f(d.x / d.z, d.y / d.z), 1.0 / d.z);
 }
 
-// Returns the coordinates in cyclic order with `axis` last.
+// Returns the coordinates in cyclic order, `axis` last.
 fn permuted(v: vec3f, axis: u32) -> vec3f {
     return select(select(v.xyz, v.zxy, axis == 1u), v.yzx, axis == 0u);
 }
@@ -31,9 +31,9 @@ struct Crossing {
     barycentric: vec2f,    // weights of the second and third vertex
 }
 
-// Intersects a triangle: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013; points
-// exactly on an edge are inside. The ray must hit the box of the triangle too, and t is clamped to that interval, so
-// that a BVH misses no hit (docs/decisions/trees.md).
+// Intersects a triangle: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013; edges are
+// inside. The ray must hit the triangle's box too, and t is clamped to that interval, so that a BVH misses no hit
+// (docs/decisions/trees.md).
 fn triangle_crossing(v0: vec3f, v1: vec3f, v2: vec3f, origin: vec3f, shear: Shear, s: Slabs) -> Crossing {
     let a = sheared(v0 - origin, shear);
     let b = sheared(v1 - origin, shear);
@@ -69,19 +69,19 @@ fn vector_from_mesh(i: Instance, v: vec3f) -> vec3f {
     return i.u * v.x + i.v * v.y + i.w * v.z;
 }
 
-// Transforms a normal to world space and normalizes it; 0 stays 0.
+// Transforms a normal to a world-space unit vector; 0 stays 0.
 fn normal_from_mesh(i: Instance, n: vec3f) -> vec3f {
     let v = i.x * n.x + i.y * n.y + i.z * n.z;
     let scaled = v / max(largest(v), 1.1754943508222875e-38);
     return scaled / sqrt(max(dot(scaled, scaled), 0.5));
 }
 
-// Returns the margin of boxes in object space, which covers the rounding of a ray there.
+// Returns the object-space margin of boxes for the rounding of a ray.
 fn mesh_pad(i: Instance, origin: vec3f) -> f32 {
     return BOX_PAD * (largest(origin) + i.size);
 }
 
-// The primitive of a hit: standalone, with all other fields 0, or a mesh triangle in world space.
+// The primitive of a hit: standalone, with other fields 0, or a mesh triangle in world space.
 struct HitPrimitive {
     primitive: Primitive,  // a mesh triangle in the form of a primitive
     edge_1: vec3f,         // from the first to the second vertex
@@ -105,7 +105,7 @@ fn standalone_hit_primitive(q: Primitive) -> HitPrimitive {
     return HitPrimitive(q, zero, zero, zero.xy, zero.xy, zero.xy, zero, zero, zero, none, none, none, zero, 0.0);
 }
 
-// Returns a triangle as a primitive whose local x and y are the barycentric coordinates of the second and third vertex.
+// Returns a triangle as a primitive with the barycentric coordinates of its second and third vertex as local x and y.
 // Edges are in world space, `v0` is in object space.
 fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material: u32) -> Primitive {
     let least = 1.1754943508222875e-38;
@@ -119,7 +119,6 @@ fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material
                      TRIANGLE, normal, 1.0 / determinant, vec3f(0.0), 0.0);
 }
 
-// Returns the surface at barycentric coordinates b, hit from direction d.
 fn face_surface(face: HitPrimitive, prim_id: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> Surface {
     let q = face.primitive;
     let from_anchor = face.edge_1 * b.x + face.edge_2 * b.y;
@@ -128,8 +127,7 @@ fn face_surface(face: HitPrimitive, prim_id: vec2u, b: vec2f, d: vec3f, epsilon:
     let normal = q.z * side;
     let edge = max(max(largest(face.edge_1), largest(face.edge_2)), largest(face.edge_2 - face.edge_1));
     let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition_number);
-    // The offset has a part towards the viewer, so that the origin of a hit on an edge is in front of the other faces
-    // at that edge too.
+    // The part towards the viewer moves the origin of a hit on an edge in front of the other faces there, too.
     let start = position + (normal - d) * (epsilon * size);
     let tangents = face_frame(face, b);
     let smooth_normal = face_normal(face, b) * side;
@@ -141,12 +139,12 @@ fn face_uv(face: HitPrimitive, b: vec2f) -> vec2f {
     return face.uv_0 + (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
 }
 
-// Returns the interpolated vertex color at barycentric coordinates b, at least 0.
+// Returns the interpolated vertex color, at least 0.
 fn color_between(c0: vec4f, c1: vec4f, c2: vec4f, b: vec2f) -> vec4f {
     return max4(c0 + (c1 - c0) * b.x + (c2 - c0) * b.y, vec4f(0.0));
 }
 
-// Returns the interpolated unit normal on the outer side of the triangle; the geometric normal without vertex normals.
+// Returns the interpolated unit normal on the triangle's outer side; the geometric normal without vertex normals.
 fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let length2 = dot(n, n);
@@ -154,14 +152,13 @@ fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     return select(face.primitive.z, flipped_to(unit, face.primitive.z), length2 > 1e-12);
 }
 
-// Returns v or -v, towards `side`: normals in files may be on either side of their triangles.
+// Returns v or -v, towards `side`: normals in files may be on either side.
 fn flipped_to(v: vec3f, side: vec3f) -> vec3f {
     return v * select(1.0, -1.0, dot(v, side) < 0.0);
 }
 
-// Returns the offset from the triangle up to the smooth surface that its vertex normals imply, so that a coarse mesh
-// does not shadow itself in grazing light: Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, chapter
-// 4.
+// Returns the offset up to the smooth surface that the vertex normals imply, so that a coarse mesh does not shadow
+// itself in grazing light: Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, chapter 4.
 fn face_terminator_offset(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
@@ -171,15 +168,15 @@ fn face_terminator_offset(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
 }
 
-// Returns the offset from a point up to the tangent plane of a vertex; 0 if the point is above it. `from_vertex` is the
-// vector from the vertex to the point. A normal more than 37 degrees off the triangle normal `up` implies no surface
-// nearby, as at the corner of a cube: objects on the cube would lose their contact shadows.
+// Returns the offset from a point up to a vertex's tangent plane; 0 above it. `from_vertex` is the vector to the point.
+// A normal more than 37 degrees off the triangle normal `up` implies no surface nearby, as at the corner of a cube:
+// objects on it would lose their contact shadows.
 fn lift(n: vec3f, from_vertex: vec3f, up: vec3f) -> vec3f {
     return n * select(0.0, max(-dot(n, from_vertex), 0.0), dot(n, up) > 0.8);
 }
 
-// Returns true unless the triangle itself occludes the origin of shadow rays from direction `to`. Light from behind may
-// pass its edges, up to the terminator offset.
+// Returns true unless the triangle itself occludes the origin of shadow rays from `to`. Light from behind may pass its
+// edges, up to the terminator offset.
 fn face_direction_allowed(face: HitPrimitive, surface: Surface, to: vec3f) -> bool {
     let fall = -dot(surface.normal, to);
     let height = dot(surface.normal, surface.terminator_offset);
@@ -188,8 +185,7 @@ fn face_direction_allowed(face: HitPrimitive, surface: Surface, to: vec3f) -> bo
     return (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0);
 }
 
-// Returns the derivatives of a point by u and v; vectors in the plane of the triangle if its texture coordinates are
-// degenerate.
+// Returns the derivatives by u and v; other vectors in the triangle's plane if its texture coordinates are degenerate.
 fn face_tangents(face: HitPrimitive) -> Tangents {
     let a = face.uv_1 - face.uv_0;
     let b = face.uv_2 - face.uv_0;
@@ -201,7 +197,7 @@ fn face_tangents(face: HitPrimitive) -> Tangents {
     return Tangents(select(face.edge_1, u, whole), select(cross(face.primitive.z, face.edge_1), v, whole));
 }
 
-// Returns the interpolated vertex tangents, which are continuous across edges, or `face_tangents` if the mesh has none.
+// Returns the interpolated vertex tangents, continuous across edges; `face_tangents` without them.
 fn face_frame(face: HitPrimitive, b: vec2f) -> Tangents {
     let a = 1.0 - b.x - b.y;
     let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;
@@ -211,13 +207,12 @@ fn face_frame(face: HitPrimitive, b: vec2f) -> Tangents {
     return Tangents(select(own.u, u, between), select(own.v, v, between));
 }
 
-// Returns the change of `face_uv` if the position changes by d.
+// Returns the change of `face_uv` for the offset d.
 fn face_uv_derivative(face: HitPrimitive, d: vec3f) -> vec2f {
     let b = vector_to_local(face.primitive, d);
     return (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
 }
 
-// Returns the change of `face_normal` if the position changes by d.
 fn face_normal_derivative(face: HitPrimitive, b: vec2f, d: vec3f) -> vec3f {
     let db = vector_to_local(face.primitive, d);
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;

@@ -1,8 +1,8 @@
 // The material `conductor` with roughness or an index of refraction: Cook and Torrance, "A Reflectance Model for
 // Computer Graphics", ACM TOG 1(1), 1982, with GGX microfacets.
 
-// Returns the reflectance of a metal with the index eta + i k for unpolarized light: Born and Wolf, "Principles of
-// Optics", 14.2.
+// Returns the reflectance of a metal of index eta + i k for unpolarized light: Born and Wolf, "Principles of Optics",
+// 14.2.
 fn conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32 {
     let c2 = cosine * cosine;
     let s2 = 1.0 - c2;
@@ -14,7 +14,7 @@ fn conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32 {
     return max(0.5 * (s + p), 0.0);
 }
 
-// Returns the tint, times Fresnel if the material has an index.
+// Returns the tint, times Fresnel if there is an index.
 fn metal_fresnel(material: Material, cosine: f32) -> vec3f {
     let eta = material.eta;
     let k = material.k;

@@ -1,7 +1,7 @@
 // The material `phong` under the integrator `path`: the modified model of Lafortune and Willems, "Using the Modified
 // Phong Reflectance Model for Physically Based Rendering", report CW 197, Leuven, 1994.
 
-// Reflectances of the two terms, scaled down if their sum exceeds 1.
+// Reflectances, scaled down to a sum of at most 1.
 struct PhongFactors {
     diffuse: vec3f,
     specular: vec3f,
@@ -17,7 +17,7 @@ fn phong_factors(material: Material) -> PhongFactors {
     return PhongFactors(diffuse, specular, select(1.0, d / (d + s), s > 0.0));
 }
 
-// Returns the cosine between wi and the mirror direction of wo, to the power of the exponent.
+// Returns the power of the cosine between wi and the mirror direction of wo.
 fn phong_lobe(material: Material, angles: Angles) -> f32 {
     let cosine = 2.0 * angles.wi * angles.wo - angles.between;
     return power(min(max(cosine, 0.0), 1.0), material.shininess);
@@ -37,7 +37,7 @@ fn modified_phong_pdf(material: Material, angles: Angles) -> f32 {
     return diffuse_pdf(angles) * share + specular * (1.0 - share);
 }
 
-// Samples a direction, which may be below the surface. `random` in [0, 1) selects the term.
+// Samples a direction, maybe below the surface. `random` in [0, 1) selects the term.
 fn modified_phong_sample(material: Material, normal: vec3f, wo: vec3f, u: vec2f, random: f32) -> vec3f {
     if random < phong_factors(material).diffuse_share {
         return diffuse_sample(normal, u);

@@ -1,7 +1,7 @@
 // Normal mapping.
 
-// Returns the unit normal for a vector n of a normal map, whose x is along the texture's u, y along its v, and z
-// outward. The result is on the side of the surface's normal and never points into the surface.
+// Returns the unit normal for a vector n of a normal map, with x along u, y along v, and z outward. It is on the side
+// of the surface's normal and never points into the surface.
 fn mapped_normal(surface: Surface, t: Texture, n: vec3f) -> vec3f {
     // Tangents along the texture's own coordinates: the inverse of its UV transform, up to a positive factor.
     let sign = select(-1.0, 1.0, t.u.x * t.v.y - t.u.y * t.v.x > 0.0);

@@ -1,6 +1,6 @@
 // Equirectangular camera: longitude along the image width, latitude along its height.
 
-// Returns the ray of image point `at`, which wraps around the poles and at the left and right edge.
+// Returns the ray of image point `at`, wrapped around poles and edges.
 fn panorama_ray(camera: Camera, at: vec2f) -> Ray {
     let east = circle_point(panorama_angles(camera, at).x);
     let north = circle_point(panorama_angles(camera, at).y);
@@ -8,7 +8,7 @@ fn panorama_ray(camera: Camera, at: vec2f) -> Ray {
     return Ray(camera.position, normalize(level * north.x + camera.up * north.y));
 }
 
-// Returns the differential for samples `spacing` pixels apart.
+// Assumes samples `spacing` pixels apart.
 fn panorama_differential(camera: Camera, at: vec2f, spacing: f32) -> Differential {
     let east = circle_point(panorama_angles(camera, at).x);
     let north = circle_point(panorama_angles(camera, at).y);
@@ -19,7 +19,7 @@ fn panorama_differential(camera: Camera, at: vec2f, spacing: f32) -> Differentia
     return Differential(Derivative(vec3f(0.0), dx), Derivative(vec3f(0.0), dy));
 }
 
-// Returns longitude, from the center to the right, and latitude, in units of pi.
+// Returns longitude, to the right from the center, and latitude, in units of pi.
 fn panorama_angles(camera: Camera, at: vec2f) -> vec2f {
     return vec2f(at.x * (2.0 / f32(camera.width)) - 1.0, 0.5 - at.y * (1.0 / f32(camera.height)));
 }

@@ -25,7 +25,7 @@ fn mirrored_path(path: Path, surface: Surface, at: HitDifferential, material: Ma
     return SpecularSplit(primary, primary, false);
 }
 
-// Returns the first usable normal of the mapped one, the smooth one and the geometric one.
+// Returns the first usable normal: mapped, smooth or geometric.
 fn usable_normal(surface: Surface, normal: vec3f) -> vec3f {
     let own = select(surface.normal, surface.smooth_normal, is_usable(surface, surface.smooth_normal));
     return select(own, normal, is_usable(surface, normal));
@@ -37,7 +37,7 @@ fn is_usable(surface: Surface, normal: vec3f) -> bool {
     return outward & (dot(surface.wo, normal) > 0.0);
 }
 
-// Returns both branches at the first bounces, then the one that `random` in [0, 1) selects.
+// Returns both branches at first, later the one that `random` in [0, 1) selects.
 fn glass_path(path: Path, surface: Surface, at: HitDifferential, material: Material, random: f32) -> SpecularSplit {
     let eta = select(material.ior, 1.0 / material.ior, surface.side > 0.0);
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
@@ -74,7 +74,7 @@ fn refracted_path(path: Path, surface: Surface, at: HitDifferential, throughput:
     return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.exclude_back, surface.exclude_front);
 }
 
-// Continues a path in the same direction behind a surface that it ignores.
+// Continues in the same direction behind an ignored surface.
 fn pass_through_path(path: Path, surface: Surface, at: HitDifferential) -> Path {
     let below = surface.position - (surface.ray_origin - surface.position);
     let ray = Ray(below, path.ray.direction);

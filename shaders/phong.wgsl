@@ -1,12 +1,12 @@
 // Phong's reflection model: Phong, "Illumination for Computer Generated Pictures", CACM 18(6), 1975.
 
-// Diffuse cosine and specular power, each summed over the samples of a light.
+// Diffuse cosine and specular power, each summed over samples.
 struct Lobes {
     diffuse: f32,
     specular: f32,
 }
 
-// Returns the lobes of one sample in direction `to` (of any length); 0 if it does not light the surface.
+// Returns one sample's lobes in direction `to` (of any length); 0 if it does not light the surface.
 fn phong_lobes(surface: Surface, material: Material, to: vec3f, exponent_bits: u32) -> Lobes {
     let inverse_length = 1.0 / sqrt(dot(to, to));
     let n_l = dot(surface.shading_normal, to);
@@ -17,13 +17,13 @@ fn phong_lobes(surface: Surface, material: Material, to: vec3f, exponent_bits: u
     return Lobes(select(0.0, n_l * inverse_length, lit), select(0.0, r_v_power, lit));
 }
 
-// Returns true if direction `to` is in front of both the shading normal and the smooth normal. The geometric normal of
-// a mesh does not count: its triangles would show at the terminator.
+// Returns true if `to` is in front of both the shading normal and the smooth normal. A mesh's geometric normal does not
+// count: its triangles would show at the terminator.
 fn is_lit(surface: Surface, to: vec3f) -> bool {
     return (dot(surface.shading_normal, to) > 0.0) & (dot(surface.smooth_normal, to) > 0.0);
 }
 
-// Returns the mask of the samples of a block that do not light the surface of `prim` and need no shadow ray.
+// Returns the mask of samples that do not light the surface of `prim` and need no shadow ray.
 fn unlit_mask(prim: HitPrimitive, surface: Surface, to: LightSegments, block: SampleBlock) -> u32 {
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {
@@ -40,7 +40,7 @@ fn phong_power(x: f32, material: Material, exponent_bits: u32) -> f32 {
     return power(x, material.shininess);
 }
 
-// Adds the unoccluded samples of a block to the lobes, in order.
+// Adds unoccluded samples to the lobes, in order.
 fn phong_block(surface: Surface, material: Material, to: LightSegments, block: SampleBlock, occluded: u32, exponent_bits: u32,
                sum: Lobes) -> Lobes {
     var lobes = sum;

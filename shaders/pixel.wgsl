@@ -1,5 +1,5 @@
 // Camera samples of a pixel, and the interface of integrators: `begin_path` starts a path, and `advance` traces one
-// surface at a time until the path has `ended`; then `path_value` and `path_layers` return its contribution. Lanes in
+// surface at a time until it has `ended`; then `path_value` and `path_layers` return its contribution. Lanes in
 // lockstep thus begin their next samples without waiting for the longest path.
 
 struct CameraSample {
@@ -21,7 +21,7 @@ fn camera_sample(pixel: vec2u, sample: u32) -> CameraSample {
     return CameraSample(ray, differential_at(raster), at.z);
 }
 
-// Returns the lens position of a sample, from a separate point set over the samples of the pixel.
+// Returns a sample's lens position, from a separate point set over the pixel's samples.
 fn lens_point(pixel: vec2u, sample: u32) -> vec2f {
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 0u)).zw;
     var u = sobol_sample(sample, key);
@@ -31,7 +31,7 @@ fn lens_point(pixel: vec2u, sample: u32) -> vec2f {
     return lens_sample(camera.blades, u);
 }
 
-// Outputs of a pixel besides its radiance, as sums of weighted colors.
+// Further outputs of a pixel, as sums of weighted colors.
 struct Layers {
     emission: vec4f,       // radiance without reflection; w: coverage of the pixel
     direct: vec4f,         // radiance after one reflection
@@ -40,7 +40,7 @@ struct Layers {
     normal: vec4f,         // outward shading normal of the first hit
 }
 
-// Returns the differential of the camera ray through the center of the lens, by image position.
+// Returns the differential through the lens center, by image position.
 fn differential_at(raster: vec2f) -> Differential {
     if DIFFERENTIALS == 0u {
         return Differential();
@@ -52,7 +52,7 @@ fn differential_at(raster: vec2f) -> Differential {
     return camera_differential(camera, raster, spacing);
 }
 
-// Warps a uniform position to the filter distribution, relative to the pixel corner; z is the weight.
+// Warps a uniform position to the filter, relative to the pixel corner; z is the weight.
 fn filtered(u: vec2f) -> vec3f {
     if FILTER_BINS == 0u {
         return vec3f(u, 1.0);

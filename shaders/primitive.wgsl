@@ -1,8 +1,7 @@
-// Dispatch by the kind of a primitive: intersection, normals, texture coordinates and tangents. `kind` may be a
-// compile-time constant.
+// Dispatch by the kind of a primitive, which may be a compile-time constant.
 
-// Returns the t of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray starts on the primitive and
-// goes inside.
+// Returns the t of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray goes inside from the
+// primitive.
 fn intersect(kind: u32, q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
@@ -22,8 +21,7 @@ fn intersect(kind: u32, q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -
     return intersect_plane(q, ray, limit);
 }
 
-// Returns true if a primitive occludes the local segment o + s d, s in (0, t_max); `levels` are the `solid_levels` of
-// o.
+// Returns true if a primitive occludes the local segment o + s d, s in (0, t_max); `levels` are `solid_levels` of o.
 fn occludes(kind: u32, o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     if kind == RECTANGLE {
         return rectangle_occludes(o, d, t_max);
@@ -43,12 +41,12 @@ fn occludes(kind: u32, o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     return plane_occludes(o, d, t_max);
 }
 
-// Returns true for surfaces of convex solids: a ray that leaves one through the inside hits it again.
+// Returns true for convex solids: a ray that leaves the surface through the inside hits it again.
 fn is_solid(kind: u32) -> bool {
     return ((SOLID_KINDS >> kind) & 1u) == 1u;
 }
 
-// Returns true if texture coordinates from 0 to 1 correspond to local coordinates from -1 to 1.
+// Returns true if texture coordinates 0 to 1 correspond to local coordinates -1 to 1.
 fn is_centered(kind: u32) -> bool {
     return (kind == RECTANGLE) | (kind == DISK);
 }
@@ -75,7 +73,7 @@ fn solid_gradient(kind: u32, local: vec3f) -> vec3f {
     return select(local, cylinder_gradient(local), kind == CYLINDER);
 }
 
-// Returns the change of `solid_gradient` if the local point changes by d.
+// Returns the change of `solid_gradient` for the offset d.
 fn solid_gradient_derivative(kind: u32, local: vec3f, d: vec3f) -> vec3f {
     return select(d, cylinder_gradient_derivative(local, d), kind == CYLINDER);
 }
@@ -92,9 +90,8 @@ fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
 }
 
 // Returns the texture coordinates of a local point. Rectangle, disk: 0 to 1 along tangent and bitangent. Triangle:
-// barycentric coordinates of the second and third vertex. Plane: lengths along tangent and bitangent. Ellipsoid:
-// longitude from the first towards the second axis, latitude from the foot of the third, each 0 to 1. Cylinder:
-// `cylinder_uv`.
+// barycentric, of the second and third vertex. Plane: lengths along tangent and bitangent. Ellipsoid: longitude from
+// the first towards the second axis, latitude from the foot of the third, each 0 to 1. Cylinder: `cylinder_uv`.
 fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
     if is_centered(q.kind) {
         return vec2f(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
@@ -109,7 +106,7 @@ fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
     return local.xy;
 }
 
-// Returns the change of `primitive_uv` if the local point changes by d.
+// Returns the change of `primitive_uv` for the offset d.
 fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
     if is_centered(q.kind) {
         return d.xy * 0.5;
@@ -127,14 +124,13 @@ fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
     return d.xy;
 }
 
-// Derivatives of a point by u and by v.
+// Derivatives by u and by v.
 struct Tangents {
     u: vec3f,
     v: vec3f,
 }
 
-// Returns the tangents of a local point. At the poles of an ellipsoid, where u has no direction, that of the nearest
-// meridian is used.
+// Returns a local point's tangents, at the poles of an ellipsoid along the nearest meridian.
 fn local_tangents(q: Primitive, local: vec3f) -> Tangents {
     if q.kind == ELLIPSOID {
         let r = sqrt(max(local.x * local.x + local.y * local.y, 1e-12));

@@ -1,11 +1,11 @@
 // The material `principled`: the metallic-roughness model of glTF 2.0 with extensions (Khronos, "glTF 2.0
 // Specification", 2021, appendix B; KHR_materials_anisotropy, _clearcoat, _ior, _sheen, _specular, _transmission,
-// _volume). Clearcoat lies over sheen, and sheen over metal or a dielectric that is diffuse or transmissive. Metal and
-// the diffuse base are the same from both sides. A layer attenuates those below by its albedo towards the viewer, which
-// conserves energy. Transmission is that of `dielectric`: by the Fresnel equations, with multiple scattering. In the
-// local frame, z is the shading normal on the viewer's side, x the tangent.
+// _volume). Clearcoat lies over sheen, and sheen over metal or a dielectric, diffuse or transmissive. Metal and the
+// diffuse base are two-sided. A layer attenuates those below by its albedo towards the viewer, which conserves energy.
+// Transmission is that of `dielectric`. In the local frame, z is the shading normal on the viewer's side, x the
+// tangent.
 
-// The lobes of a material as seen from one direction.
+// The lobes as seen from one direction.
 struct PrincipledLobes {
     diffuse: vec3f,        // albedo of the diffuse base
     alpha: vec2f,          // of the specular lobe, along x and y
@@ -27,8 +27,8 @@ struct PrincipledLobes {
     lobe_probs: vec4f,     // probabilities of diffuse, specular, glass and coat; the rest is that of sheen
 }
 
-// Returns the lobes seen from wo, only those with a bit in `lobes`. `energy` has tabulated albedos: x and y are the
-// terms of `ggx_albedo` for anisotropic lobes, z is the single-scattering albedo of rough glass.
+// Returns the lobes seen from wo, only those with a bit in `lobes`. `energy` holds tabulated albedos: x and y as in
+// `ggx_albedo` for anisotropic lobes, z for rough glass.
 fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal: vec3f, lobes: u32, energy: vec3f) -> PrincipledLobes {
     var m = PrincipledLobes();
     let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);
@@ -81,8 +81,8 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
         // Turquin, "Practical multiple scattering compensation for microfacet models", 2019.
         compensation = max(1.0 / max(share.x + share.y, 1e-3) - lower_bound, 0.0);
         let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
-        // With the index of air nothing reflects at any angle: Lagarde and de Rousiers, "Moving Frostbite to Physically
-        // Based Rendering", SIGGRAPH 2014 course, section 3.
+        // With the index of air nothing reflects: Lagarde and de Rousiers, "Moving Frostbite to Physically Based
+        // Rendering", SIGGRAPH 2014 course, section 3.
         let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
         let inner_gain = vec3f(1.0) + inner_f0 * compensation;
         let metal_gain = (vec3f(1.0) + base * compensation) * (material.metallic * layer_throughput);
@@ -133,7 +133,7 @@ fn schlick(f0: vec3f, f90: vec3f, cosine: f32) -> vec3f {
     return f0 + (f90 - f0) * (x2 * x2 * x);
 }
 
-// Returns the reflectance of glass, or of both sides of a thin sheet, rescaled to `glass_f0` and `glass_f90`.
+// Returns the reflectance of glass, or of both sides of a thin sheet, scaled to `glass_f0` and `glass_f90`.
 fn glass_fresnel(m: PrincipledLobes, cosine: f32) -> vec3f {
     let c = min(max(cosine, 1e-6), 1.0);
     let behind = refracted_cosine(c, m.ratio);
@@ -144,12 +144,11 @@ fn glass_fresnel(m: PrincipledLobes, cosine: f32) -> vec3f {
     return select(bounded_color(vec3f(max(f.x, 0.0), max(f.y, 0.0), max(f.z, 0.0))), vec3f(1.0), behind == 0.0);
 }
 
-// Returns the probability that a microfacet of glass reflects.
 fn glass_probability(m: PrincipledLobes, cosine: f32) -> f32 {
     return min(luminance(glass_fresnel(m, cosine)), 1.0);
 }
 
-// Returns true if transmission is a delta: smooth, or without a change of the index.
+// Returns true for delta transmission: smooth, or without a change of the index.
 fn transmits_straight(m: PrincipledLobes) -> bool {
     return is_flat(m.alpha) | (!m.thin & (abs(m.eta - 1.0) < 1e-3));
 }
@@ -176,8 +175,7 @@ fn refracting_half(wo: vec3f, wi: vec3f, eta: f32) -> vec3f {
     return select(-unit, unit, unit.z > 0.0);
 }
 
-// Returns the Jacobian from transmitted directions to microfacet normals, equation 17 of that paper; 0 if no normal
-// refracts wi to wo.
+// Returns the Jacobian from transmitted directions to normals, equation 17 there; 0 if no normal refracts wi to wo.
 fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
     let o = dot(wo, half);
     let i = dot(wi, half);
@@ -186,7 +184,7 @@ fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
     return select(0.0, density, (o > 0.0) & (i < 0.0));
 }
 
-// Returns the BSDF times the cosine of wi, without delta lobes.
+// Returns the BSDF times the cosine of wi, without deltas.
 fn principled_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> vec3f {
     var value = m.diffuse * (max(wi.z, 0.0) * 0.31830988618379067);
     if (lobes & LOBE_SPECULAR) != 0u {
@@ -259,7 +257,6 @@ fn to_frame_around(n: vec3f, v: vec3f) -> vec3f {
     return vec3f(dot(frame.u, v), dot(frame.v, v), dot(n, v));
 }
 
-// Returns the PDF of `principled_sample`, per solid angle, without delta lobes.
 fn principled_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
     var pdf = m.lobe_probs.x * (max(wi.z, 0.0) * 0.31830988618379067);
     if (lobes & LOBE_SPECULAR) != 0u {
@@ -286,7 +283,7 @@ fn principled_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
     return pdf;
 }
 
-// Returns the PDF of a reflected direction from that of its microfacet normal.
+// Returns a reflected direction's PDF from that of its normal.
 fn mirrored_pdf(alpha: vec2f, wo: vec3f, half: vec3f) -> f32 {
     let cosine = dot(wo, half);
     return select(0.0, ggx_pdf(alpha, wo, half) / (4.0 * max(cosine, 1e-6)), cosine > 0.0);
@@ -378,7 +375,7 @@ fn sheen_lobe(alpha: f32, wo: vec3f, wi: vec3f) -> f32 {
     return d / (4.0 * max(wi.z + wo.z - wi.z * wo.z, 1e-4));
 }
 
-// Returns the directional albedo of sheen, above 1 at grazing angles for low roughness: a fit of its logarithm by the
+// Returns the directional albedo of sheen, above 1 at grazing angles for low roughness: its logarithm is fitted by the
 // square root of the cosine, within 2 % above quadrature.
 fn sheen_albedo(roughness: f32, cosine: f32) -> f32 {
     let r = roughness;

@@ -1,8 +1,8 @@
 // Checker and line textures, filtered analytically. They combine a pulse in u and one in v: 1 on a part `on` of each
-// period of 1, else 0. A wave is a pulse less its mean. Its integrals, and the mean of the product of both over a
+// period of 1, else 0. A wave is a pulse less its mean. Its integrals, and the mean of the product of two over a
 // parallelogram, have closed forms.
 
-// Returns the mean fraction of the second color over a footprint.
+// Returns the mean fraction of the second color.
 fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let checker = kind == CHECKER;
     let scale = select(1.0, 0.5, checker);
@@ -18,7 +18,7 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let t_max = vec2f(abs(long.x) + abs(short.x), abs(long.y) + abs(short.y));
     let at = vec2f(phase(f.uv.x * scale + shift), phase(f.uv.y * scale + shift));
 
-    // A footprint with at most one step is evaluated relative to it, which keeps the precision of small ones.
+    // With at most one step in the footprint, everything is relative to it, to keep the precision of small ones.
     let least = min(on, 1.0 - on);
     let near_x = t_max.x < least;
     let near_y = t_max.y < least;
@@ -29,7 +29,7 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let mean_x = select(select(on + wave.x, 0.5 + rise.x * wave.x, near_x), on, wide_x);
     let mean_y = select(select(on + wave.y, 0.5 + rise.y * wave.y, near_y), on, wide_y);
 
-    // If one pulse is constant, the mean of the product is the product of the means.
+    // With one pulse constant, the mean of the product is the product of the means.
     let apart = wide_x | wide_y | (near_x & (abs(offset.x) >= 0.5 * t_max.x)) | (near_y & (abs(offset.y) >= 0.5 * t_max.y));
     let crossed = max(min(abs(long.x), abs(long.y)), min(abs(short.x), abs(short.y)));
     var together = 0.0;
@@ -46,13 +46,12 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     return min(max(share, 0.0), 1.0);
 }
 
-// Returns the position in a period.
 fn phase(x: f32) -> f32 {
     let small = select(0.0, x, abs(x) < 8388608.0); // larger ones have no fraction
     return small - floor(small);
 }
 
-// Returns the shorter edge, moved off the line of the longer one: a footprint has an area, or is a point.
+// Returns the shorter edge, off the line of the longer one: a footprint has an area, or is a point.
 fn widened_edge(long: vec2f, short: vec2f) -> vec2f {
     let length = sqrt(long.x * long.x + long.y * long.y);
     let across = vec2f(-long.y, long.x) / max(length, 1e-30);
@@ -62,7 +61,7 @@ fn widened_edge(long: vec2f, short: vec2f) -> vec2f {
     return short + across * select(0.0, more, abs(width) < least);
 }
 
-// Returns the offset of x in [0, 1) from the nearest step of the pulse: 0, `on` or 1.
+// Returns the offset of x in [0, 1) from the nearest step: 0, `on` or 1.
 fn nearest_step(x: f32, on: f32) -> f32 {
     let outer = select(x - 1.0, x, x < 0.5);
     let inner = x - on;
@@ -74,7 +73,7 @@ fn wave_value(x: f32, on: f32, near: bool) -> f32 {
     return select(select(-on, 1.0 - on, x - floor(x) < on), select(1.0, -1.0, x < 0.0), near);
 }
 
-// Returns the integral of the wave, with mean 0 over a period.
+// Returns the integral of the wave, of mean 0.
 fn wave_integral(x: f32, on: f32, near: bool) -> f32 {
     let r = x - floor(x);
     return select(min(r * (1.0 - on), (1.0 - r) * on) - 0.5 * on * (1.0 - on), abs(x), near);
@@ -87,7 +86,7 @@ fn wave_integral_2(x: f32, on: f32, near: bool) -> f32 {
     return select(far, 0.5 * x * abs(x), near);
 }
 
-// Returns the mean of the wave along one axis over a footprint around x with the edges a and b.
+// Returns the mean of a wave over a footprint around x with the edges a and b.
 fn wave_mean(x: f32, a: f32, b: f32, on: f32, near: bool) -> f32 {
     let long = max(abs(a), abs(b));
     let short = min(abs(a), abs(b));
@@ -101,7 +100,7 @@ fn wave_mean(x: f32, a: f32, b: f32, on: f32, near: bool) -> f32 {
 }
 
 // Returns the integral of the product of both waves over the footprint around `at` with the edges a and b: by Green's
-// theorem, that of W(x) w(y) dy along its boundary, where W is the integral of the wave w.
+// theorem, that of W(x) w(y) dy along its boundary, with W the integral of the wave w.
 fn around_footprint(at: vec2f, a: vec2f, b: vec2f, on: f32, near: bool) -> f32 {
     let half = (a + b) * 0.5;
     let other = (a - b) * 0.5;
@@ -117,7 +116,7 @@ fn around_footprint(at: vec2f, a: vec2f, b: vec2f, on: f32, near: bool) -> f32 {
 
 // Returns the integral of W(x) w(y) dy along an edge: if flat, the slope times that of W(x) w(y) dx by parts, from the
 // second integral at the ends and at the steps of w(y). If steep, x and y are swapped: the integrals of W(x) w(y) dy
-// and W(y) w(x) dx sum to the difference of W(x) W(y) at the ends.
+// and W(y) w(x) dx add up to the difference of W(x) W(y) at the ends.
 fn along_edge(tail: vec2f, head: vec2f, on: f32, near: bool) -> f32 {
     let steep = abs(head.x - tail.x) < abs(head.y - tail.y);
     let start = select(tail, tail.yx, steep);
@@ -148,8 +147,8 @@ fn along_edge(tail: vec2f, head: vec2f, on: f32, near: bool) -> f32 {
     return select(along, corners - along, steep);
 }
 
-// Returns the mean of the product of both waves over a footprint of many periods: the terms of the Fourier series that
-// vary least along the longer edge, since the others average to almost 0.
+// Returns the mean of the product over many periods: the Fourier terms that vary least along the longer edge, as the
+// others average to almost 0.
 fn far_product(at: vec2f, long: vec2f, short: vec2f, on: f32) -> f32 {
     let flat = abs(long.x) > abs(long.y);
     let a = select(long, long.yx, flat);
@@ -174,11 +173,11 @@ fn sine_ratio(x: f32) -> f32 {
     return select(sine(x) / (3.1415927 * x), 1.0, abs(x) < 0.001);
 }
 
-// Terms of the Fourier series.
+// Fourier terms.
 const MAX_HARMONICS: f32 = 8.0;
-// Maximum periods of an edge along both axes without that series, which bounds the work.
+// Maximum periods of an edge along both axes without Fourier series, to bound the work.
 const MAX_PERIODS: f32 = 32.0;
-// Minimum width of a footprint, relative to its length or a period.
+// Minimum width relative to the length or a period.
 const THINNEST: f32 = 0.001;
-// Extent along an axis beyond which the mean is that of the whole pattern.
+// Extent along an axis from which on the mean is that of the pattern.
 const WIDEST: f32 = 4096.0;

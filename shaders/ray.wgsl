@@ -6,7 +6,7 @@ struct Ray {
     direction: vec3f,      // unit length
 }
 
-// The nearest hit so far; INFINITE_T and NO_INDEX for a miss.
+// The nearest hit; INFINITE_T and NO_INDEX for a miss.
 struct Hit {
     t: f32,
     instance: u32,         // 0 for a standalone primitive, else 1 + index of the mesh instance
@@ -19,7 +19,7 @@ fn no_hit() -> Hit {
     return Hit(INFINITE_T, 0u, NO_INDEX, 0u, vec2f(0.0));
 }
 
-// Returns the index of a standalone primitive from instance and primitive; NO_INDEX for a mesh triangle.
+// Returns a standalone primitive's index; NO_INDEX for a mesh triangle.
 fn standalone_prim(prim_id: vec2u) -> u32 {
     return select(NO_INDEX, prim_id.y, prim_id.x == 0u);
 }
@@ -32,19 +32,19 @@ fn vector_to_local(q: Primitive, v: vec3f) -> vec3f {
     return vec3f(dot(q.x, v), dot(q.y, v), dot(q.z, v));
 }
 
-// Transforms a local vector to world space: the columns of the linear map are the cross products of the rows of its
-// inverse, over the determinant.
+// Transforms a local vector to world space: columns of the linear map are cross products of the rows of its inverse,
+// over the determinant.
 fn vector_to_world(q: Primitive, v: vec3f) -> vec3f {
     let sum = cross(q.y, q.z) * v.x + cross(q.z, q.x) * v.y + cross(q.x, q.y) * v.z;
     return sum / q.determinant;
 }
 
-// Returns the t of the plane z = 0 of a flat primitive; not finite for parallel rays.
+// Returns the t of the plane z = 0; not finite for parallel rays.
 fn plane_distance(q: Primitive, ray: Ray) -> f32 {
     return dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction);
 }
 
-// Returns true if the local segment o + s d, s in (0, t_max), crosses the plane z = 0.
+// Returns true if the segment o + s d, s in (0, t_max), crosses z = 0.
 fn crosses_plane(o: vec3f, d: vec3f, t_max: f32) -> bool {
     return (o.z * d.z < 0.0) & (abs(o.z) < t_max * abs(d.z));
 }
@@ -56,14 +56,13 @@ fn scaled_crossing(o: vec3f, d: vec3f) -> vec2f {
     return vec2f(o.x * a + s * d.x, o.y * a + s * d.y);
 }
 
-// Returns the nearer of `hit` and the hit at t on standalone primitive i, unless i is `origin_prim`.
+// Returns the nearer of `hit` and the hit at t on primitive i, unless i is `origin_prim`.
 fn closer(hit: Hit, t: f32, i: u32, origin_prim: u32) -> Hit {
     let nearer = (t < hit.t) & (i != origin_prim);
     return Hit(select(hit.t, t, nearer), hit.instance, select(hit.primitive, i, nearer), hit.slot, hit.barycentric);
 }
 
-// Returns the nearer of two hits, in ties that of the lower instance, then primitive. If b.t is INFINITE_T, b is a
-// miss.
+// Returns the nearer hit, in ties that of the lower instance, then primitive. If b.t is INFINITE_T, b is a miss.
 fn nearer_hit(a: Hit, b: Hit) -> Hit {
     let lower = (b.instance < a.instance) | ((b.instance == a.instance) & (b.primitive < a.primitive));
     let nearer = (b.t < INFINITE_T) & ((b.t < a.t) | ((b.t == a.t) & lower));

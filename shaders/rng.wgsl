@@ -1,4 +1,4 @@
-// Counter-based random numbers: without state, so that they do not depend on the order of execution.
+// Counter-based random numbers, independent of the order of execution.
 
 // Returns the hash pcg4d: Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
 fn hash4(key: vec4u) -> vec4u {

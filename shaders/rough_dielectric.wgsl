@@ -2,7 +2,7 @@
 // Surfaces", EGSR 2007, with GGX microfacets. `ior` is the index behind the surface relative to the viewer's side;
 // radiance scales with its square.
 
-// Returns the factor of the multiple-scattering compensation, the same for reflection and transmission.
+// Returns the multiple-scattering compensation of reflection and transmission.
 fn dielectric_gain(material: Material) -> f32 {
     return 1.0 + material.loss;
 }
@@ -48,7 +48,7 @@ fn rough_dielectric_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
     return select(0.0, select(select(0.0, bent, passes), mirrored, above), wo.z > 0.0);
 }
 
-// Samples reflection or refraction, as selected by `random` in [0, 1).
+// Samples reflection or refraction, by `random` in [0, 1).
 fn rough_dielectric_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
     let alpha = facet_alpha(material);
     let eta = 1.0 / material.ior;

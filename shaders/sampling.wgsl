@@ -1,7 +1,7 @@
 // Sample patterns on the unit square.
 
-// Returns point `index` of the set `group`. The sets of a pixel, or of a light for its samples, are numbered in order
-// of use. `side` is the side of a grid, else the size of a set. `key` differs by pixel, light and seed.
+// Returns point `index` of the set `group`. The sets of a pixel, or of a light, are numbered in order of use. `side` is
+// the side of a grid, else the size of a set. `key` differs by pixel, light and seed.
 fn sample_square(pattern: u32, side: u32, index: u32, group: u32, key: vec2u) -> vec2f {
     if pattern == GRID {
         return grid_sample(side, index);
@@ -21,13 +21,13 @@ fn sample_square(pattern: u32, side: u32, index: u32, group: u32, key: vec2u) ->
     return random_sample(index, group, key);
 }
 
-// Returns a cell center of a regular grid, row by row.
+// Returns a cell center, row by row.
 fn grid_sample(side: u32, index: u32) -> vec2f {
     let cell = 1.0 / f32(side);
     return vec2f((f32(index % side) + 0.5) * cell, (f32(index / side) + 0.5) * cell);
 }
 
-// Returns a cell center of a regular grid rotated by atan(1/2) around the center of the square, wrapped.
+// Returns a cell center of a grid rotated by atan(1/2) around the square's center, wrapped.
 fn rotated_grid_sample(side: u32, index: u32) -> vec2f {
     let p = grid_sample(side, index) - 0.5;
     let x = 0.8944272 * p.x - 0.4472136 * p.y;
@@ -40,8 +40,8 @@ fn wrap(x: f32) -> f32 {
     return select(above, above - 1.0, above >= 1.0);
 }
 
-// Returns a uniform position in a cell of a regular grid, row by row. The integer division cannot round a position into
-// the next cell. `side` is at most 256.
+// Returns a uniform position in a cell, row by row. The integer division cannot round it into the next cell. `side` is
+// at most 256.
 fn jittered_sample(side: u32, index: u32, group: u32, key: vec2u) -> vec2f {
     let bits = hash4(vec4u(key.x, key.y, group, index));
     let x = (((index % side) << 24u) | (bits.x >> 8u)) / side;
@@ -54,13 +54,13 @@ fn random_sample(index: u32, group: u32, key: vec2u) -> vec2f {
     return vec2f(unit_float(bits.x), unit_float(bits.y));
 }
 
-// Returns the key of a purpose: 0 is the area of the pixel, 1 + n light n, NO_INDEX the choice of branches.
+// Returns the key of a purpose: 0 is the pixel's area, 1 + n light n, NO_INDEX the choice of branches.
 fn sample_key(pixel: vec2u, seed: u32, purpose: u32) -> vec2u {
     let bits = hash4(vec4u(pixel.x, pixel.y, seed, purpose));
     return bits.xy;
 }
 
-// Returns four random numbers for a decision of a path, unique if no two of a purpose have the same `bounce`.
+// Returns four random numbers for a decision, unique if no two of a purpose have the same `bounce`.
 fn decision_bits(pixel: vec2u, seed: u32, sample: u32, bounce: u32, purpose: u32) -> vec4u {
     let key = sample_key(pixel, seed, purpose);
     return hash4(vec4u(key.x, key.y, sample, bounce));

@@ -1,5 +1,4 @@
-// Scattering at a surface for all material kinds: effective material, BSDF evaluation and sampling, allowed directions,
-// and the medium behind.
+// Scattering at a surface for all material kinds.
 
 struct Reflection {
     value: vec3f,          // BSDF times the cosine of wi; 0 if wi is not allowed
@@ -26,7 +25,6 @@ fn plain_reflection(surface: Surface, material: Material, wi: vec3f) -> Reflecti
     return result;
 }
 
-// Evaluates any material, within the allowed directions.
 fn reflection(prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, wi: vec3f) -> Reflection {
     var result = plain_reflection(surface, material, wi);
     if (MATERIALS & MICROFACET_KINDS) != 0u {
@@ -47,7 +45,7 @@ fn reflection(prim: HitPrimitive, surface: Surface, material: Material, mixture:
     return result;
 }
 
-// Clamps a textured or vertex-colored material so that it creates no energy.
+// Clamps textured or vertex-colored materials so that they create no energy.
 fn bounded(found: Material) -> Material {
     var material = found;
     if (LOOKUPS != 0u) | (VERTEX_COLORS != 0u) {
@@ -70,7 +68,7 @@ fn bounded(found: Material) -> Material {
     return material;
 }
 
-// Returns `normal`, from a normal map, if the material can use it, else another one of the surface.
+// Returns `normal`, from a normal map, if the material can use it, else another normal.
 fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
     if is_delta(material) {
         let usable = usable_normal(surface, normal);
@@ -99,13 +97,12 @@ fn albedo(material: Material) -> vec3f {
     return select(vec3f(0.0), material.diffuse, (material.kind == DIFFUSE) | (material.kind == PRINCIPLED));
 }
 
-// Returns true if the material encloses a medium.
 fn has_inside(material: Material) -> bool {
     let is_volume = (material.kind == PRINCIPLED) & (material.thin == 0u) & (material.transmission > 0.0);
     return (material.kind == GLASS) | (material.kind == ROUGH_GLASS) | is_volume;
 }
 
-// Returns true if the material only reflects and refracts specularly here.
+// Returns true if scattering here is only specular.
 fn is_delta(material: Material) -> bool {
     if (DELTA_KINDS & MICROFACET_KINDS) != 0u {
         return is_specular(material) | (has_facets(material) & is_polished(material));
@@ -125,8 +122,8 @@ fn facet_frame(surface: Surface, material: Material) -> Tangents {
     return frame_around(surface.shading_normal);
 }
 
-// Returns a microfacet material as seen by the viewer, in the frame of du and dv: the index behind the surface relative
-// to that before it, and the energy lost to multiple scattering.
+// Returns a microfacet material as seen by the viewer, in the frame of du and dv: the relative index behind the
+// surface, and the loss by multiple scattering.
 fn facets_of(surface: Surface, found: Material) -> Material {
     var material = found;
     let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
@@ -151,7 +148,7 @@ fn facets_of(surface: Surface, found: Material) -> Material {
     return material;
 }
 
-// Evaluates a microfacet material in its frame.
+// Evaluates microfacets in their frame.
 fn facet_reflection(material: Material, wo: vec3f, wi: vec3f) -> Reflection {
     var result = Reflection(vec3f(0.0), 0.0);
     if (MATERIALS & (1u << METAL)) != 0u {
@@ -172,7 +169,7 @@ fn facet_reflection(material: Material, wo: vec3f, wi: vec3f) -> Reflection {
     return result;
 }
 
-// Samples a microfacet material in its frame.
+// Samples microfacets in their frame.
 fn facet_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
     var result = LobeSample(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 0.0, 1.0);
     if (MATERIALS & (1u << METAL)) != 0u {
@@ -193,7 +190,7 @@ fn facet_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSam
     return result;
 }
 
-// Returns wo in the frame of the lobe, never below the surface.
+// Returns wo in the lobe's frame, never below the surface.
 fn local_wo(surface: Surface) -> vec3f {
     let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
     return vec3f(wo.x, wo.y, max(wo.z, 1e-6));
@@ -209,7 +206,7 @@ fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Princ
     return principled_mixture(material, wo, surface.side > 0.0, coat, LOBES, energy);
 }
 
-// Returns true if light may arrive from wi; false if shading and geometric normal disagree about its side.
+// Returns false if shading and geometric normal disagree about the side of wi.
 fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, wi: vec3f) -> bool {
     var lit = is_lit(surface, wi);
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
@@ -222,7 +219,7 @@ fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, w
     return lit;
 }
 
-// Returns true if the material transmits light other than by a delta.
+// Returns true for transmission other than by a delta.
 fn is_transmissive(material: Material) -> bool {
     var passes = ((TRANSMISSIVE_KINDS >> material.kind) & 1u) != 0u;
     if (LOBES & LOBE_TRANSMISSION) != 0u {

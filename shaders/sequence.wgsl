@@ -1,7 +1,7 @@
 // Low-discrepancy sequences on the unit square, randomized by integer hashing.
 
 // Returns point `index` of the Sobol' (0,2)-sequence, Owen-scrambled by hashing: Burley, "Practical Hash-based Owen
-// Scrambling", JCGT 9(4), 2020. Keys are independent, since the order is scrambled too.
+// Scrambling", JCGT 9(4), 2020. As the order is scrambled too, keys are independent.
 fn sobol_sample(index: u32, key: vec2u) -> vec2f {
     let bits = sobol_bits(index, key);
     return vec2f(unit_float(bits.x), unit_float(bits.y));
@@ -13,9 +13,9 @@ fn sobol_bits(index: u32, key: vec2u) -> vec2u {
     return vec2u(reverseBits(scramble(i, key.x)), reverseBits(scramble(sobol_reversed(i), key.y)));
 }
 
-// Returns the second coordinate of Sobol' point i as 32 bits, the first digit lowest; i is the first coordinate. Digit
-// j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2 in five factors (Ahmed, "An
-// Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR 2024).
+// Returns the second coordinate of Sobol' point i as 32 bits, the first digit lowest; i is the first one. Digit j is
+// the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2 in five factors (Ahmed, "An Implementation
+// Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR 2024).
 fn sobol_reversed(i: u32) -> u32 {
     var x = i;
     x ^= (x >> 1u) & 0x55555555u;
@@ -25,8 +25,8 @@ fn sobol_reversed(i: u32) -> u32 {
     return x ^ (x >> 16u);
 }
 
-// Changes every bit by the lower ones, which is Owen scrambling of reversed digits: the permutation of Laine and
-// Karras, "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of Burley 2020, listing 2.
+// Changes every bit by the lower ones, which Owen-scrambles reversed digits: the permutation of Laine and Karras,
+// "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of Burley 2020, listing 2.
 fn scramble(digits: u32, seed: u32) -> u32 {
     var x = digits + seed;
     x ^= x * 0x6c50b47cu;
@@ -41,7 +41,7 @@ fn shuffled_index(index: u32, seed: u32) -> u32 {
     return reverseBits(scramble(reverseBits(index), seed));
 }
 
-// Returns point `index` of the Halton sequence in bases 2 and 3, in scrambled order and rotated on the torus (Cranley
+// Returns point `index` of the Halton sequence in bases 2 and 3, scrambled in order and rotated on the torus (Cranley
 // and Patterson, "Randomization of Number Theoretic Methods for Multiple Integration", 1976).
 fn halton_sample(index: u32, key: vec2u) -> vec2f {
     let i = shuffled_index(index, key.x ^ key.y);
@@ -50,7 +50,7 @@ fn halton_sample(index: u32, key: vec2u) -> vec2f {
     return vec2f(unit_float(x), f32(y) * 6.969171550963438e-8);
 }
 
-// Returns the lowest 15 base-3 digits of i in reverse order, as an integer below 3^15.
+// Returns the lowest 15 base-3 digits of i, reversed, below 3^15.
 fn radical_inverse_3(i: u32) -> u32 {
     var rest = i;
     var reversed = 0u;

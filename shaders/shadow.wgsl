@@ -1,5 +1,5 @@
 // Shadow rays from a point to a block of at most 32 samples of a light. Terms of primitive, point and light are
-// computed once per block, and the loop loads no primitive.
+// computed once, and the loop loads no primitive.
 
 struct SampleBlock {
     pattern: u32,
@@ -10,8 +10,8 @@ struct SampleBlock {
     key: vec2u,
 }
 
-// Returns the mask of the samples of a block that the primitive occludes from p. `kind` is a compile-time constant.
-// With `inside_prim` p is on a solid seen from inside (`solid_levels`).
+// Returns the mask of samples that the primitive occludes from p. `kind` is a compile-time constant. With `inside_prim`
+// p is on a solid seen from inside (`solid_levels`).
 fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, light: Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
@@ -25,7 +25,7 @@ fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, light: L
     return bits;
 }
 
-// Returns true if the primitive occludes the segment p + s to, s in (0, t_max).
+// Returns true if the primitive occludes p + s to, s in (0, t_max).
 fn occludes_segment(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, to: vec3f, t_max: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let levels = solid_levels(kind, q, from_anchor, inside_prim);
@@ -36,7 +36,7 @@ fn block_sample(block: SampleBlock, i: u32) -> vec2f {
     return sample_square(block.pattern, block.side, block.first + i, block.group, block.key);
 }
 
-// The frustum of shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
+// The shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
 struct ShadowFrustum {
     apex: vec3f,
     to: LightSegments,
@@ -53,7 +53,7 @@ fn light_frustum(light: Light, p: vec3f) -> ShadowFrustum {
 
 // Returns false if a plane through the apex separates the sphere from the frustum. Its normal is n = m - towards slope,
 // where m is the part of the vector to the sphere's center perpendicular to `towards`, and `slope` the least that keeps
-// all rays of the frustum below the plane.
+// all rays below the plane.
 fn may_block(sphere: Sphere, frustum: ShadowFrustum) -> bool {
     let w = sphere.center - frustum.apex;
     let along = dot(w, frustum.to.towards);

@@ -1,10 +1,10 @@
-// Intersection of rays with boxes, in the interval that the three slabs have in common: Kay and Kajiya, "Ray Tracing
-// Complex Scenes", SIGGRAPH 1986. Boxes are enlarged by `pad` on all sides.
+// Intersection of rays with boxes, in the common interval of three slabs: Kay and Kajiya, "Ray Tracing Complex Scenes",
+// SIGGRAPH 1986. Boxes are enlarged by `pad`.
 //
 // Every step is monotone in 32-bit floats: of two nested boxes, the outer one is entered no later and left no earlier.
 // A BVH thus misses nothing whose box a ray hits (docs/decisions/trees.md).
 
-// The terms of a ray for box tests, with origins for lower and upper sides.
+// A ray's terms for box tests, with origins for lower and upper sides.
 struct Slabs {
     low_origin: vec3f,
     high_origin: vec3f,
@@ -16,13 +16,13 @@ fn slabs(origin: vec3f, direction: vec3f, pad: f32) -> Slabs {
     return Slabs(origin + pad, origin - pad, inverse);
 }
 
-// Returns 1 / x, with |x| at least 2^-100 so that it is finite.
+// Returns 1 / x, finite: |x| is at least 2^-100.
 fn inverse_of(x: f32) -> f32 {
     let least = select(7.888609e-31, -7.888609e-31, x < 0.0);
     return 1.0 / select(least, x, abs(x) >= 7.888609e-31);
 }
 
-// Returns the t where the ray enters the box, x, and leaves it, y; it misses if x > y.
+// Returns the t of entry, x, and exit, y; a miss if x > y.
 fn box_interval(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
     let a = (low - s.low_origin) * s.inverse;
     let b = (high - s.high_origin) * s.inverse;
@@ -31,12 +31,12 @@ fn box_interval(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
     return vec2f(near, far);
 }
 
-// Returns true if the interval is not empty and overlaps [0, limit].
+// Returns true for a nonempty interval that overlaps [0, limit].
 fn interval_hits(interval: vec2f, limit: f32) -> bool {
     return (interval.x <= interval.y) & (interval.y >= 0.0) & (interval.x <= limit);
 }
 
-// All rays from one point with directions in a box. Box tests are conservative: they hit what any of the rays hits.
+// All rays from a point with directions in a box. Box tests hit what any of them hits.
 struct RayInterval {
     low_origin: vec3f,
     high_origin: vec3f,
@@ -56,7 +56,7 @@ fn ray_interval(origin: vec3f, least: vec3f, most: vec3f, pad: f32) -> RayInterv
                select(zero, of_most, down), select(zero, of_least, up));
 }
 
-// Returns the t where any of the rays may enter the box, x, and leave it, y.
+// Returns the t where any ray may enter, x, and leave, y.
 fn ray_interval_box(low: vec3f, high: vec3f, f: RayInterval) -> vec2f {
     let a = low - f.low_origin;
     let b = high - f.high_origin;

@@ -20,9 +20,9 @@ fn largest(v: vec3f) -> f32 {
     return max(max(abs(v.x), abs(v.y)), abs(v.z));
 }
 
-// Returns the surface where a ray hits primitive i, which is q, without texture coordinates. A Newton step moves the
-// point back onto the primitive, up to the rounding of its coordinates and of its offset from the anchor. Rays start
-// above it by `epsilon` times the largest of these.
+// Returns the surface where a ray hits primitive i, q, without texture coordinates. A Newton step moves the point back
+// onto it, up to the rounding of its coordinates and of its offset from the anchor. Rays start above it by `epsilon`
+// times the largest of these.
 fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let point = ray.origin + ray.direction * t;
     let offset = point - q.anchor;
@@ -44,7 +44,7 @@ fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
                    vec3f(0.0), vec3f(0.0));
 }
 
-// Returns a surface of the primitive q with texture coordinates and tangents.
+// Adds texture coordinates and tangents on q.
 fn with_coordinates(surface: Surface, q: Primitive) -> Surface {
     let local = point_to_local(q, surface.position);
     let tangents = local_tangents(q, local);

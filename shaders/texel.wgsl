@@ -1,6 +1,6 @@
-// Texels of images: wrapping of coordinates, formats, filter weights.
+// Texels: wrapping, formats, filter weights.
 
-// Returns an equivalent coordinate near the image: 0 to 1, mirrored 0 to 2, clamped -8 to 9.
+// Returns an equivalent coordinate: 0 to 1, mirrored 0 to 2, clamped -8 to 9.
 fn near_coordinate(u: f32, wrap: u32) -> f32 {
     let small = select(0.0, u, abs(u) < 8388608.0); // larger ones have no fraction
     let repeated = small - floor(small);
@@ -9,7 +9,7 @@ fn near_coordinate(u: f32, wrap: u32) -> f32 {
     return select(select(repeated, clamped, wrap == CLAMP), mirrored, wrap == MIRRORED);
 }
 
-// Returns the column or row for i in a level with `size` of them.
+// Returns the column or row for i among `size`.
 fn wrapped_index(i: i32, size: u32, wrap: u32) -> u32 {
     let n = i32(size);
     if wrap == CLAMP {
@@ -42,8 +42,8 @@ fn srgb_to_linear(x: f32) -> f32 {
     return select(power((x + 0.055) / 1.055, 2.4), x / 12.92, x <= 0.04045);
 }
 
-// Returns the weight at the squared radius r2 of an ellipse, 1 at its edge: a Gaussian less its value at the edge, with
-// alpha 2 as in pbrt. Heckbert, "Fundamentals of Texture Mapping and Image Warping", 1989, section 3.5.8.
+// Returns the weight at the squared radius r2, 1 at the ellipse's edge: a Gaussian less its value there, with alpha 2
+// as in pbrt. Heckbert, "Fundamentals of Texture Mapping and Image Warping", 1989, section 3.5.8.
 fn gaussian_weight(r2: f32) -> f32 {
     return exp2(r2 * -2.8853900817779268) - 0.1353352832366127;
 }

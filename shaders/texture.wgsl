@@ -1,4 +1,4 @@
-// Texture lookups and filters, and their application to materials.
+// Texture lookups and filters.
 
 fn texture_color(t: Texture, surface: Footprint) -> vec3f {
     let f = texture_footprint(t, surface);
@@ -26,7 +26,7 @@ fn texture_color(t: Texture, surface: Footprint) -> vec3f {
     return t.first + (t.second - t.first) * x;
 }
 
-// A level of an image pyramid.
+// An image pyramid's level.
 struct Level {
     start: u32,            // of its texels
     width: u32,
@@ -61,15 +61,15 @@ fn nearest_color(t: Texture, uv: vec2f) -> vec3f {
     return load_texel(t, level, i32(x), i32(y));
 }
 
-// Returns the level, with a fraction, at which `length`, in texels of the finest level, is 1 to 2 texels.
+// Returns the level, with a fraction, where `length`, in texels of the finest one, is 1 to 2 texels.
 fn level_of_length(t: Texture, length: f32) -> f32 {
     let coarsest = f32(t.levels - 1u);
     let level = max(log2(max(length, 1.0)), 0.0);
     return select(coarsest, level, (length < 1e9) & (level < coarsest));
 }
 
-// Interpolates the finest level bilinearly; TRILINEAR: the two levels whose texels match the longer edge of the
-// footprint, as in graphics hardware: Williams, "Pyramidal Parametrics", SIGGRAPH 1983.
+// Interpolates the finest level bilinearly; TRILINEAR: the two levels whose texels match the footprint's longer edge:
+// Williams, "Pyramidal Parametrics", SIGGRAPH 1983.
 fn linear_color(t: Texture, f: Footprint) -> vec3f {
     let size = vec2f(f32(t.width), f32(t.height));
     let dx = f.dx * size;
@@ -122,10 +122,10 @@ fn ewa_color(t: Texture, f: Footprint) -> vec3f {
 }
 
 // Returns the mean of a level over the ellipse, resized so that the whole filter has the variance that it has on the
-// finest level. In units in which a half axis r has the variance r^2, that is M + I, where I is the reconstruction
-// filter. Texels of a level are means over a box of variance 1/3, less that of the finest texels: (1 - q) / 3, where q
-// is the squared size of a finest texel; I becomes q I. Half axes stay above 1, so that every ellipse contains a texel.
-// The mean is taken of differences to one texel, which keeps constants exact.
+// finest level: M + I, where a half axis r has the variance r^2 and I is the reconstruction filter. Texels are means
+// over a box of variance 1/3, less that of the finest texels: (1 - q) / 3, where q is the squared size of a finest
+// texel; I becomes q I. Half axes stay above 1, so that every ellipse contains a texel. Differences to one texel are
+// averaged, to keep constants exact.
 fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) -> vec3f {
     let size = vec2f(f32(level.width), f32(level.height));
     let q = size / vec2f(f32(t.width), f32(t.height));
@@ -163,13 +163,13 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
     return base + sum * select(0.0, 1.0 / total, total > 0.0);
 }
 
-// Returns the channel of a color that a scalar parameter uses.
+// Returns the channel of a scalar parameter.
 fn channel_of(color: vec3f, lookup: Lookup, slot: u32) -> f32 {
     let channel = (lookup.channels >> (2u * slot)) & 3u;
     return select(select(color.x, color.y, channel == 1u), color.z, channel == 2u);
 }
 
-// Sets the parameters that only principled materials have from the color of a lookup.
+// Sets the parameters of principled materials only.
 fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     var m = before;
     let purposes = lookup.purposes;
@@ -190,14 +190,14 @@ fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     return m;
 }
 
-// A material and its shading normals, with textures applied.
+// A textured material and its shading normals.
 struct EvaluatedMaterial {
     material: Material,
     normal: vec3f,
     coat_normal: vec3f,    // of the clearcoat
 }
 
-// Applies textures; `lookups` is the maximum number for the material.
+// Applies at most `lookups` textures.
 fn evaluate_material(prim: HitPrimitive, hit: Hit, material: Material, surface: Surface, at: HitDifferential, lookups: u32) -> EvaluatedMaterial {
     var shading = EvaluatedMaterial(material, surface.shading_normal, surface.shading_normal);
     if lookups == 0u {

@@ -1,8 +1,7 @@
-// The material `dielectric` as a thin sheet, which transmits light without a change of direction. Interreflection
-// between its two sides adds up to the reflectance 2 R / (1 + R): Stam, "An Illumination Model for a Skin Layer Bounded
-// by Rough Surfaces", EGRW 2001, has the series. Roughness spreads transmitted light like reflected light.
+// The material `dielectric` as a thin sheet, which does not change the direction of transmitted light. Interreflection
+// between its sides adds up to the reflectance 2 R / (1 + R): Stam, "An Illumination Model for a Skin Layer Bounded by
+// Rough Surfaces", EGRW 2001, has the series. Roughness spreads transmitted light like reflected light.
 
-// Returns the reflectance of a sheet.
 fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     let c = min(max(cosine, 1e-6), 1.0);
     let eta = 1.0 / ior;
@@ -10,7 +9,7 @@ fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     return 2.0 * once / (1.0 + once);
 }
 
-// Mirrors a direction to the viewer's side if it is behind the sheet.
+// Mirrors a direction behind the sheet to the viewer's side.
 fn to_upper_side(wi: vec3f) -> vec3f {
     return vec3f(wi.x, wi.y, abs(wi.z));
 }
@@ -32,7 +31,7 @@ fn thin_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
     return select(0.0, share * facet_pdf(facet_alpha(material), wo, up), (wo.z > 0.0) & (up.z > 0.0));
 }
 
-// Samples a direction: reflected or transmitted, chosen by `random` in [0, 1).
+// Samples reflection or transmission, by `random` in [0, 1).
 fn thin_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
     let alpha = facet_alpha(material);
     let m = ggx_sample(alpha, wo, u);

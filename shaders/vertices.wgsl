@@ -1,6 +1,6 @@
-// Optional vertex attributes of meshes: colors, and further sets of texture coordinates.
+// Optional vertex attributes: colors, and further texture coordinates.
 
-// Returns the interpolated vertex color of a hit; white without vertex colors.
+// Returns the interpolated vertex color; white without.
 fn vertex_color(hit: Hit) -> vec4f {
     if is_on_mesh(hit) {
         let i = load_instance(hit.instance - 1u);
@@ -15,7 +15,7 @@ fn vertex_color(hit: Hit) -> vec4f {
     return vec4f(1.0);
 }
 
-// Applies vertex colors to a material, as its `vertex_colors` specifies.
+// Applies vertex colors as `vertex_colors` specifies.
 fn with_vertex_colors(before: Material, hit: Hit) -> Material {
     var material = before;
     if material.vertex_colors != NO_COLORS {
@@ -28,14 +28,14 @@ fn with_vertex_colors(before: Material, hit: Hit) -> Material {
     return material;
 }
 
-// Loads the texture coordinates of a vertex from a further set, which must exist.
+// Loads a vertex's further texture coordinates, which must exist.
 fn load_further_uv(i: Instance, vertex: u32, uv_set: u32) -> vec2f {
     let rows = (i.uv_sets + 1u) / 2u;
     let row = bitcast<vec4f>(meshes[i.more_uvs + rows * vertex + (uv_set - 1u) / 2u]);
     return select(row.zw, row.xy, (uv_set & 1u) == 1u);
 }
 
-// Returns the hit primitive with a set of texture coordinates in place of the first; 0 if the mesh does not have it.
+// Returns the hit primitive with a set of texture coordinates in place of the first; 0 if missing.
 fn hit_primitive_in_uv_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
     var face = prim;
     if is_on_mesh(hit) {
@@ -53,7 +53,7 @@ fn hit_primitive_in_uv_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrim
     return face;
 }
 
-// Returns texture coordinates in a set; `first` are those of set 0.
+// Returns texture coordinates in a set; `first` is set 0.
 fn uv_in_set(first: vec2f, prim: HitPrimitive, hit: Hit, uv_set: u32) -> vec2f {
     if UV_SETS == 0u {
         return first;
@@ -64,7 +64,6 @@ fn uv_in_set(first: vec2f, prim: HitPrimitive, hit: Hit, uv_set: u32) -> vec2f {
     return face_uv(hit_primitive_in_uv_set(prim, hit, uv_set), hit.barycentric);
 }
 
-// Returns the footprint in a set; `first` is that in set 0.
 fn footprint_in_set(first: Footprint, prim: HitPrimitive, hit: Hit, at: HitDifferential, uv_set: u32) -> Footprint {
     if UV_SETS == 0u {
         return first;

@@ -1,7 +1,7 @@
 // Mappings from the unit square to points and directions.
 
 // Samples the unit disk uniformly: Shirley and Chiu, "A Low Distortion Map between Disk and Square", Journal of
-// Graphics Tools 2(3), 1997. Sine and cosine of angles up to pi / 4 by their Taylor series, within 3 / 10^8.
+// Graphics Tools 2(3), 1997. Taylor series of angles up to pi / 4, within 3 / 10^8.
 fn disk_sample(u: vec2f) -> vec2f {
     let a = 2.0 * u.x - 1.0;
     let b = 2.0 * u.y - 1.0;
@@ -16,8 +16,8 @@ fn disk_sample(u: vec2f) -> vec2f {
     return select(vec2f(y, x), vec2f(x, y), wide) * r;
 }
 
-// Samples a triangle uniformly. Returns the barycentric coordinates of its second and third vertex: Heitz, "A
-// Low-Distortion Map Between Triangle and Square", 2019.
+// Samples a triangle uniformly, as barycentric coordinates of its second and third vertex: Heitz, "A Low-Distortion Map
+// Between Triangle and Square", 2019.
 fn triangle_sample(u: vec2f) -> vec2f {
     let upper = u.y > u.x;
     let x = select(u.x - 0.5 * u.y, 0.5 * u.x, upper);
@@ -25,8 +25,8 @@ fn triangle_sample(u: vec2f) -> vec2f {
     return vec2f(x, y);
 }
 
-// Returns two unit vectors that form a right-handed basis with the unit vector n: Duff et al., "Building an Orthonormal
-// Basis, Revisited", JCGT 6(1), 2017.
+// Returns two unit vectors that complete a right-handed basis with n: Duff et al., "Building an Orthonormal Basis,
+// Revisited", JCGT 6(1), 2017.
 fn frame_around(n: vec3f) -> Tangents {
     let sign = select(-1.0, 1.0, n.z >= 0.0);
     let a = -1.0 / (sign + n.z);
@@ -34,21 +34,21 @@ fn frame_around(n: vec3f) -> Tangents {
     return Tangents(vec3f(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), vec3f(b, sign + n.y * n.y * a, -n.y));
 }
 
-// Rotates a vector from a frame whose z axis is the unit vector n.
+// Rotates a vector from a frame with the z axis n.
 fn vector_around(n: vec3f, v: vec3f) -> vec3f {
     let frame = frame_around(n);
     return frame.u * v.x + frame.v * v.y + n * v.z;
 }
 
-// Samples a unit vector on the side of n with a density proportional to the cosine: points of the disk are projected to
-// the hemisphere (Malley's method). Its length is 1 within 3 / 10^7.
+// Samples a unit vector on the side of n proportionally to the cosine: disk points are projected to the hemisphere
+// (Malley's method). Its length is 1 within 3 / 10^7.
 fn hemisphere_sample(n: vec3f, u: vec2f) -> vec3f {
     let p = disk_sample(u);
     return vector_around(n, vec3f(p, sqrt(max(1.0 - p.x * p.x - p.y * p.y, 0.0))));
 }
 
-// Maps the point p of the unit disk to the spherical cap of height `most` around z, preserving relative areas. The
-// length is 1 up to rounding.
+// Maps the unit disk to the spherical cap of height `most` around z, preserving relative areas. The length is 1 up to
+// rounding.
 fn cap_sample(p: vec2f, most: f32) -> vec3f {
     let h = (p.x * p.x + p.y * p.y) * most;
     return vec3f(p * sqrt(max(most * (2.0 - h), 0.0)), 1.0 - h);

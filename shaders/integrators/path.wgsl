@@ -2,7 +2,7 @@
 // importance sampling (MIS). Kajiya, "The Rendering Equation", SIGGRAPH 1986; Veach, "Robust Monte Carlo Methods for
 // Light Transport Simulation", thesis, 1997, chapter 9.
 
-// The path of one sample of a pixel.
+// The path of a sample.
 struct PathState {
     path: Path,            // with the next ray
     radiance: vec3f,       // accumulated
@@ -32,8 +32,8 @@ fn begin_path(pixel: vec2u, sample: u32) -> PathState {
                      vec3f(0.0), vec3f(0.0), skipped_distance, 0u);
 }
 
-// Advances a path by one surface. Short code also runs for a path that ends, and its results are discarded: software
-// Vulkan executes both sides of a branch, and each value kept across it adds cost.
+// Advances a path by one surface. Short code also runs for ended paths, and its results are discarded: software Vulkan
+// executes both sides of a branch, and each value kept across it adds cost.
 fn advance(before: PathState, pixel: vec2u) -> PathState {
     var state = before;
     let path = before.path;
@@ -70,8 +70,8 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         }
     }
     if ABSORPTION != 0u {
-        // An opaque surface hit from inside determines the medium of the whole segment. One with alpha does not, since
-        // the ray may have skipped it on entry.
+        // An opaque surface hit from inside determines the medium of the whole segment. One with alpha does not: the
+        // ray may have skipped it on entry.
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
         let absorption = select(state.absorption, material.absorption, inside);
         state.path.throughput *= transmittance(absorption, hit.t + state.skipped_distance);
@@ -145,7 +145,6 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     return state;
 }
 
-// Returns the weighted radiance and the weight.
 fn path_value(state: PathState) -> vec4f {
     return vec4f(state.radiance * state.weight, state.weight);
 }
@@ -157,7 +156,7 @@ fn path_layers(state: PathState) -> Layers {
                   layers.normal * weight);
 }
 
-// Returns two 32-bit numbers of a randomized (0,2)-sequence over the pixel's samples, independent for each key. Burley,
+// Returns two 32-bit numbers of a randomized (0,2)-sequence over the pixel's samples, independent per key. Burley,
 // "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020, section 5.
 fn decision_set(key: vec2u, sample: u32) -> vec2u {
     if PIXEL_PATTERN == RANDOM {
@@ -166,13 +165,12 @@ fn decision_set(key: vec2u, sample: u32) -> vec2u {
     return sobol_bits(sample, key);
 }
 
-// Returns `decision_set` on the unit square.
 fn decision(key: vec2u, sample: u32) -> vec2f {
     let bits = decision_set(key, sample);
     return vec2f(unit_float(bits.x), unit_float(bits.y));
 }
 
-// Adds radiance that arrives after `bounces` bounces, if `taken`, with indirect samples clamped.
+// Adds radiance that arrives after `bounces` bounces, if `taken`, clamping indirect samples.
 fn add_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> PathState {
     var state = before;
     var radiance = select(vec3f(0.0), found, taken);
@@ -189,7 +187,6 @@ fn add_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> P
     return state;
 }
 
-// Adds the emission of the hit surface, with its MIS weight.
 fn add_emission(state: PathState, prim: HitPrimitive, hit: Hit, surface: Surface, material: Material, is_hit: bool) -> PathState {
     let one_sided = material.kind == EMITTER;
     let is_emissive = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
@@ -210,7 +207,7 @@ fn add_emission(state: PathState, prim: HitPrimitive, hit: Hit, surface: Surface
     return add_radiance(state, state.path.throughput * material.emission * weight, is_hit & is_emissive, state.path.depth);
 }
 
-// Continues behind a surface that the ray skips.
+// Continues behind a skipped surface.
 fn continue_through(before: PathState, surface: Surface, at: HitDifferential, t: f32) -> PathState {
     var state = before;
     state.path = pass_through_path(before.path, surface, at);
@@ -227,7 +224,7 @@ fn continue_through(before: PathState, surface: Surface, at: HitDifferential, t:
     return state;
 }
 
-// Records layers of the first hit, and the albedo of the first non-specular one.
+// Records the first hit's layers, and the first non-specular albedo.
 fn record_first_hit_layers(before: PathState, surface: Surface, material: Material) -> PathState {
     var state = before;
     if state.path.depth == 0u {
@@ -241,7 +238,6 @@ fn record_first_hit_layers(before: PathState, surface: Surface, material: Materi
     return state;
 }
 
-// Samples reflection or refraction.
 fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, material: Material, random: f32) -> PathState {
     var state = before;
     state.pdf = 0.0;
@@ -276,7 +272,7 @@ fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, m
     return state;
 }
 
-// Adds an NEE sample of the selected emitter, if `wanted`.
+// Adds an NEE sample, if `wanted`.
 fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, chosen: EmitterSelection, u: vec2f,
               wanted: bool, pixel: vec2u) -> PathState {
     let light = sample_emitter(chosen, surface.ray_origin, lit_normal(surface, material), u);
@@ -307,7 +303,6 @@ fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, mate
     return add_radiance(state, found, !occluded, state.path.depth + 1u);
 }
 
-// Samples the next direction from the BSDF.
 fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, u: vec2f,
              random: f32) -> PathState {
     var state = before;
@@ -344,7 +339,7 @@ fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material
     return state;
 }
 
-// Applies a sample in the surface's frame, reflected or transmitted.
+// Applies a sample in the surface's frame.
 fn apply_lobe_sample(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, found: LobeSample) -> PathState {
     var state = before;
     let frame = Tangents(surface.du, surface.dv);

@@ -1,7 +1,7 @@
 // The integrator `phong`: direct light by Phong's model, seen directly or through mirrors and glass.
 
-// Returns the radiance along a camera ray. Paths branch at glass; branches are traced depth first, with at most
-// MAX_SPLIT_DEPTH pending. A path that hits a mirror or glass after BOUNCES bounces sees the background.
+// Returns the radiance along a camera ray. Paths branch at glass, traced depth first, with at most MAX_SPLIT_DEPTH
+// pending. A path that hits a mirror or glass after BOUNCES bounces sees the background.
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
     var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);
     if CAMERA_INVISIBLE != 0u {
@@ -67,7 +67,6 @@ fn scatter(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample: u32) 
     return glass_path(path, surface, at, material, unit_float(bits.x));
 }
 
-// Returns the radiance at the end of a path.
 fn radiance_from(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
     let plain = material_of(prim);
     if plain.kind == EMITTER {
@@ -105,7 +104,6 @@ fn radiance_from(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample:
     return sum;
 }
 
-// Returns Phong's lobes, summed over a light's samples.
 fn lobes_of_light(prim: HitPrimitive, surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
                   pixel: vec2u, sample: u32) -> Lobes {
     let to = segments_to_light(light, surface.position);

@@ -1,7 +1,7 @@
 // Adaptive rendering: like `render.wgsl`, but takes more than the pilot samples only where the neighbors' pilot
-// statistics require it. Two further parts of the film hold each pixel's moments and pilot statistics. A dispatch
-// renders either pilot samples or later ones, which require all pilot samples of the film. A pixel's own samples do not
-// affect their number: a mean with such a stopping rule is biased.
+// statistics require it. Two further parts of the film hold moments and pilot statistics. A dispatch renders either
+// pilot samples or later ones, which require all pilot samples of the film. A pixel's own samples do not affect their
+// number: a mean with such a stopping rule is biased.
 
 @compute @workgroup_size(8, 8)
 fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -51,7 +51,7 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     report_completion(local);
 }
 
-// Returns the summed pilot statistics of the up to four neighbors in the film.
+// Returns the pilot statistics of up to four neighbors.
 fn neighbor_pilot_sum(place: vec2u) -> vec4f {
     let width = params.film_size.x;
     let index = 2u * width * params.film_size.y + place.y * width + place.x;

@@ -1,6 +1,5 @@
-// Renders a range of samples of a rectangle of pixels into the film: rgb sums weighted radiance, a the weights. Layers
-// are further parts of the film. Samples are added to the film's value one by one, so that any division into dispatches
-// gives the same bits.
+// Renders a range of samples of a rectangle of pixels into the film: rgb sums weighted radiance, a the weights; layers
+// follow. Samples are added one by one, so that any division into dispatches gives the same bits.
 
 @compute @workgroup_size(8, 8)
 fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {

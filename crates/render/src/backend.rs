@@ -13,29 +13,29 @@ use wgray_image::Region;
 ///
 /// # Films
 ///
-/// - Initially no film exists. [`begin`](Backend::begin) creates an empty one. [`resume`](Backend::resume) continues
-///   one that was read earlier, possibly from another backend. Both replace the current film.
-/// - A film covers a region of the image. It may have no pixels.
-/// - A film has the scene's [layout](FilmLayout): moments and pilot statistics under adaptive sampling, and layers
-///   if they were requested ([`Packed::with_layers`]). Layers do not change the bits of the other lists.
-/// - [`film`](Backend::film) copies the film. It can be called whenever nothing is pending, and changes nothing.
+/// - [`begin`](Backend::begin) creates an empty film. [`resume`](Backend::resume) continues one, possibly of another
+///   backend. Both replace the current film.
+/// - A film covers a region of the image, possibly without pixels.
+/// - A film has the scene's [layout](FilmLayout): moments and pilot statistics under adaptive sampling, layers if
+///   requested ([`Packed::with_layers`]). Layers do not change the bits of other lists.
+/// - [`film`](Backend::film) copies the film, whenever nothing is pending.
 ///
 /// # Dispatches
 ///
-/// - [`submit`](Backend::submit) starts a dispatch, which adds a range of samples to the pixels of a tile, and does not
-///   wait for the device. The dispatch is pending until [`poll`](Backend::poll) returns true or [`wait`](Backend::wait)
-///   returns. At most one is pending. [`render`](Backend::render) submits and waits.
-/// - `poll` never waits for a device. A backend without a device does the work inside `poll` or `wait`.
+/// - [`submit`](Backend::submit) starts a dispatch, which adds samples to the pixels of a tile. At most one is pending,
+///   until [`poll`](Backend::poll) returns true or [`wait`](Backend::wait) returns. [`render`](Backend::render) submits
+///   and waits.
+/// - `submit` and `poll` never wait for a device. A backend without one does the work inside `poll` or `wait`.
 /// - With nothing pending, `poll` returns true and `wait` returns immediately.
-/// - All lists of the film have the same bits for every partition of the work: tiles of any shape in any order and
-///   ranges of any length, if every pixel gets each sample once, in ascending order.
-/// - Under adaptive sampling all pixels of the film get their first [`samples_of_all`](Backend::samples_of_all) samples
-///   before any pixel gets a further one. For the last tile that lacks pilot samples, one range may contain both.
+/// - The film's bits are the same for every partition of the work into tiles and ranges, if every pixel gets each
+///   sample once, in ascending order.
+/// - Under adaptive sampling all pixels get their first [`samples_of_all`](Backend::samples_of_all) samples before any
+///   gets a further one. For the last tile that lacks pilot samples, one range may contain both.
 /// - An empty tile or an empty range of samples changes nothing, wherever it lies.
 ///
 /// # First hits
 ///
-/// - [`first_hits`](Backend::first_hits) needs no film and does not change it.
+/// - [`first_hits`](Backend::first_hits) neither needs nor changes a film.
 ///
 /// # Errors
 ///
@@ -47,8 +47,7 @@ use wgray_image::Region;
 /// - [`RenderError::FilmMismatch`]: `resume` with a film of another layout than the scene's;
 /// - [`RenderError::PilotIncomplete`]: further samples before all pixels of the film have their pilot samples.
 ///
-/// All other errors come from the device. After one of them nothing is pending and no film exists; `begin` and `resume`
-/// may succeed.
+/// All other errors come from the device. Then nothing is pending and no film exists; `begin` and `resume` may succeed.
 pub trait Backend {
     /// Creates an empty film of a region of the image.
     fn begin(&mut self, region: Region) -> Result<(), RenderError>;
@@ -59,34 +58,34 @@ pub trait Backend {
     /// Starts to add a range of samples to the pixels of a tile.
     fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError>;
 
-    /// Returns true if nothing is pending. Completes a dispatch that has ended, or submits its next step.
+    /// Returns true if nothing is pending. Completes an ended dispatch, or submits its next step.
     fn poll(&mut self) -> Result<bool, RenderError>;
 
     /// Waits until nothing is pending.
     fn wait(&mut self) -> Result<(), RenderError>;
 
-    /// Adds a range of samples to the pixels of a tile, and waits for it.
+    /// Adds samples to the pixels of a tile, and waits.
     fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         self.submit(tile, samples)?;
         self.wait()
     }
 
-    /// Copies the film, and waits for the copy.
+    /// Copies the film.
     fn film(&mut self) -> Result<Film, RenderError>;
 
-    /// Returns the first hits of the rays through the pixel centers, row by row from the top. Waits for them;
+    /// Returns the first hits through the pixel centers, row by row from the top. Waits;
     /// [`job::first_hits`](crate::job::first_hits) splits a large region.
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
 
-    /// Returns the maximum size of a film in pixels. The pixels [`around`](Backend::around) such a film fit too.
+    /// Returns the maximum size of a film in pixels, such that [`around`](Backend::around) fits too.
     fn largest_film(&self) -> u64;
 
-    /// Returns the number of pilot samples, which all pixels get and on which the number of further samples depends;
-    /// `u32::MAX` without adaptive sampling.
+    /// Returns the number of pilot samples, which determine the number of further samples; `u32::MAX` without adaptive
+    /// sampling.
     fn samples_of_all(&self) -> u32;
 
-    /// Returns the pixels whose samples determine the sample counts in a region: the region, and under adaptive
-    /// sampling its neighbors.
+    /// Returns the pixels on which sample counts in a region depend: the region, and under adaptive sampling its
+    /// neighbors.
     fn around(&self, region: Region) -> Region;
 }
 
@@ -102,7 +101,7 @@ pub(crate) struct Rules {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FilmState {
     pub region: Region,
-    /// Number of pilot samples so far, over all pixels.
+    /// Pilot samples so far, over all pixels.
     first_samples: u64,
 }
 
@@ -115,7 +114,6 @@ impl Rules {
         }
     }
 
-    /// Returns the layout of a film.
     #[cfg(feature = "gpu")]
     pub fn film_layout(&self) -> FilmLayout {
         self.film_layout
@@ -126,7 +124,6 @@ impl Rules {
         self.picture
     }
 
-    /// Sets the size of the image.
     #[cfg(feature = "gpu")]
     pub fn set_size(&mut self, width: u32, height: u32) {
         self.picture = Region::whole(width, height);

@@ -10,11 +10,11 @@ use wgray_image::Region;
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{place}: {message}")]
 pub struct ShaderError {
-    /// File, line and column of the source, such as `camera.wgsl:12:9`, or the stage that failed.
+    /// Source file, line and column, such as `camera.wgsl:12:9`, or the failed stage.
     pub place: String,
     /// The message.
     pub message: String,
-    /// The marked source line and its neighbors, if the place is known.
+    /// The marked source line and its neighbors, if known.
     pub excerpt: Option<String>,
 }
 
@@ -32,7 +32,7 @@ impl fmt::Display for ShaderErrors {
     }
 }
 
-/// The reason why an image could not be rendered.
+/// Why an image could not be rendered.
 #[derive(Debug, Error)]
 pub enum RenderError {
     /// No device matches the request.
@@ -46,16 +46,15 @@ pub enum RenderError {
     Device {
         /// The adapter's name.
         device: String,
-        /// The message of the driver.
+        /// The driver's message.
         message: String,
     },
-    /// The device was lost, for example because its driver was reset, with all of its memory. Another one may be
-    /// opened.
+    /// The device was lost with all of its memory, for example because its driver was reset. Another one may be opened.
     #[error("{device}: the device was lost: {message}")]
     Lost {
         /// The adapter's name.
         device: String,
-        /// The message of the driver.
+        /// The driver's message.
         message: String,
     },
     /// The device has too little memory.
@@ -63,10 +62,10 @@ pub enum RenderError {
     OutOfMemory {
         /// The adapter's name.
         device: String,
-        /// The allocation that failed, and the memory in use, once they are known.
+        /// The failed allocation and the memory in use, once known.
         message: Option<String>,
     },
-    /// The driver ends long loops early, even in a kernel that renders a single sample of a pixel.
+    /// The driver ends long loops early, even for a single sample of a pixel.
     #[error(
         "{device}: this driver ends long loops early, even for a single sample of a pixel; use fewer shapes, lights or \
          light samples, or the CPU"
@@ -75,7 +74,7 @@ pub enum RenderError {
         /// The adapter's name.
         device: String,
     },
-    /// The scene exceeds a limit of the device.
+    /// The scene exceeds a device limit.
     #[error("{device}: {message}; the CPU has no such limit")]
     TooLarge {
         /// The adapter's name.
@@ -83,7 +82,7 @@ pub enum RenderError {
         /// The size and the limit.
         message: String,
     },
-    /// A call that needs a film before one was begun or resumed.
+    /// A call that needs a film, before one exists.
     #[error("no film; begin or resume one first")]
     NoFilm,
     /// A call while another is pending.
@@ -104,7 +103,7 @@ pub enum RenderError {
     /// A film that cannot be resumed for this scene.
     #[error("the film does not fit the scene: {0}")]
     FilmMismatch(String),
-    /// Further samples under adaptive sampling before all pixels have their pilot samples, which determine how many are
+    /// Further samples under adaptive sampling before all pixels have the pilot samples that determine how many are
     /// needed.
     #[error(
         "samples {} to {} come too early: some pixels of the film do not have their first {first} yet",
@@ -113,13 +112,13 @@ pub enum RenderError {
     PilotIncomplete {
         /// The samples.
         samples: Range<u32>,
-        /// Number of pilot samples per pixel.
+        /// Pilot samples per pixel.
         first: u32,
     },
-    /// The image, with this size in bytes, does not fit into memory.
+    /// An image of this size in bytes does not fit into memory.
     #[error("an image in memory needs {} MiB, which are not available; render a crop", .0 >> 20)]
     Memory(u64),
-    /// A checkpoint or part to resume from cannot be read.
+    /// A checkpoint or part cannot be read.
     #[error("{0}")]
     Input(std::io::Error),
     /// The work was cancelled.

@@ -1,19 +1,18 @@
-//! Excerpts of source text for messages: a numbered line with the location marked.
+//! Excerpts of source text for messages: a numbered, marked line.
 
-/// Prefix of the lines of an excerpt that are not part of the text, in place of a line number.
+/// Prefix of an excerpt's other lines, in place of a line number.
 pub const NO_NUMBER: &str = "      |";
-/// Maximum number of characters of a line.
 const WIDTH: usize = 160;
-/// Number of characters before the location in a truncated line.
+/// Characters before the location in a truncated line.
 const BEFORE: usize = 60;
 
-/// Returns a line with its number, which counts from 1. A long line is truncated.
+/// Returns a line with its number, from 1. Truncates a long one.
 pub fn numbered(number: usize, line: &str) -> String {
     let (part, _) = window(line, 0);
     format!("{number:>5} | {part}").trim_end().to_string()
 }
 
-/// Returns a numbered line with marks below `length` characters from `start`. A long line is truncated around them.
+/// Returns a numbered line with marks below `length` characters from `start`. Truncates a long one around them.
 pub fn marked(number: usize, line: &str, start: usize, length: usize) -> String {
     let (part, at) = window(line, start);
     let room = part.chars().count().saturating_sub(at).max(1);
@@ -21,7 +20,7 @@ pub fn marked(number: usize, line: &str, start: usize, length: usize) -> String 
     format!("{number:>5} | {part}\n{NO_NUMBER} {indent}{marks}")
 }
 
-/// Returns the part of a line to print, and the position of the character `place` in it.
+/// Returns the printed part of a line, and the position of `place` in it.
 fn window(line: &str, place: usize) -> (String, usize) {
     let count = line.chars().count();
     let place = place.min(count);

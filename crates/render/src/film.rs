@@ -7,7 +7,7 @@ use wgray_image::Region;
 /// The optional lists of a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FilmLayout {
-    /// Moments and pilot statistics, for adaptive sampling.
+    /// Moments and pilot statistics.
     pub adaptive: bool,
     /// The sums of each [`Layer`].
     pub layers: bool,
@@ -26,18 +26,18 @@ impl FilmLayout {
     }
 }
 
-/// Sums of the path integrator besides the radiance.
+/// The path integrator's sums besides the radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
-    /// Emitted radiance; a: fraction of samples whose camera rays hit anything.
+    /// Emitted radiance; a: fraction of samples that hit anything.
     Emission,
-    /// Radiance that was scattered once.
+    /// Radiance scattered once.
     Direct,
-    /// Radiance that was scattered more often.
+    /// Radiance scattered more often.
     Indirect,
     /// Albedo of the surface.
     Albedo,
-    /// Shading normal, outward.
+    /// Outward shading normal.
     Normal,
 }
 
@@ -59,11 +59,11 @@ pub struct Film {
     pub region: Region,
     /// rgb: sum of weighted radiances; a: sum of weights.
     pub sums: Vec<Vec4>,
-    /// rgb: sum of squared deviations from the mean; a: number of samples. Empty without adaptive sampling.
+    /// rgb: summed squared deviations from the mean; a: samples. Empty without adaptive sampling.
     pub moments: Vec<Vec4>,
-    /// Statistics of the pilot samples, for the neighbors. Empty without adaptive sampling.
+    /// Pilot statistics, for the neighbors. Empty without adaptive sampling.
     pub pilot_sums: Vec<Vec4>,
-    /// Weighted sums of each [`Layer`]. Empty unless layers were requested.
+    /// Weighted sums of each [`Layer`]. Empty unless requested.
     pub layers: [Vec<Vec4>; Layer::ALL.len()],
 }
 
@@ -97,7 +97,7 @@ impl Film {
         }
     }
 
-    /// Returns the layout; a film without pixels has the default one.
+    /// Returns the layout; the default one without pixels.
     pub fn film_layout(&self) -> FilmLayout {
         FilmLayout {
             adaptive: !self.moments.is_empty(),
@@ -105,7 +105,7 @@ impl Film {
         }
     }
 
-    /// Returns all lists, including empty ones: sums, moments, pilot statistics, layers.
+    /// Returns all lists, even empty ones: sums, moments, pilot statistics, layers.
     pub fn lists(&self) -> impl Iterator<Item = &Vec<Vec4>> {
         let Film {
             region: _,
@@ -129,7 +129,7 @@ impl Film {
         [sums, moments, pilot_sums].into_iter().chain(layers)
     }
 
-    /// Returns the part of the film in a region, which must lie inside it.
+    /// Returns the part in a region, which must lie inside.
     pub fn part(self, part: Region) -> Film {
         if part == self.region {
             return self;
@@ -150,7 +150,7 @@ impl Film {
         }
     }
 
-    /// Returns the number of samples of a pixel, under adaptive sampling.
+    /// Returns a pixel's number of samples, under adaptive sampling.
     pub fn sample_count(&self, pixel: usize) -> u32 {
         self.moments[pixel].w as u32
     }
@@ -160,9 +160,9 @@ impl Film {
         (0..self.moments.len()).map(|pixel| self.sample_count(pixel))
     }
 
-    /// Returns the estimated variance of a pixel's mean per channel, under adaptive sampling. It treats samples as
-    /// independent: for stratified patterns it is an upper bound on average. The number of samples of the pixel depends
-    /// on its neighbors instead.
+    /// Returns the estimated variance of a pixel's mean per channel, under adaptive sampling. It assumes independent
+    /// samples: an upper bound on average for stratified patterns. The pixel's number of samples depends on its
+    /// neighbors instead.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
         variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
     }
@@ -172,14 +172,14 @@ impl Film {
         self.layers.iter().all(|list| !list.is_empty())
     }
 
-    /// Returns the mean of a layer over a pixel's samples; 0 without samples or layers.
+    /// Returns a layer's mean over a pixel's samples; 0 without samples or layers.
     pub fn layer(&self, layer: Layer, pixel: usize) -> [f32; 3] {
         let sum = self.layers[layer as usize].get(pixel).copied().unwrap_or_default();
         mean(sum.xyz().extend(self.sums[pixel].w))
     }
 
-    /// Returns the fraction of a pixel's samples whose camera rays hit anything; 0 without samples, 1 without layers. A
-    /// filter with negative weights can move it out of 0 to 1.
+    /// Returns the fraction of a pixel's samples that hit anything; 0 without samples, 1 without layers. Filters with
+    /// negative weights can move it out of 0 to 1.
     pub fn alpha(&self, pixel: usize) -> f32 {
         let all = self.sums[pixel].w;
         match self.layers[Layer::Emission as usize].get(pixel) {
@@ -189,7 +189,7 @@ impl Film {
         }
     }
 
-    /// Returns the means of all pixels in linear RGB.
+    /// Returns all pixels' means in linear RGB.
     pub fn means(&self) -> impl Iterator<Item = [f32; 3]> {
         self.sums.iter().copied().map(mean)
     }
@@ -202,7 +202,7 @@ pub fn variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3 {
     moments.xyz() * scale
 }
 
-/// Returns the mean of a pixel's samples in linear RGB, black without samples.
+/// Returns a pixel's mean in linear RGB, black without samples.
 pub fn mean(sum: Vec4) -> [f32; 3] {
     if sum.w == 0.0 {
         [0.0; 3]

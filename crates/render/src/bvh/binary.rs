@@ -1,7 +1,7 @@
-//! Top-down construction of a binary BVH by the surface area heuristic (SAH), as input of the wide BVH.
+//! Top-down construction of a binary BVH by the surface area heuristic (SAH), for the wide BVH.
 //!
 //! Splits are found by binning (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), in
-//! small nodes by an exhaustive sweep along each axis.
+//! small nodes by a sweep along each axis.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4, Vec4Swizzles as _};
@@ -10,18 +10,18 @@ use rayon::prelude::*;
 use super::Aabb;
 use super::wide::{SLOTS, costs};
 
-/// Minimum number of items of a node that several threads split.
+/// Minimum items of a node that several threads split.
 const PARALLEL: usize = 1 << 16;
-/// Number of items per task of a parallel loop.
+/// Items per task of a parallel loop.
 const CHUNK: usize = 1 << 14;
-/// Minimum number of items of a node whose halves are built in parallel.
+/// Minimum items of a node whose halves are built in parallel.
 const JOIN: usize = 1 << 11;
-/// Maximum number of items of a node that is split by exhaustive search.
+/// Maximum items of a node split by exhaustive search.
 const SMALL: usize = 8;
-/// Number of bins per axis, a power of two.
+/// Bins per axis, a power of two.
 const BINS: usize = 16;
 
-/// A box and its index. The index is stored as the bits of `low.w`, which takes no part in arithmetic; `high.w` is 1.
+/// A box and its index, as the bits of `low.w`, which takes no part in arithmetic; `high.w` is 1.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct BuildItem {
@@ -40,7 +40,7 @@ impl BuildItem {
                 high: Vec3::ZERO,
             }
         };
-        // Adding 0 turns -0 into 0: otherwise the bits of a minimum would depend on the order of its operands.
+        // Adding 0 turns -0 into 0: otherwise a minimum's bits would depend on the order of operands.
         let finite = |v: Vec3| v.clamp(Vec3::MIN, Vec3::MAX) + Vec3::ZERO;
         BuildItem {
             low: finite(low).extend(f32::from_bits(number as u32)),
@@ -65,27 +65,27 @@ impl BuildItem {
     }
 }
 
-/// An inner node. Nodes of a single item are not stored.
+/// An inner node, of at least two items.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct Inner {
     pub low: Vec3,
     pub high: Vec3,
-    /// Number of items in the first half.
+    /// Items in the first half.
     pub first: u32,
-    /// SAH cost of the items in a wide BVH if they may occupy up to 1, 2, .. 7 slots of the parent node.
+    /// SAH cost in a wide BVH if the items may occupy up to 1, 2, .. 7 slots of the parent.
     pub costs: [f32; SLOTS - 1],
 }
 
-/// A binary BVH in depth-first order. A node of n items owns n - 1 consecutive inner nodes: itself, those of its first
-/// half, those of its second half.
+/// A binary BVH in depth-first order. A node of n items owns n - 1 consecutive inner nodes: itself, then those of each
+/// half.
 pub struct Binary {
     pub items: Vec<BuildItem>,
     pub inner: Vec<Inner>,
 }
 
 impl Binary {
-    /// Builds a tree of at most `levels` levels of inner nodes, provided that there are at most 2^`levels` boxes.
+    /// Builds at most `levels` levels of inner nodes, for at most 2^`levels` boxes.
     pub fn build(boxes: &[Aabb], levels: u32, most_in_leaf: usize) -> Binary {
         let items = boxes.par_iter().enumerate().with_min_len(CHUNK);
         let mut items: Vec<BuildItem> = items.map(|(i, bounds)| BuildItem::new(i, bounds)).collect();
@@ -129,7 +129,6 @@ fn costs_of(items: &[BuildItem], inner: &[Inner]) -> [f32; SLOTS - 1] {
     }
 }
 
-/// The bounds of a node's items and of their doubled centroids.
 #[derive(Clone, Copy)]
 struct Bounds {
     low: Vec4,
@@ -178,16 +177,16 @@ impl Bounds {
     }
 }
 
-/// Area added to every box, so that the number of nodes counts even among boxes without a surface.
+/// Added to every box, so that the number of nodes counts even among boxes without a surface.
 const MIN_AREA: f32 = 1e-30;
 
-/// Returns half the surface area. Sizes are clamped, so that costs are finite.
+/// Returns half the surface area, clamped to finite costs.
 pub fn area(low: Vec4, high: Vec4) -> f32 {
     let size = (high - low).min(Vec4::splat(1e15));
     size.x * size.y + size.y * size.z + size.z * size.x + MIN_AREA
 }
 
-/// Partitions the items into two nonempty parts and returns the size of the first.
+/// Partitions the items into two nonempty parts; returns the first one's size.
 fn split(items: &mut [BuildItem], bounds: &Bounds, levels: u32) -> usize {
     let count = items.len();
     if count == 2 {
@@ -202,7 +201,6 @@ fn split(items: &mut [BuildItem], bounds: &Bounds, levels: u32) -> usize {
     found.unwrap_or_else(|| split_in_half(items, bounds))
 }
 
-/// Splits at the median centroid along the axis of largest centroid extent.
 fn split_in_half(items: &mut [BuildItem], bounds: &Bounds) -> usize {
     let half = items.len() / 2;
     let extent = (bounds.high_middle - bounds.low_middle).xyz();
@@ -217,7 +215,7 @@ fn split_in_half(items: &mut [BuildItem], bounds: &Bounds) -> usize {
     half
 }
 
-/// Returns the split of lowest SAH cost among all splits in the order of centroids along an axis.
+/// Returns the split of lowest SAH cost in the order of centroids along any axis.
 fn split_small(items: &mut [BuildItem]) -> Option<usize> {
     let count = items.len();
     let mut best: Option<(f32, usize, [BuildItem; SMALL])> = None;
@@ -328,11 +326,11 @@ fn together(mut a: Bins, b: Bins) -> Bins {
     a
 }
 
-/// Moves items that satisfy the predicate to the front and returns their number.
+/// Moves items that satisfy the predicate to the front; returns their number.
 fn partition(items: &mut [BuildItem], is_first: impl Fn(&BuildItem) -> bool) -> usize {
     let mut end = 0;
     for i in 0..items.len() {
-        // Branchless: the branch would be mispredicted half the time.
+        // Branchless: half the branches would be mispredicted.
         let first = is_first(&items[i]);
         items.swap(end, i);
         end += usize::from(first);

@@ -1,12 +1,12 @@
-//! Builder of bounding volume hierarchies with up to 8 children per node, which the kernels and the CPU traverse.
+//! Builder of bounding volume hierarchies with up to 8 children per node.
 //!
 //! Nodes follow Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs",
 //! HPG 2017, section 4: 80 bytes, with child boxes quantized to 256 steps per axis.
 //!
 //! Measured on two cores of an AMD EPYC: a million triangles take 0.26 to 0.36 s, with 90 MB during the build and 10 to
-//! 12 MB after it; 100,000 spheres take 0.03 s. With the same collapse, the builder of obvhs 0.4 (PLOC and reinsertion)
-//! gave an SAH cost 3 % lower to 13 % higher in 1 to 4 times the time (distance 6, 15 % reinserted), or 7 % lower to 7
-//! % higher in 7 to 80 times the time (distance 14, all reinserted), over seven scenes.
+//! 12 MB after it; 100,000 spheres take 0.03 s. With the same collapse, obvhs 0.4 (PLOC and reinsertion) gave an SAH
+//! cost 3 % lower to 13 % higher in 1 to 4 times the time (distance 6, 15 % reinserted), or 7 % lower to 7 % higher in
+//! 7 to 80 times the time (distance 14, all reinserted), over seven scenes.
 
 mod binary;
 mod node;
@@ -17,7 +17,7 @@ use glam::Vec3;
 use self::binary::Binary;
 pub use self::node::Node;
 
-/// An axis-aligned bounding box. It is empty if low > high.
+/// An axis-aligned bounding box, empty if low > high.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// The lower corner.
@@ -55,23 +55,23 @@ impl Aabb {
 pub struct Tree {
     /// The nodes, root first.
     pub nodes: Vec<Node>,
-    /// The indices of the boxes, in the order of the leaves.
+    /// Box indices, in leaf order.
     pub order: Vec<u32>,
 }
 
 /// Maximum number of levels of nodes.
 pub const BUILD_MAX_DEPTH: u32 = 32;
 
-/// Maximum number of items per leaf: the items of 8 leaves must be addressable by an offset of 5 bits.
+/// Maximum number of items per leaf: 8 leaves must be addressable by 5 bits.
 pub const MAX_LEAF_SIZE: u32 = 4;
 
-/// Builds the BVH over boxes. The result does not depend on the number of threads.
+/// Builds the BVH over boxes, independently of the number of threads.
 ///
-/// `most_in_leaf` is the maximum number of items per leaf, from 1 to [`MAX_LEAF_SIZE`]. Bounds are clamped to finite
-/// numbers. Boxes that are empty or contain NaN are replaced by the point 0.
+/// `most_in_leaf` is the maximum number of items per leaf, 1 to [`MAX_LEAF_SIZE`]. Bounds are clamped to finite
+/// numbers. Empty boxes and those with NaN are replaced by the point 0.
 pub fn build(boxes: &[Aabb], most_in_leaf: u32) -> Tree {
     let most_in_leaf = most_in_leaf.clamp(1, MAX_LEAF_SIZE) as usize;
-    // The wide BVH has at most as many levels as the binary one, in practice a third.
+    // At most as many levels as the binary BVH, in practice a third.
     wide::collapse(&Binary::build(boxes, BUILD_MAX_DEPTH, most_in_leaf), most_in_leaf)
 }
 

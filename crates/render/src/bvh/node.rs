@@ -1,37 +1,37 @@
-//! A BVH node with up to 8 children, whose boxes are quantized to a grid of the node.
+//! A BVH node with up to 8 children, with boxes quantized to its grid.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec3, Vec3};
 
 use super::Aabb;
 
-/// A node of a [`Tree`](super::Tree). The kernels read it as five rows of four 32-bit words.
+/// A node of a [`Tree`](super::Tree): in kernels, five rows of four 32-bit words.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Node {
     /// The origin of the grid.
     pub base: [f32; 3],
-    /// The grid steps along x, y and z, powers of two, as the biased exponents (bits 23 to 30) of an `f32`.
+    /// Grid steps along x, y and z, powers of two, as biased exponents (bits 23 to 30) of an `f32`.
     pub exponents: [u8; 3],
-    /// Bit c is set if child c is an inner node.
+    /// Bit c: child c is an inner node.
     pub inner: u8,
-    /// Index of the first child that is an inner node. The others follow in the order of their slots.
+    /// Index of the first inner child. Others follow in the order of their slots.
     pub first_child: u32,
-    /// Index of the first item of the node's leaves in [`Tree::order`](super::Tree::order).
+    /// First item of its leaves in [`Tree::order`](super::Tree::order).
     pub first_item: u32,
-    /// For each child that is a leaf, its number of items in bits 5 to 7, and the offset of the first from `first_item`
-    /// in bits 0 to 4; 0 for other slots.
+    /// Per leaf: number of items in bits 5 to 7, and offset of the first from `first_item` in bits 0 to 4; 0 for other
+    /// slots.
     pub leaves: [u8; 8],
-    /// The lower bounds of the children along x, y and z in grid steps; 255 in an empty slot.
+    /// Lower bounds along x, y and z in grid steps; 255 in an empty slot.
     pub low: [[u8; 8]; 3],
-    /// The upper bounds of the children along x, y and z in grid steps; 0 in an empty slot.
+    /// Upper bounds along x, y and z in grid steps; 0 in an empty slot.
     pub high: [[u8; 8]; 3],
 }
 
 const _: () = assert!(size_of::<Node>() == 80);
 
 impl Node {
-    /// Returns a node without children, whose grid covers the bounds.
+    /// Returns a node without children whose grid covers the bounds.
     pub(super) fn around(bounds: &Aabb) -> Node {
         Node {
             base: bounds.low.to_array(),
@@ -45,7 +45,7 @@ impl Node {
         }
     }
 
-    /// Sets the box of a slot to the smallest box on the grid that contains the bounds.
+    /// Sets a slot's box to the smallest one on the grid around the bounds.
     pub(super) fn set_bounds(&mut self, slot: usize, bounds: &Aabb) {
         let (base, scale) = (self.base(), self.scale());
         for axis in 0..3 {
@@ -89,13 +89,13 @@ impl Node {
         self.base() + UVec3::from_array(q.map(u32::from)).as_vec3() * self.scale()
     }
 
-    /// Returns the node index of a child, or `None` if it is not an inner node.
+    /// Returns a child's node index, or `None` if it is not an inner node.
     pub fn child(&self, child: usize) -> Option<u32> {
         let before = self.inner & ((1 << child) - 1);
         (self.inner >> child & 1 == 1).then(|| self.first_child + before.count_ones())
     }
 
-    /// Returns the range of a child's items in [`Tree::order`](super::Tree::order), which is empty if it is not a leaf.
+    /// Returns a child's items in [`Tree::order`](super::Tree::order), none if it is not a leaf.
     pub fn items(&self, child: usize) -> std::ops::Range<usize> {
         let leaf = self.leaves[child];
         let start = self.first_item as usize + usize::from(leaf & 31);
@@ -107,12 +107,12 @@ fn step(exponent: u8) -> f32 {
     f32::from_bits(u32::from(exponent) << 23)
 }
 
-/// Decodes a bound in the same way as the kernels: multiplication and addition are both rounded.
+/// Decodes a bound like the kernels: multiplication and addition are both rounded.
 fn bound(base: f32, q: u8, scale: f32) -> f32 {
     base + f32::from(q) * scale
 }
 
-/// Returns the exponent of the smallest step with which the grid spans `low` to `high`.
+/// Returns the exponent of the smallest step that spans `low` to `high`.
 fn exponent(low: f32, high: f32) -> u8 {
     let step_at_least = (high - low).min(f32::MAX) / 255.0;
     let mut exponent = (step_at_least.to_bits() >> 23) as u8;

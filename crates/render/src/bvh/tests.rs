@@ -1,11 +1,11 @@
-//! Tests of the BVH builder: invariants of the nodes for random, degenerate and extreme boxes.
+//! Tests of the BVH builder: node invariants for random, degenerate and extreme boxes.
 
 use glam::Vec3;
 
 use super::binary::{Binary, Inner};
 use super::{Aabb, BUILD_MAX_DEPTH, MAX_LEAF_SIZE, Node, Tree, build};
 
-/// A generator of numbers from 0 to 1.
+/// Numbers from 0 to 1.
 struct Random(u64);
 
 impl Random {
@@ -40,12 +40,12 @@ fn decoded(base: f32, q: u8, exponent: u8) -> f32 {
     base + q as f32 * f32::from_bits((exponent as u32) << 23)
 }
 
-/// Asserts the invariants of a BVH and returns its number of levels.
+/// Asserts invariants and returns the number of levels.
 fn check(tree: &Tree, boxes: &[Aabb], most_in_leaf: u32) -> u32 {
     let mut nodes = vec![0; tree.nodes.len()];
     let mut items = vec![0; boxes.len()];
     let mut levels = 0;
-    // Index, level, and the boxes of all ancestors.
+    // Index, level, boxes of all ancestors.
     let mut pending: Vec<(u32, u32, Vec<Aabb>)> = vec![(0, 1, Vec::new())];
     while let Some((number, level, outer)) = pending.pop() {
         levels = levels.max(level);
@@ -184,7 +184,7 @@ fn boxes_in_geometric_progression() {
             check_builds(&repeated);
         }
     }
-    // Slow growth degenerates the binary tree into a chain if its depth is not limited.
+    // Slow growth makes a binary tree of unlimited depth a chain.
     let boxes: Vec<Aabb> = (0..2000)
         .map(|i| around(Vec3::X * 1.05f32.powi(-i), Vec3::splat(1e-25)))
         .collect();
@@ -200,7 +200,7 @@ fn binary_levels(inner: &[Inner]) -> u32 {
 
 #[test]
 fn the_depth_is_limited() {
-    // Each box is twice as large as the next one, with distinct centroids.
+    // Each box is twice as large as the next one.
     let boxes: Vec<Aabb> = (0..240)
         .map(|i| around(Vec3::splat(2f32.powi(120 - i)), Vec3::splat(2f32.powi(120 - i))))
         .collect();
@@ -223,7 +223,7 @@ fn huge_tiny_and_infinite_boxes() {
             .collect();
         check_builds(&boxes);
     }
-    // Small boxes far from the origin, where grid steps are below the float spacing.
+    // Small boxes far from the origin: grid steps below the float spacing.
     for far in [1e3, 1e6, 1e9, -1e9] {
         let boxes: Vec<Aabb> = (0..500)
             .map(|_| around(random.point() + far, random.point() * 1e-3))
@@ -258,7 +258,6 @@ fn empty_and_nan_boxes_are_replaced() {
             .iter()
             .all(|node| (0..8).all(|c| !node.low(c).is_nan() && !node.high(c).is_nan()))
     );
-    // Each of them is replaced by the point 0.
     boxes[100..].fill(around(Vec3::ZERO, Vec3::ZERO));
     assert_eq!(build(&boxes, 4), tree);
     check(&tree, &boxes, 4);

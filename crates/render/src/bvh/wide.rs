@@ -8,21 +8,20 @@ use rayon::prelude::*;
 use super::binary::{Binary, BuildItem, Inner};
 use super::{Aabb, Node, Tree};
 
-/// Maximum number of children per node.
+/// Maximum children per node.
 pub const SLOTS: usize = 8;
-/// SAH cost of testing a ray against the boxes of a node.
+/// SAH cost of testing a node's boxes.
 const NODE_COST: f32 = 1.0;
-/// SAH cost of testing a ray against an item.
+/// SAH cost of testing an item.
 const ITEM_COST: f32 = 0.3;
-/// Minimum number of items of a node whose children are built in parallel.
+/// Minimum items of a node whose children are built in parallel.
 const PARALLEL: usize = 1 << 14;
 
 pub fn leaf_cost(area: f32, count: usize) -> f32 {
     area * count as f32 * ITEM_COST
 }
 
-/// Returns the cost of a binary node that may occupy up to 1, 2, .. 7 slots of a wide parent, from the costs of its
-/// halves.
+/// Returns a binary node's costs in up to 1, 2, .. 7 slots of a wide parent, from those of its halves.
 pub fn costs(area: f32, count: usize, most_in_leaf: usize, sides: &[[f32; SLOTS - 1]; 2]) -> [f32; SLOTS - 1] {
     let shared = |slots: usize| share(slots, |k| sides[0][k - 1], |k| sides[1][k - 1]).0;
     let mut costs = [0.0; SLOTS - 1];
@@ -36,8 +35,7 @@ pub fn costs(area: f32, count: usize, most_in_leaf: usize, sides: &[[f32; SLOTS 
     costs
 }
 
-/// Distributes slots over two sides, at least one each, at the lowest cost. Returns the cost and the slots of the first
-/// side.
+/// Distributes slots over two sides, at least one each, at the lowest cost. Returns it and the first side's slots.
 fn share(slots: usize, first: impl Fn(usize) -> f32, second: impl Fn(usize) -> f32) -> (f32, usize) {
     let mut best = (first(1) + second(slots - 1), 1);
     for k in 2..slots {
@@ -94,13 +92,12 @@ impl<'a> Part<'a> {
         ]
     }
 
-    /// Returns true if a leaf costs no more than an inner node.
     fn is_leaf(&self, most_in_leaf: usize) -> bool {
         let count = self.items.len();
         count == 1 || (count <= most_in_leaf && leaf_cost(self.area(), count) <= self.cost(1))
     }
 
-    /// Collects the parts that occupy the slots of a wide node. The part must have at least two items.
+    /// Collects the parts in a wide node's slots, of a part with at least two items.
     fn spread(&self, slots: usize, children: &mut Vec<Part<'a>>) {
         let halves = self.halves();
         let (_, first) = share(slots, |k| halves[0].cost(k), |k| halves[1].cost(k));
@@ -138,7 +135,7 @@ struct Below {
 }
 
 impl Below {
-    /// Adds the descendants of a part and returns the node of the part.
+    /// Adds the descendants of a part and returns its node.
     fn add(&mut self, part: Part) -> Node {
         if part.items.is_empty() {
             return Node::around(&Aabb {
@@ -192,7 +189,7 @@ impl Below {
         node
     }
 
-    /// Appends nodes that were built separately, in the order in which `add` would have added them.
+    /// Appends nodes built separately, in the order of `add`.
     fn append(&mut self, node: Node, below: Below) -> Node {
         let (nodes, items) = (self.tree.nodes.len() as u32, self.tree.order.len() as u32);
         let moved = |node: Node| Node {
@@ -207,10 +204,9 @@ impl Below {
 }
 
 /// Assigns children to slots. Slot c is meant for octant c of the node (bit 0: +x, bit 1: +y, bit 2: +z), so that c ^
-/// octant of a ray approximates front-to-back order. The child and free slot of largest projected distance are assigned
-/// first.
+/// octant of a ray approximates front-to-back order. The pair of largest projected distance is assigned first.
 fn slots_of(bounds: &Aabb, children: &[Part]) -> [Option<usize>; SLOTS] {
-    // Both terms are halved to avoid overflow.
+    // Halved, to avoid overflow.
     let middle = |bounds: &Aabb| bounds.low * 0.5 + bounds.high * 0.5;
     let center = middle(bounds);
     let mut towards = [[0.0; SLOTS]; SLOTS];

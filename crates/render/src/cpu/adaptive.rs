@@ -1,4 +1,4 @@
-//! Twin of `shaders/adaptive.wgsl`: adaptive sampling by variance estimates of neighboring pixels.
+//! Twin of `shaders/adaptive.wgsl`.
 
 use glam::{Vec3, Vec4, Vec4Swizzles};
 

@@ -1,5 +1,4 @@
-//! Closest-hit and occlusion queries of the scene's BVHs, with the results of `shaders/bvh.wgsl` by the traversals of
-//! [`traversal`].
+//! Closest-hit and occlusion queries of the scene's BVHs: the results of `shaders/bvh.wgsl` by [`traversal`].
 
 use bytemuck::cast_slice;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
@@ -22,14 +21,13 @@ use crate::records::{
     with_primitive_kind,
 };
 
-/// Maximum number of items that are tested without the BVH: a ray hits most nodes of a small BVH.
+/// Maximum number of items tested without the BVH: rays hit most nodes of small ones.
 const FEW_ITEMS: usize = 4;
 
 fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
     scene.counts.item_padding.x * (largest(origin) + scene.counts.item_padding.y)
 }
 
-/// Returns the closest hit among the items of the scene's BVH if it is nearer than `before`, else `before`.
 pub fn closest_in_bvh(scene: &Packed, before: Hit, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {
     let mut hit = before;
     let pad = item_pad(scene, ray.origin);
@@ -94,7 +92,7 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
     let pad = mesh_pad(i, origin);
-    // On equal distance, a triangle of this instance wins only over hits on instances with larger indices.
+    // On equal distance, this instance wins only over larger indices.
     let best = Nearest {
         t: before.t,
         number: if number + 1 < before.instance { NO_INDEX } else { 0 },
@@ -135,7 +133,6 @@ fn corners(mesh: &PackedMesh, slot: usize) -> [Vec3; 3] {
     [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].xyz())
 }
 
-/// The shadow rays from a surface to a block of samples of a light.
 struct Rays<'a> {
     surface: &'a Surface,
     light: &'a Light,
@@ -152,8 +149,7 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Returns a mask of the samples of the block that an item of the BVH occludes from the surface, or that are set in
-/// `before`.
+/// Returns the samples of the block that an item occludes, or that are set in `before`.
 pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
     let all = u32::MAX >> (32 - block.count);
     let wanted = all & !before;
@@ -182,7 +178,6 @@ pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &L
     (before & all) | traversal::occluded_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, wanted, bounds, visit)
 }
 
-/// Returns the mask of the samples in `wanted` that an item occludes.
 fn occluded_by_item(scene: &Packed, item: &BvhItem, wanted: u32, rays: &Rays) -> u32 {
     let i = item.index;
     let kind = item.kind & 0xff;
@@ -224,7 +219,7 @@ fn occluded_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u3
     traversal::occluded(*LEVEL, &walked(mesh), &segments, wanted)
 }
 
-/// Like [`traversal::occluded`], for meshes in which some groups cast no shadow.
+/// Like [`traversal::occluded`], if some groups cast no shadow.
 fn occluded_by_groups(
     scene: &Packed,
     i: &Instance,
@@ -258,8 +253,7 @@ fn occluded_by_groups(
     )
 }
 
-/// Returns true if an item of the BVH, except the primitive `target_prim`, occludes the segment from the surface to
-/// `t_max * to`.
+/// Returns true if an item, except `target_prim`, occludes the segment to `t_max * to`.
 pub fn is_occluded_by_bvh(scene: &Packed, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
     let pad = item_pad(scene, surface.ray_origin);
     let s = slabs(surface.ray_origin, to, pad);

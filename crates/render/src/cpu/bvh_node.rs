@@ -1,4 +1,4 @@
-//! Twin of `shaders/bvh_node.wgsl`: BVH nodes with eight children and quantized boxes.
+//! Twin of `shaders/bvh_node.wgsl`.
 
 use glam::{UVec2, UVec3, Vec3, Vec4};
 

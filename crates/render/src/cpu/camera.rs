@@ -1,4 +1,4 @@
-//! Twin of `shaders/camera.wgsl`: camera rays and their differentials.
+//! Twin of `shaders/camera.wgsl`.
 
 use glam::{Vec2, Vec3};
 
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::records::PERSPECTIVE;
 
-    /// Returns a camera that looks along +y, with +x to the right and +z up; the image plane is 4 x 2, one unit ahead.
+    /// Returns a camera that looks along +y, +x to the right and +z up; the image plane is 4 x 2, one unit ahead.
     fn camera(projection: u32) -> Camera {
         Camera {
             position: Vec3::new(1.0, 2.0, 3.0),

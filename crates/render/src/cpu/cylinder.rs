@@ -1,4 +1,4 @@
-//! Twin of `shaders/cylinder.wgsl`: the surface of x² + y² <= 1, |z| <= 1 in local space.
+//! Twin of `shaders/cylinder.wgsl`.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// Returns the distance and the normal of a hit; INFINITE_T if it misses.
+    /// Returns distance and normal; INFINITE_T for a miss.
     fn hit(q: &Primitive, ray: Ray) -> (f32, Vec3) {
         let t = intersect_cylinder(q, false, ray, INFINITE_T);
         (
@@ -195,7 +195,7 @@ mod tests {
             // From inside.
             ([1.0, 2.0, 3.0], [0.0, -1.0, 0.0], 2.0, Vec3::NEG_Y),
             ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0], 3.0, Vec3::Z),
-            // Just below the rim, and just inside of it.
+            // Just below the rim, and inside of it.
             ([-2.0, 2.0, 6.5], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::NEG_X),
             ([-0.9, 2.0, 7.0], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::Z),
         ] {
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_huge_cylinder_keeps_its_digits_near_the_origin() {
-        // The scene lies on the side of a horizontal cylinder, and on the cap of a vertical one.
+        // On the side of a horizontal cylinder, and the cap of a vertical one.
         let pipe = primitive(
             CYLINDER,
             DVec3::NEG_Z * 1e6,

@@ -1,4 +1,4 @@
-//! Twin of `shaders/dielectric.wgsl`: path sampling of the smooth materials `dielectric` and `glass`.
+//! Twin of `shaders/dielectric.wgsl`.
 
 use std::f32::consts::LOG2_E;
 

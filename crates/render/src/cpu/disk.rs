@@ -1,4 +1,4 @@
-//! Twin of `shaders/disk.wgsl`: the disk x² + y² <= 1, z = 0 in local space.
+//! Twin of `shaders/disk.wgsl`.
 
 use glam::Vec3;
 
@@ -31,7 +31,7 @@ mod tests {
     use crate::pack::primitive;
     use crate::records::{DISK, INFINITE_T};
 
-    /// Returns the distance from (x, y, 5), straight down, to a disk of radius 2 around (1, 1, 3).
+    /// Returns the distance from (x, y, 5) down to a disk of radius 2 around (1, 1, 3).
     fn from_above(x: f32, y: f32) -> f32 {
         let columns = DMat3::from_cols(DVec3::X * 2.0, DVec3::Y * 2.0, DVec3::Z);
         let disk = primitive(DISK, DVec3::new(1.0, 1.0, 3.0), columns, 0, 0);

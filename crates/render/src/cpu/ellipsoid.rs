@@ -102,7 +102,7 @@ mod tests {
         );
     }
 
-    /// The hit with a general ellipsoid lies on the quadric |M (p - c)|^2 = 1, and its normal is the gradient there.
+    /// Hits lie on the quadric |M (p - c)|^2 = 1, with its gradient as normal.
     #[test]
     fn an_ellipsoid_is_its_quadric() {
         let center = DVec3::new(0.5, 0.4, 0.4);

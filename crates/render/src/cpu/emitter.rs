@@ -1,4 +1,4 @@
-//! Twin of `shaders/emitter.wgsl`: emitter selection and light sampling.
+//! Twin of `shaders/emitter.wgsl`.
 
 use glam::{UVec2, Vec2, Vec3};
 

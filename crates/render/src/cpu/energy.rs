@@ -1,4 +1,4 @@
-//! Twin of `shaders/energy.wgsl`: single-scattering albedo of microfacet lobes, from tables.
+//! Twin of `shaders/energy.wgsl`.
 
 use glam::{Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/environment.wgsl`: radiance and importance sampling of the environment map.
+//! Twin of `shaders/environment.wgsl`.
 
 use glam::{UVec2, UVec4, Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/equirect.wgsl`: equirectangular mapping of the environment map, and its cells.
+//! Twin of `shaders/equirect.wgsl`.
 
 use glam::{Vec2, Vec3};
 

@@ -1,6 +1,5 @@
-//! Elliptical weighted average with cached weights: textures of the same size that a material looks up at a point share
-//! them. Most textures of a model have the same size, and the weights take most of the time of a lookup. The bits are
-//! those of [`super::texture::ewa_color`].
+//! Elliptical weighted average with cached weights, shared by textures of the same size that a material looks up at a
+//! point: usually all, and weights take most of the time. The bits are those of [`super::texture::ewa_color`].
 
 use std::cell::RefCell;
 use std::sync::LazyLock;
@@ -13,7 +12,7 @@ use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color,
 use super::texture::level_of_length;
 use crate::records::{FLOAT, LINEAR8, Packed, SRGB8, Texture};
 
-/// Returns the same as `ewa_color` of `shaders/texture.wgsl`.
+/// Returns the same as `ewa_color`.
 pub fn color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
     LAST.with_borrow_mut(|kernel| {
         let key = Key::of(t, f);
@@ -34,7 +33,7 @@ struct Key {
     size: [u32; 2],
     levels: u32,
     wrap: u32,
-    /// The footprint and the maximum anisotropy, as bits.
+    /// Footprint and maximum anisotropy, as bits.
     place: [u32; 7],
 }
 
@@ -49,24 +48,22 @@ impl Key {
     }
 }
 
-/// The texels in a footprint and their weights.
 struct Kernel {
     key: Key,
-    /// Weights of the finer level, and of the next one if both are blended.
+    /// Finer level, and the next one if both are blended.
     levels: [Weights; 2],
     finer: u32,
     /// Share of the coarser level.
     between: f32,
 }
 
-/// The texels of a level in a footprint and their weights.
 struct Weights {
     /// Index within the level.
     texels: Vec<u32>,
     weights: Vec<f32>,
-    /// Index of the first texel with a weight above 0; the sum is one of differences to it.
+    /// First texel with a weight above 0; the sum is of differences to it.
     base: usize,
-    /// Inverse of the sum of the weights; 0 if that is 0.
+    /// 1 / (sum of the weights), or 0.
     scale: f32,
 }
 
@@ -169,7 +166,6 @@ impl Weights {
         self.scale = if total > 0.0 { 1.0 / total } else { 0.0 };
     }
 
-    /// Returns the weighted mean of the colors of a level.
     fn mean(&self, texels: &[u32], format: u32) -> Vec3 {
         let table = match format {
             FLOAT => return self.mean_of(|i| Vec3::from_slice(bytemuck::cast_slice(&texels[3 * i..3 * i + 3]))),
@@ -195,7 +191,7 @@ impl Weights {
 static SRGB: LazyLock<Table> = LazyLock::new(|| Table::new(SRGB8));
 static LINEAR: LazyLock<Table> = LazyLock::new(|| Table::new(LINEAR8));
 
-/// Table of [`unpacked_color`], indexed by the exponent and nine digits.
+/// [`unpacked_color`] by the exponent and nine digits.
 struct Table(Box<[f32; 1 << 14]>);
 
 impl Table {

@@ -1,4 +1,4 @@
-//! Twin of `shaders/filter.wgsl`: reconstruction filters by importance sampling.
+//! Twin of `shaders/filter.wgsl`.
 
 use super::math::max;
 

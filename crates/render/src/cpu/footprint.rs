@@ -1,4 +1,4 @@
-//! Twin of `shaders/footprint.wgsl`: the footprint of a sample on a surface, in texture coordinates.
+//! Twin of `shaders/footprint.wgsl`.
 
 use glam::{Vec2, Vec3};
 

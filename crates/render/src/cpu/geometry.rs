@@ -1,4 +1,4 @@
-//! Twin of `shaders/geometry.wgsl` and `shaders/meshes.wgsl`: closest hits, occlusion and surface properties.
+//! Twin of `shaders/geometry.wgsl` and `shaders/meshes.wgsl`.
 
 use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4Swizzles as _};

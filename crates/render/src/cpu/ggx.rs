@@ -91,7 +91,7 @@ mod tests {
     use super::*;
     use crate::cpu::rng::{hash4, unit_float};
 
-    /// Roughness pairs (alpha_x, alpha_y).
+    /// (alpha_x, alpha_y).
     const ALPHAS: [(f64, f64); 8] = [
         (0.001, 0.001),
         (0.02, 0.02),
@@ -112,8 +112,8 @@ mod tests {
         DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
     }
 
-    /// Integrates over the hemisphere of microfacet normals. The slopes are x = ax tan(angle) cos(longitude) and y = ay
-    /// tan(angle) sin(longitude), which concentrates the steps where the distribution is large.
+    /// Integrates over microfacet normals. The slopes are x = ax tan(angle) cos(longitude) and y = ay tan(angle)
+    /// sin(longitude), which concentrates steps where the distribution is large.
     fn over_normals((ax, ay): (f64, f64), mut f: impl FnMut(DVec3) -> f64) -> f64 {
         let (rings, spokes) = (400, 400);
         let mut sum = 0.0;
@@ -145,8 +145,7 @@ mod tests {
         for alpha in ALPHAS {
             for (cosine, longitude) in [(1.0, 0.0), (0.7, 0.3), (0.3, 1.5), (0.05, 2.9)] {
                 let wo = unit(cosine, longitude);
-                // The visible fraction G1 of the projected area of all normals that face the viewer is the surface's
-                // projected area.
+                // G1 of the projected area of all normals that face the viewer is the surface's projected area.
                 let facing = over_normals(alpha, |m| {
                     f64::from(ggx_d(pair(alpha), m.as_vec3())) * m.dot(wo.as_dvec3()).max(0.0)
                 });
@@ -175,7 +174,7 @@ mod tests {
     }
 
     /// Returns the chi-square statistic of sampled normals, in standard deviations above its expected value. Cells are
-    /// uniform in the angle and longitude of stretched slopes. `wrong` is a factor of the pdf on one half of the
+    /// uniform in the angle and longitude of stretched slopes. `wrong` is a factor of the pdf on half of the
     /// hemisphere.
     fn chi_square(alpha: (f64, f64), wo: Vec3, wrong: f64) -> f64 {
         const CELLS: usize = 20;
@@ -234,8 +233,7 @@ mod tests {
         }
     }
 
-    /// Returns the single-scattering directional albedo as factors of f0 and f90, integrated over normals with Heitz'
-    /// Lambda.
+    /// Returns the single-scattering albedo as factors of f0 and f90, integrated over normals with Heitz' Lambda.
     fn albedo(alpha: (f64, f64), wo: DVec3) -> (f64, f64) {
         let lambda = |w: DVec3| {
             let tangent2 = ((alpha.0 * w.x).powi(2) + (alpha.1 * w.y).powi(2)) / w.z.powi(2);

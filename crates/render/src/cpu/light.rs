@@ -1,4 +1,4 @@
-//! Twin of `shaders/light.wgsl`: vectors from a point to the samples of a light.
+//! Twin of `shaders/light.wgsl`.
 
 use glam::{Vec2, Vec3};
 

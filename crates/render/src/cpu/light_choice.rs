@@ -1,4 +1,4 @@
-//! Twin of `shaders/light_choice.wgsl`: selection of an emitter by the light tree, and its pdf.
+//! Twin of `shaders/light_choice.wgsl`.
 
 use glam::{UVec2, UVec4, Vec3};
 

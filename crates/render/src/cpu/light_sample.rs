@@ -1,4 +1,4 @@
-//! Twin of `shaders/light_sample.wgsl`: point samples on emitters, and their pdfs.
+//! Twin of `shaders/light_sample.wgsl`.
 
 use std::f32::consts::FRAC_1_PI;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/light_tree.wgsl`: importance sampling of light-tree nodes.
+//! Twin of `shaders/light_tree.wgsl`.
 
 use glam::{BVec4A, Vec3, Vec4};
 

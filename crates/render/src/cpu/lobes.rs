@@ -1,4 +1,4 @@
-//! SIMD evaluation of Phong's lobes for all directions of a block, with the results of `phong_lobes`.
+//! SIMD evaluation of `phong_lobes` for all directions of a block.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
@@ -9,7 +9,7 @@ use super::surface::Surface;
 use super::traversal::{Directions, MOST};
 use crate::records::Material;
 
-/// Returns a mask whose bit i is set if direction i lights the surface, as [`is_lit`](super::phong::is_lit).
+/// Sets bit i if direction i lights the surface ([`is_lit`](super::phong::is_lit)).
 pub fn lit_bits(level: Level, surface: &Surface, to: &Directions) -> u32 {
     dispatch!(level, simd => {
         let mut bits = 0;
@@ -20,8 +20,7 @@ pub fn lit_bits(level: Level, surface: &Surface, to: &Directions) -> u32 {
     })
 }
 
-/// Returns [`phong_lobes`](super::phong::phong_lobes) in all these directions: the diffuse values, then the specular
-/// ones.
+/// Returns [`phong_lobes`](super::phong::phong_lobes) in all directions: diffuse values, then specular ones.
 pub fn lobes_of_all(
     level: Level,
     surface: &Surface,
@@ -88,7 +87,7 @@ fn dot_vector<S: Simd>(a: Vec3, [x, y, z]: &[S::f32s; 3]) -> S::f32s {
     *x * a.x + *y * a.y + *z * a.z
 }
 
-/// Returns one SIMD vector of directions, from index i on.
+/// Returns a SIMD vector of directions from index i on.
 #[inline(always)]
 fn components<S: Simd>(simd: S, to: &Directions, i: usize) -> [S::f32s; 3] {
     let [x, y, z] = &to.along;
@@ -131,7 +130,6 @@ mod tests {
         }
     }
 
-    /// Every instruction set gives the bits of the functions for one sample.
     #[test]
     fn simd_equals_scalar() {
         let to = LightSegments {

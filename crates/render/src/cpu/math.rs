@@ -1,4 +1,4 @@
-//! Twin of `shaders/math.wgsl`: arithmetic with the same bits on every device.
+//! Twin of `shaders/math.wgsl`.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 

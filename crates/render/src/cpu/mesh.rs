@@ -1,4 +1,4 @@
-//! Twin of `shaders/mesh.wgsl`: intersection and surface properties of mesh triangles.
+//! Twin of `shaders/mesh.wgsl`.
 
 use glam::{UVec2, Vec2, Vec3, Vec4};
 

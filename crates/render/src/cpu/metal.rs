@@ -1,4 +1,4 @@
-//! Twin of `shaders/metal.wgsl`: the material `conductor` with roughness or an index of refraction.
+//! Twin of `shaders/metal.wgsl`.
 
 use glam::{Vec2, Vec3};
 
@@ -74,7 +74,6 @@ pub fn metal_sample(material: &Material, wo: Vec3, u: Vec2) -> LobeSample {
 mod tests {
     use super::*;
 
-    /// A complex number.
     #[derive(Clone, Copy)]
     struct Complex(f64, f64);
 
@@ -96,11 +95,10 @@ mod tests {
         }
     }
 
-    /// Returns the reflectance from Fresnel's amplitudes with a complex index.
     fn by_amplitudes(eta: f64, k: f64, c: f64) -> f64 {
         let n = Complex(eta, k);
         let n2 = n.times(n);
-        // The index times the cosine of the refracted ray: sqrt(n^2 - sin^2).
+        // The index times the refracted cosine: sqrt(n^2 - sin^2).
         let nt = n2.plus(Complex(1.0 - c * c, 0.0), -1.0).root();
         let s = Complex(c, 0.0);
         let s_ratio = s.plus(nt, -1.0).square() / s.plus(nt, 1.0).square();
@@ -129,7 +127,7 @@ mod tests {
                 );
             }
         }
-        // With k = 0 the result is that of a dielectric.
+        // k = 0 is a dielectric.
         let glass =
             crate::cpu::specular::fresnel(0.6, crate::cpu::specular::refracted_cosine(0.6, 1.0 / 1.5), 1.0 / 1.5);
         assert!((conductor_fresnel(1.5, 0.0, 0.6) - glass).abs() < 1e-6);

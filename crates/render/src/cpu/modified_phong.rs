@@ -1,4 +1,4 @@
-//! Twin of `shaders/modified_phong.wgsl`: the material `phong` under the integrator `path`.
+//! Twin of `shaders/modified_phong.wgsl`.
 
 use std::f32::consts::FRAC_1_PI;
 

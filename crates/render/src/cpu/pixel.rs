@@ -16,8 +16,7 @@ use super::sequence::sobol_sample;
 use crate::records::{Packed, RANDOM};
 use wgray_scene::Integrator;
 
-/// Returns one sample of a pixel: its weighted radiance and its weight, and its contribution to the layers if they are
-/// enabled.
+/// Returns a sample's weighted radiance and weight, and its contribution to enabled layers.
 pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> (Vec4, Layers) {
     match scene.integrator {
         Integrator::Phong => {

@@ -1,4 +1,4 @@
-//! Twin of `shaders/plane.wgsl`: the infinite plane z = 0 of local space.
+//! Twin of `shaders/plane.wgsl`.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/primitive.wgsl`: dispatch by the kind of a primitive.
+//! Twin of `shaders/primitive.wgsl`.
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/principled.wgsl`: the material `principled`, glTF's metallic-roughness model with its extensions.
+//! Twin of `shaders/principled.wgsl`.
 
 use glam::{Vec2, Vec3, Vec3Swizzles as _, Vec4};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/procedural.wgsl`: checker and line textures, filtered analytically.
+//! Twin of `shaders/procedural.wgsl`.
 
 use std::f32::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/ray.wgsl`: rays, hits, and the local space in which primitives are intersected.
+//! Twin of `shaders/ray.wgsl`.
 
 use glam::{UVec2, Vec2, Vec3};
 

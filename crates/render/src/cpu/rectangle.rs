@@ -1,4 +1,4 @@
-//! Twin of `shaders/rectangle.wgsl`: the rectangle |x| <= 1, |y| <= 1, z = 0 of local space.
+//! Twin of `shaders/rectangle.wgsl`.
 
 use glam::Vec3;
 
@@ -26,7 +26,7 @@ mod tests {
     use crate::pack::primitive;
     use crate::records::{INFINITE_T, RECTANGLE};
 
-    /// Returns a rectangle in the plane y = 1 with the half edges (2, 0, 0) and (0, 0, 1).
+    /// Returns a rectangle in y = 1 with half edges (2, 0, 0) and (0, 0, 1).
     fn rectangle() -> Primitive {
         let columns = DMat3::from_cols(DVec3::X * 2.0, DVec3::Z, -DVec3::Y);
         primitive(RECTANGLE, DVec3::new(0.0, 1.0, 0.0), columns, 0, 0)

@@ -1,4 +1,4 @@
-//! CPU backend: evaluates the twin functions of the kernels on a thread pool.
+//! CPU backend: evaluates the kernels' twins on a thread pool.
 
 use std::ops::Range;
 
@@ -14,8 +14,7 @@ use crate::film::{Film, Layer};
 use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
 
-/// The CPU backend of a scene. A submitted dispatch runs in [`Backend::poll`] or [`Backend::wait`], on the current
-/// rayon pool.
+/// A scene's CPU backend. Dispatches run in [`Backend::poll`] or [`Backend::wait`], on the current rayon pool.
 pub struct Cpu<'a> {
     scene: &'a Packed,
     rules: Rules,
@@ -45,7 +44,7 @@ impl<'a> Cpu<'a> {
     }
 }
 
-/// Maximum number of pixels of a row per task.
+/// Maximum pixels of a row per task.
 const RUN: usize = 32;
 
 impl Backend for Cpu<'_> {
@@ -114,7 +113,7 @@ impl Backend for Cpu<'_> {
     }
 }
 
-/// Adds samples to a tile of a film. Under adaptive sampling they are either pilot samples or later ones.
+/// Adds samples to a tile: under adaptive sampling either pilot samples or later ones.
 fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32>) {
     let Film {
         region,
@@ -170,7 +169,7 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
     });
 }
 
-/// A segment of a row of the film. Lists are empty if the film has none or if they are read-only.
+/// A segment of a film row. Missing and read-only lists are empty.
 struct Run<'a> {
     first: UVec2,
     sums: &'a mut [Vec4],
@@ -197,8 +196,8 @@ impl Run<'_> {
     }
 }
 
-/// Splits the records of a tile, whose film covers `region`, into segments of rows, each with its first pixel. Returns
-/// no segments if `records` is empty.
+/// Splits a tile's records, whose film covers `region`, into segments of rows, with their first pixels; none if
+/// `records` is empty.
 fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut [Vec4])> {
     let rows = records.chunks_mut(region.width() as usize).enumerate();
     let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
@@ -210,7 +209,7 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
     .collect()
 }
 
-/// Adds pilot samples to a pixel, like `shaders/kernels/adaptive.wgsl`.
+/// See `shaders/kernels/adaptive.wgsl`.
 fn add_pilot_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
     for sample in samples {
         let (value, layers) = pixel_radiance(scene, pixel, sample);
@@ -222,7 +221,7 @@ fn add_pilot_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mu
     run.pilot_sums[x] = pilot_finish(run.pilot_sums[x], run.sums[x], run.moments[x]);
 }
 
-/// Adds samples after the pilot samples to a pixel, as many as its neighbors' pilot samples require.
+/// Adds samples after the pilot samples, as many as the neighbors' require.
 fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, pilot_sums: Vec4) {
     let s = &scene.specialization;
     let end = samples_wanted(

@@ -1,4 +1,4 @@
-//! SIMD evaluation of all samples of a block, with the results of `block_sample` and `segment`.
+//! SIMD evaluation of `block_sample` and `segment` for all samples of a block.
 
 use std::sync::LazyLock;
 
@@ -9,10 +9,10 @@ use super::shadow::{SampleBlock, block_sample};
 use super::traversal::{Directions, MOST};
 use crate::records::GRID;
 
-/// The SIMD instruction set of this processor.
+/// Instruction set of this processor.
 pub static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 
-/// The samples of a block on the unit square. Unused lanes repeat the first one.
+/// Samples on the unit square. Unused lanes repeat the first one.
 pub struct Samples {
     count: usize,
     x: [f32; MOST],
@@ -20,7 +20,6 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Returns the samples of a block.
     pub fn of(block: SampleBlock) -> Samples {
         let count = block.count as usize;
         let first = block_sample(block, 0);

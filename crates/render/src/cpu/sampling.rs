@@ -1,4 +1,4 @@
-//! Twin of `shaders/sampling.wgsl`: sample patterns on the unit square.
+//! Twin of `shaders/sampling.wgsl`.
 
 use glam::{UVec2, UVec4, Vec2};
 

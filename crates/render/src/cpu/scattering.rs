@@ -1,4 +1,4 @@
-//! Twin of `shaders/scattering.wgsl`: scattering at a surface for all material kinds.
+//! Twin of `shaders/scattering.wgsl`.
 
 use glam::{Vec2, Vec3, Vec4};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/sequence.wgsl`: low-discrepancy sequences on the unit square, randomized by integer hashing.
+//! Twin of `shaders/sequence.wgsl`.
 
 use glam::{UVec2, Vec2};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/shadow.wgsl`: shadow rays from a point to a block of samples of a light.
+//! Twin of `shaders/shadow.wgsl`.
 
 use glam::{UVec2, Vec2, Vec3};
 

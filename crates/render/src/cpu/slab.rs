@@ -1,4 +1,4 @@
-//! Twin of `shaders/slab.wgsl`: intersection of rays with axis-aligned boxes.
+//! Twin of `shaders/slab.wgsl`.
 
 use glam::{Vec2, Vec3};
 

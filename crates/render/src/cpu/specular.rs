@@ -1,4 +1,4 @@
-//! Twin of `shaders/specular.wgsl`: specular reflection and refraction.
+//! Twin of `shaders/specular.wgsl`.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/surface.wgsl`: the point where a ray hits a surface.
+//! Twin of `shaders/surface.wgsl`.
 
 use glam::{UVec2, Vec2, Vec3};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/texture.wgsl`: texture lookups and filters, and their application to materials.
+//! Twin of `shaders/texture.wgsl`.
 
 use glam::{Vec2, Vec3};
 

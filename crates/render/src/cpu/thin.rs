@@ -1,4 +1,4 @@
-//! Twin of `shaders/thin.wgsl`: the material `dielectric` as a thin sheet.
+//! Twin of `shaders/thin.wgsl`.
 
 use glam::{Vec2, Vec3};
 

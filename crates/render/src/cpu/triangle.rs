@@ -1,4 +1,4 @@
-//! Twin of `shaders/triangle.wgsl`: the triangle x >= 0, y >= 0, x + y <= 1, z = 0 of local space.
+//! Twin of `shaders/triangle.wgsl`.
 
 use glam::Vec3;
 

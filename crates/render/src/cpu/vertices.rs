@@ -1,4 +1,4 @@
-//! Twin of `shaders/vertices.wgsl`: vertex colors, and further sets of texture coordinates.
+//! Twin of `shaders/vertices.wgsl`.
 
 use glam::{UVec4, Vec2, Vec3, Vec4};
 

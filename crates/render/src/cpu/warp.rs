@@ -1,4 +1,4 @@
-//! Twin of `shaders/warp.wgsl`: mappings from the unit square to points and directions.
+//! Twin of `shaders/warp.wgsl`.
 
 use glam::{Vec2, Vec3};
 

@@ -10,16 +10,16 @@ use wgray_image::panic_guard::catch_panic;
 pub const HOW_TO_GET_VULKAN: &str =
     "on Debian, 'apt-get install mesa-vulkan-drivers' installs software Vulkan (lavapipe)";
 
-/// Requested device.
+/// A requested device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AdapterChoice {
     /// A physical GPU, else software Vulkan.
     Auto,
     /// Any adapter.
     Gpu,
-    /// The adapter with this number in [`adapters`], from 1, or with this text in its name, driver or type. A number
-    /// outside the list must be a whole word of a name, such as 7900. Of several adapters with the same name, the first
-    /// that can be opened is used.
+    /// The adapter with this number in [`adapters`], from 1, or this text in its name, driver or type. Larger numbers
+    /// must be a whole word of a name, such as 7900. Of several adapters with the same name, the first that can be
+    /// opened is used.
     Named(String),
 }
 
@@ -38,16 +38,16 @@ pub struct GpuInfo {
     pub exact: bool,
     /// Supported float controls, requested if `exact`.
     pub float_controls: FloatControls,
-    /// Maximum size of a storage buffer binding in bytes.
+    /// Maximum storage buffer binding in bytes.
     pub largest_binding: u64,
-    /// Maximum size of a buffer in bytes.
+    /// Maximum buffer size in bytes.
     pub largest_buffer: u64,
-    /// Maximum number of storage buffers in a shader.
+    /// Maximum storage buffers in a shader.
     pub storage_buffers: u32,
 }
 
 impl GpuInfo {
-    /// Returns true if the adapter computes on the CPU, such as lavapipe and SwiftShader.
+    /// Returns true for adapters on the CPU, such as lavapipe and SwiftShader.
     pub fn is_software(&self) -> bool {
         self.kind == SOFTWARE
     }
@@ -55,7 +55,7 @@ impl GpuInfo {
 
 const SOFTWARE: &str = "software";
 
-/// Returns all adapters that wgpu finds, in the order of preference.
+/// Returns all adapters, in the order of preference.
 pub fn adapters() -> Vec<GpuInfo> {
     enumerate().iter().map(info).collect()
 }
@@ -74,7 +74,7 @@ pub fn preferred(choice: &AdapterChoice) -> Result<GpuInfo, RenderError> {
 
 pub(super) const NONE_FOUND: &str = "no Vulkan, Metal or DX12 adapter found; ";
 
-/// Returns the indices of the matching adapters, best first. The error is a message for the user.
+/// Returns the matching adapters, best first. The error is a message for the user.
 pub(super) fn fitting(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<usize>, String> {
     let AdapterChoice::Named(name) = choice else {
         return Ok((0..infos.len()).collect());
@@ -119,7 +119,7 @@ pub(super) fn fitting(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<u
 }
 
 pub(super) fn enumerate() -> Vec<wgpu::Adapter> {
-    // wgpu may panic while a driver is being reset. No adapter is listed then.
+    // wgpu may panic while a driver is being reset; no adapter then.
     let adapters = catch_panic(|| {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
@@ -129,8 +129,8 @@ pub(super) fn enumerate() -> Vec<wgpu::Adapter> {
     adapters
 }
 
-/// Sort key of an adapter; the minimum is the best. Lavapipe precedes SwiftShader, since it is many times faster. Other
-/// adapters of the same type keep the order of the system.
+/// Returns the sort key of an adapter, lowest first. Lavapipe precedes SwiftShader, since it is many times faster.
+/// Other adapters of a type keep the system's order.
 fn preference(info: &wgpu::AdapterInfo) -> (u8, bool) {
     let kind = match info.device_type {
         DeviceType::DiscreteGpu => 0,
@@ -169,14 +169,13 @@ pub(super) fn info(adapter: &wgpu::Adapter) -> GpuInfo {
     }
 }
 
-/// Returns true if a text contains a whole word: `7900` in "Radeon RX 7900 XT", but not `15` in "llvmpipe (LLVM
-/// 15.0.6)".
+/// Returns true for a whole word: `7900` in "Radeon RX 7900 XT", but not `15` in "llvmpipe (LLVM 15.0.6)".
 fn has_word(text: &str, word: &str) -> bool {
     let mut words = text.split(|c: char| !c.is_alphanumeric() && c != '.');
     words.any(|known| known == word)
 }
 
-/// Returns true if part of the name, driver or type matches, ignoring case.
+/// Ignores case.
 fn matches(info: &GpuInfo, name: &str) -> bool {
     let name = name.to_lowercase();
     let lavapipe = if is_lavapipe(&info.name) { "lavapipe" } else { "" };

@@ -1,5 +1,6 @@
-//! Baking: small scenes are embedded in their kernel as constants. The functions of `buffers.wgsl` become straight-line
-//! code with a statement per primitive. Software Vulkan loads buffers lane by lane, but constants at no cost.
+//! Baking: small scenes are embedded in their kernel as constants, and the functions of `buffers.wgsl` become
+//! straight-line code with a statement per primitive. Software Vulkan loads buffers lane by lane, but constants at no
+//! cost.
 
 use std::fmt::Write;
 
@@ -12,13 +13,12 @@ use crate::records::{
     Texture,
 };
 
-/// Maximum number of materials, lights and textures of a baked scene. Compile time grows faster than linearly with
-/// them.
+/// Maximum number of materials, lights and textures of a baked scene: compile time grows faster than linearly.
 pub const MAX_RECORDS: usize = 512;
 
 /// Returns [`bake`] if the scene is small enough.
 pub fn bake_if_small(packed: &Packed) -> Option<String> {
-    // Lights selected by a light tree are read from buffers.
+    // Lights in a light tree are read from buffers.
     let lights = if packed.lighting.nodes.is_empty() {
         packed.lighting.lights.len()
     } else {
@@ -29,7 +29,7 @@ pub fn bake_if_small(packed: &Packed) -> Option<String> {
     (packed.primitives.len() <= MAX_LINEAR_PRIMITIVES && records <= MAX_RECORDS).then(|| bake(packed))
 }
 
-/// Returns WGSL for one scene: the functions of `buffers.wgsl`, and those that load records.
+/// Returns WGSL for one scene: `buffers.wgsl`, and functions that load records.
 pub fn bake(packed: &Packed) -> String {
     let mut out = String::new();
     let records: Vec<String> = packed.primitives.iter().map(Record::constant).collect();
@@ -131,7 +131,7 @@ pub fn bake(packed: &Packed) -> String {
     out
 }
 
-/// Returns WGSL of the functions that load records from the rows of one buffer, in the order of [`rows`].
+/// Returns WGSL functions that load records from the rows of one buffer, in the order of [`rows`].
 pub fn tables() -> String {
     let mut out = String::new();
     from_rows::<Material>(&mut out, "load_material", "records", "0u");
@@ -142,7 +142,7 @@ pub fn tables() -> String {
     out
 }
 
-/// Returns WGSL of the functions that load records of BVHs and meshes, which are never baked.
+/// Returns WGSL functions that load records of BVHs and meshes, never baked.
 pub fn tree_tables() -> String {
     let mut out = String::new();
     from_rows::<BvhItem>(&mut out, "load_item", "nodes", "counts.tree.x");
@@ -153,7 +153,7 @@ pub fn tree_tables() -> String {
     out
 }
 
-/// Returns the rows of materials, lights, textures, emitters, lookups, the light tree and the indices of its leaves.
+/// Returns the rows of materials, lights, textures, emitters, lookups, light tree and its leaves' indices.
 pub fn rows(packed: &Packed) -> Vec<UVec4> {
     let bytes = [
         cast_slice(&packed.materials),
@@ -168,7 +168,7 @@ pub fn rows(packed: &Packed) -> Vec<UVec4> {
     rows
 }
 
-/// Returns the rows of the BVHs, their items and the instances.
+/// Returns the rows of BVHs, items and instances.
 pub fn node_rows(packed: &Packed) -> Vec<UVec4> {
     let mut out: Vec<UVec4> = cast_slice(&packed.bvh.nodes).to_vec();
     out.extend(cast_slice::<_, UVec4>(&packed.bvh.items));
@@ -180,8 +180,8 @@ pub fn node_rows(packed: &Packed) -> Vec<UVec4> {
     out
 }
 
-/// Returns the rows of each mesh: triangles, vertices, vertex attributes, tangents, triangle groups, vertex colors and
-/// additional texture coordinates.
+/// Returns each mesh's rows: triangles, vertices, vertex attributes, tangents, triangle groups, vertex colors and
+/// further texture coordinates.
 pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
     let mut out = Vec::new();
     for mesh in &packed.bvh.meshes {
@@ -196,7 +196,6 @@ pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
     out
 }
 
-/// Returns the number of rows of [`node_rows`].
 pub fn node_rows_count(packed: &Packed) -> usize {
     let rows_of = |nodes: &[Node]| size_of_val(nodes) / size_of::<UVec4>();
     let of_meshes: usize = packed.bvh.meshes.iter().map(|mesh| rows_of(&mesh.nodes)).sum();
@@ -204,7 +203,6 @@ pub fn node_rows_count(packed: &Packed) -> usize {
     rows_of(&packed.bvh.nodes) + records / size_of::<UVec4>() + packed.bvh.group_words.len().div_ceil(4) + of_meshes
 }
 
-/// Returns the number of rows of [`mesh_rows`].
 pub fn mesh_rows_count(packed: &Packed) -> usize {
     let rows = packed.bvh.meshes.iter().map(|mesh| {
         let of_vertices = mesh.vertices.len()
@@ -217,7 +215,7 @@ pub fn mesh_rows_count(packed: &Packed) -> usize {
     rows.sum()
 }
 
-/// Packs words in rows of four, padded with zeros.
+/// Packs words in rows of four, zero-padded.
 fn in_rows(words: &[u32]) -> impl Iterator<Item = UVec4> {
     words.chunks(4).map(|words| {
         let word = |i: usize| words.get(i).copied().unwrap_or(0);
@@ -225,7 +223,7 @@ fn in_rows(words: &[u32]) -> impl Iterator<Item = UVec4> {
     })
 }
 
-/// Writes a function that loads record `i` of a table that starts at a row of a buffer.
+/// Writes a function that loads record `i` of a table in a buffer.
 fn from_rows<R: Record>(out: &mut String, name: &str, buffer: &str, start: &str) {
     let (record, size) = (R::NAME, size_of::<R>() / size_of::<UVec4>());
     let _ = writeln!(
@@ -235,7 +233,6 @@ fn from_rows<R: Record>(out: &mut String, name: &str, buffer: &str, start: &str)
     from_row::<R>(out, buffer);
 }
 
-/// Writes the body of a function that loads the record at row `at` of a buffer.
 fn from_row<R: Record>(out: &mut String, buffer: &str) {
     for row in 0..size_of::<R>() / size_of::<UVec4>() {
         let _ = writeln!(out, "    let r{row} = {buffer}[at + {row}u];");
@@ -249,7 +246,7 @@ fn write_function(out: &mut String, signature: &str, start: &str, result: &str, 
     let _ = writeln!(out, "    return {result};\n}}");
 }
 
-/// Writes a function from an index to a constant record, as a chain of selections.
+/// Writes a function from an index to a constant record: a chain of selections.
 fn write_table<R: Record>(out: &mut String, name: &str, records: &[R]) {
     let record = R::NAME;
     let first = records.first().map_or(format!("{record}()"), R::constant);

@@ -16,7 +16,7 @@ use super::spirv;
 use crate::error::ShaderError;
 use crate::records::Specialization;
 
-/// A kernel that naga accepts.
+/// A kernel accepted by naga.
 pub struct ValidKernel {
     module: Module,
     info: ModuleInfo,
@@ -27,7 +27,7 @@ pub fn check(source: &Source) -> Result<ValidKernel, ShaderError> {
     check_at(source).map_err(|(error, _)| error)
 }
 
-/// Parses and validates a kernel. Errors include the byte offset in the whole text, if known.
+/// Errors include the byte offset in the whole text, if known.
 pub fn check_at(source: &Source) -> Result<ValidKernel, (ShaderError, Option<usize>)> {
     let start = |span: Option<Span>| span.and_then(Span::to_range).map(|range| range.start);
     if let Some((place, rule)) = too_deep(&source.text) {
@@ -53,19 +53,18 @@ fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>
 }
 
 impl ValidKernel {
-    /// Returns the module of naga.
     pub(super) fn module(&self) -> &Module {
         &self.module
     }
 
-    /// Returns whether an entry point writes a variable, itself or in functions that it calls.
+    /// Returns true if an entry point writes a variable, even in called functions.
     pub(super) fn writes(&self, entry: &str, variable: Handle<GlobalVariable>) -> bool {
         let position = self.module.entry_points.iter().position(|known| known.name == entry);
         let usage = position.map(|i| self.info.get_entry_point(i)[variable]);
         usage.is_some_and(|usage| usage.intersects(GlobalUse::WRITE | GlobalUse::ATOMIC))
     }
 
-    /// Returns the SPIR-V of a specialized kernel, whose float operations are executed exactly as written.
+    /// Returns the SPIR-V of a specialized kernel, executed exactly as written.
     pub fn exact_spirv(
         &self,
         kernel: &Kernel,
@@ -76,8 +75,7 @@ impl ValidKernel {
         self.exact_entry(kernel.entry_point, &constants.constants(), rounding, controls)
     }
 
-    /// Returns the SPIR-V of any compute entry point with these values of overrides, whose float operations are
-    /// executed exactly as written.
+    /// Returns the SPIR-V of any compute entry point with these overrides, executed exactly as written.
     pub fn exact_entry(
         &self,
         entry: &str,
@@ -100,7 +98,7 @@ impl ValidKernel {
         let mut module = specialised.into_owned();
         prune(&mut module);
         let info = validate(&module).map_err(|error| ShaderError::other("specialisation", &error))?;
-        // naga need not bound loops, because each loop of the kernels counts to a bound.
+        // Unbounded by naga, because each loop of the kernels counts to a bound.
         let options = spv::Options {
             lang_version: (1, 3),
             force_loop_bounding: false,
@@ -122,7 +120,7 @@ impl ValidKernel {
         Ok(spirv::ask_for(controls, &spirv::forbid_contraction(&words)))
     }
 
-    /// Returns the kernel with quotients and square roots replaced by functions of `shaders/rounding.wgsl`.
+    /// Replaces quotients and square roots by functions of `shaders/rounding.wgsl`.
     fn rounded_in_software(&self) -> Result<ValidKernel, ShaderError> {
         let mut module = self.module.clone();
         round_in_software(&mut module, &self.info).map_err(|error| ShaderError::other(ROUNDING, &error))?;

@@ -16,7 +16,7 @@ use wgray_shaders::{
 };
 pub use wgray_shaders::{File, SHARED, built_in};
 
-/// File of the software division and square roots.
+/// Software division and square roots.
 pub const ROUNDING: &str = "rounding.wgsl";
 
 /// A compute shader.
@@ -24,8 +24,8 @@ pub const ROUNDING: &str = "rounding.wgsl";
 pub struct Kernel {
     /// Name of the entry point.
     pub entry_point: &'static str,
-    /// Files in addition to [`SHARED`], the scene and an integrator. The last one contains the entry point and declares
-    /// its outputs.
+    /// Files besides [`SHARED`], the scene and an integrator. The last one has the entry point and declares its
+    /// outputs.
     pub files: &'static [&'static [File]],
     /// True if the kernel needs an integrator.
     pub integrates: bool,
@@ -43,7 +43,7 @@ pub static ADAPTIVE: Kernel = Kernel {
     files: &[KERNEL, SAMPLES, ADAPTIVE_FILE],
     integrates: true,
 };
-/// Writes the first hit of the ray through each pixel center.
+/// Writes the first hits through pixel centers.
 pub static FIRST_HITS: Kernel = Kernel {
     entry_point: "first_hits",
     files: &[KERNEL, FIRST_HITS_FILE],
@@ -60,7 +60,7 @@ fn integrator_files(integrator: Integrator) -> &'static [File] {
 }
 
 impl Kernel {
-    /// Returns the file that contains the entry point.
+    /// Returns the file with the entry point.
     pub fn file(&self) -> &'static str {
         self.files.iter().copied().flatten().last().map_or("", |(name, _)| name)
     }
@@ -72,7 +72,7 @@ pub struct Shaders {
     files: Vec<(String, String)>,
 }
 
-/// Replaces a byte-order mark, which WGSL does not allow, by as many spaces, so that offsets do not change.
+/// Replaces a byte-order mark, not allowed in WGSL, by as many spaces, to keep offsets.
 fn without_mark(text: String) -> String {
     match text.strip_prefix('\u{feff}') {
         Some(rest) => format!("   {rest}"),
@@ -90,7 +90,7 @@ impl Shaders {
         }
     }
 
-    /// Reads the files of the project's `shaders/` from another folder.
+    /// Reads the files of `shaders/` from another folder.
     pub fn read(folder: &Path) -> io::Result<Shaders> {
         let read = |name: &str| {
             let path = folder.join(name);
@@ -103,12 +103,12 @@ impl Shaders {
         })
     }
 
-    /// Returns true if the code is equal, except for comments and white space.
+    /// Returns true if only comments and white space differ.
     pub fn has_same_code(&self, other: &Shaders) -> bool {
         self.files().all(|(name, text)| is_same_code(text, other.text(name)))
     }
 
-    /// Returns the names and contents of all files.
+    /// Returns all names and contents.
     pub fn files(&self) -> impl Iterator<Item = (&str, &str)> {
         self.files.iter().map(|(name, text)| (name.as_str(), text.as_str()))
     }
@@ -121,7 +121,7 @@ impl Shaders {
         self
     }
 
-    /// Returns the shared mathematics only: constants, records and pure functions.
+    /// Returns the shared mathematics: constants, records and pure functions.
     pub fn shared(&self) -> Source {
         let mut source = Source::default();
         source.append(
@@ -133,13 +133,13 @@ impl Shaders {
         source
     }
 
-    /// Composes a kernel. `baked` is the text of the functions that contain the scene as constants; without it, the
-    /// kernel reads the scene from buffers.
+    /// Composes a kernel. `baked` is the text of functions with the scene as constants; without it, the scene is read
+    /// from buffers.
     pub fn compose(&self, kernel: &Kernel, integrator: Integrator, baked: Option<&str>) -> Source {
         self.compose_with_texels(kernel, integrator, baked, None)
     }
 
-    /// Like [`Shaders::compose`]. `texels` is the text of the function that reads texels from several buffers.
+    /// Like [`Shaders::compose`]. `texels` reads texels from several buffers.
     pub fn compose_with_texels(
         &self,
         kernel: &Kernel,
@@ -183,7 +183,7 @@ impl Shaders {
         }
     }
 
-    /// Returns the contents of a file; empty if it does not exist.
+    /// Returns a file's contents, or an empty text.
     pub fn text(&self, name: &str) -> &str {
         self.files
             .iter()
@@ -192,7 +192,7 @@ impl Shaders {
     }
 }
 
-/// Text of a kernel, and the origin of each part.
+/// A kernel's text, and the origin of each part.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Source {
     /// WGSL text.
@@ -228,7 +228,7 @@ impl Source {
         self.text.push_str(&other.text);
     }
 
-    /// Replaces a range inside one file. The line numbers after it do not change.
+    /// Replaces a range inside one file, with as many lines.
     pub fn replaced(&self, range: Range<usize>, with: &str) -> Source {
         let lines = self.text[range.clone()].matches('\n').count();
         let with = with.to_string() + &"\n".repeat(lines);
@@ -263,7 +263,7 @@ impl Source {
         Some(format!("{file}:{line}:{column}"))
     }
 
-    /// Returns the file that a byte of the text is from, its contents, and the offset in it.
+    /// Returns a byte's file, its contents, and the offset in it.
     pub fn locate(&self, offset: usize) -> Option<(&str, &str, usize)> {
         let i = self.parts.partition_point(|part| part.start <= offset).checked_sub(1)?;
         let end = self.parts.get(i + 1).map_or(self.text.len(), |next| next.start);

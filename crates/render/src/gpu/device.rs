@@ -15,11 +15,11 @@ use wgray_image::panic_guard::{CatchPanicOnDrop, catch_panic};
 #[derive(Clone)]
 pub struct Device {
     pub(super) pipelines: PipelineCache,
-    // Dropped in this order. wgpu may panic if the device is lost.
+    // Dropped in this order. wgpu may panic after a device loss.
     pub(super) queue: CatchPanicOnDrop<wgpu::Queue>,
     pub(super) device: CatchPanicOnDrop<wgpu::Device>,
     failure: Failure,
-    /// Properties of its adapter.
+    /// Its adapter.
     pub info: GpuInfo,
 }
 
@@ -27,13 +27,13 @@ pub struct Device {
 ///
 /// # Errors
 ///
-/// [`RenderError::NoDevice`] if no adapter matches, or if adapters of different names do. If no matching adapter can be
-/// opened, the error of the last one.
+/// [`RenderError::NoDevice`] if no adapter matches, or adapters of different names do; else the error of the last one
+/// that cannot be opened.
 pub fn choose(choice: &AdapterChoice) -> Result<Device, RenderError> {
     choose_among(choice, &|_| true)
 }
 
-/// Like [`choose`], but only among the adapters for which `wanted` is true.
+/// Like [`choose`], among adapters that are `wanted`.
 ///
 /// # Errors
 ///
@@ -94,12 +94,12 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
 }
 
 impl Device {
-    /// Returns the wgpu handles, for other kernels than those of the renderer.
+    /// Returns the wgpu handles, for kernels other than the renderer's.
     pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.device, &self.queue)
     }
 
-    /// Makes wgpu calls and returns the first error that they raise.
+    /// Makes wgpu calls and returns their first error.
     pub(super) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, RenderError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
@@ -107,12 +107,12 @@ impl Device {
         let value = catch_panic(calls);
         let errors = [validation.pop(), internal.pop(), memory.pop()].map(pollster::block_on);
         let [validation, internal, memory] = errors;
-        // A failed allocation also invalidates later uses of the buffer. Report the cause.
+        // A failed allocation also invalidates later uses of the buffer: report the cause.
         let first = [memory, validation, internal].into_iter().flatten().next();
         self.failure.judge(&self.info.name, value, first.as_ref())
     }
 
-    /// Returns an error with this message, or the device loss that caused it.
+    /// Returns an error, or the device loss that caused it.
     pub(super) fn error(&self, error: impl std::fmt::Display) -> RenderError {
         self.failure.error(&self.info.name, &error)
     }
@@ -145,7 +145,7 @@ impl Device {
         self.device.create_buffer(&descriptor)
     }
 
-    /// Creates a buffer with these records. An empty list becomes one zeroed record, since bindings cannot be empty.
+    /// Creates a buffer. An empty list becomes a zeroed record, since bindings cannot be empty.
     pub(super) fn upload<T: Pod>(&self, usage: BufferUsages, records: &[T]) -> wgpu::Buffer {
         let none = T::zeroed();
         let contents = if records.is_empty() {
@@ -160,7 +160,7 @@ impl Device {
             mapped_at_creation: true,
         };
         let buffer = self.device.create_buffer(&descriptor);
-        // A buffer without memory cannot be mapped. The enclosing `checked` reports the reason.
+        // Without memory it cannot be mapped. The enclosing `checked` reports the reason.
         if let Ok(mut view) = buffer.get_mapped_range_mut(..) {
             view.slice(..contents.len()).copy_from_slice(contents);
             drop(view);
@@ -187,7 +187,7 @@ impl Device {
         self.mapped(staging)
     }
 
-    /// Starts mapping a buffer, which completes after the work submitted so far.
+    /// Starts mapping a buffer, after the work submitted so far.
     pub(super) fn map(&self, staging: &wgpu::Buffer) -> Mapping {
         let (sender, receiver) = mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, .., move |result| {
@@ -198,7 +198,7 @@ impl Device {
 
     pub(super) fn wait_for(&self, mapping: &Mapping) -> Result<(), RenderError> {
         self.wait()?;
-        // Another thread that waits for the same device may run the callback a little later.
+        // Another thread that waits for the device may run the callback a little later.
         let result = mapping.0.recv().map_err(|error| self.error(error))?;
         result.map_err(|error| self.error(error))
     }
@@ -216,7 +216,7 @@ impl Device {
 pub(super) struct Mapping(mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>);
 
 impl Mapping {
-    /// Returns the result of the mapping once; `None` while it is pending.
+    /// Returns the result once; `None` while pending.
     pub(super) fn done(&self) -> Option<Result<(), String>> {
         match self.0.try_recv() {
             Ok(result) => Some(result.map_err(|error| error.to_string())),

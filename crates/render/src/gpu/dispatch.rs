@@ -1,11 +1,11 @@
-//! Generated WGSL functions that call another one for each kind of primitive, with the kind as a constant.
+//! Generated WGSL functions that call another one for each kind of primitive, as a constant.
 
 use std::fmt::Write as _;
 
 use crate::records::{PRIMITIVE_KINDS, PrimitiveForm};
 
-/// Returns WGSL loops over the primitives outside of the BVH, which are sorted by kind. Kernels with a baked scene have
-/// straight-line code for these functions instead.
+/// Returns WGSL loops over the primitives outside of the BVH, sorted by kind. Baked scenes have straight-line code
+/// instead.
 pub fn linear_loops() -> String {
     functions(
         true,
@@ -34,9 +34,8 @@ pub fn linear_loops() -> String {
     )
 }
 
-/// Returns the WGSL tests of a BVH item's primitive in `bvh.wgsl`: the closest hit, the occlusion of light samples, and
-/// the occlusion of a segment. They use loops in place of `if`, because software Vulkan skips a loop that no lane
-/// enters.
+/// Returns the WGSL tests of a BVH item's primitive in `bvh.wgsl`: closest hit, occlusion of light samples and of a
+/// segment. Loops replace `if`, because software Vulkan skips a loop that no lane enters.
 pub fn item_tests() -> String {
     functions(
         false,
@@ -69,8 +68,8 @@ pub fn item_tests() -> String {
     )
 }
 
-/// Writes functions, each given by its signature, first statement, statement per kind (with the name of the kind for
-/// `KIND`) and result. Planes are infinite and therefore not in a BVH.
+/// Writes functions, each given by signature, first statement, statement per kind (named `KIND`) and result. Infinite
+/// planes are not in a BVH.
 fn functions(with_planes: bool, functions: &[(&str, &str, &str, &str)]) -> String {
     let mut out = String::new();
     for (signature, start, statement, result) in functions {

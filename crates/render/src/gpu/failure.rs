@@ -7,15 +7,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::RenderError;
 
-/// Recorded failures of a device. Clones share them.
+/// Failures of a device, shared by clones.
 #[derive(Clone, Default)]
 pub struct Failure(Arc<Mutex<FailureState>>);
 
 #[derive(Default)]
 struct FailureState {
-    /// Reason of the device loss, which is permanent.
+    /// Permanent.
     lost: Option<DeviceFault>,
-    /// First error outside of error scopes, until it is reported.
+    /// First error outside of scopes, until it is reported.
     untold: Option<DeviceFault>,
 }
 
@@ -26,11 +26,11 @@ enum DeviceFault {
     Other(String),
 }
 
-/// Messages of wgpu for a device that the driver lost, and for out-of-memory in an infallible call.
+/// Messages of wgpu after a device loss, and for out-of-memory in an infallible call.
 const LOST: &str = "Device is lost";
 const NO_MEMORY: &str = "Out of memory";
 
-/// Messages of wgpu for a device that cannot be opened: its driver is being reset, or out of memory.
+/// Messages for a device that cannot be opened: its driver is being reset, or out of memory.
 const LOST_AT_OPENING: &str = "Parent device is lost";
 const NO_MEMORY_AT_OPENING: &str = "Not enough memory left.";
 
@@ -64,7 +64,7 @@ impl DeviceFault {
 }
 
 impl Failure {
-    /// Records device loss, and errors outside of error scopes, for which wgpu would panic.
+    /// Records device loss, and errors outside of scopes, for which wgpu would panic.
     pub fn listen(&self, device: &wgpu::Device) {
         let (errors, losses) = (self.clone(), self.clone());
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| errors.keep(DeviceFault::of(&error))));
@@ -87,8 +87,8 @@ impl Failure {
         });
     }
 
-    /// Returns the value of wgpu calls, or an error: a device loss, the first error of the error scopes, an error
-    /// recorded outside of them, or a panic, in this order.
+    /// Returns the value of wgpu calls, or an error: a device loss, the first error of the scopes, one recorded outside
+    /// of them, or a panic, in this order.
     pub fn judge<T>(
         &self,
         device: &str,
@@ -104,7 +104,7 @@ impl Failure {
         }
     }
 
-    /// Returns an error with this message, or the device loss that caused it.
+    /// Returns an error, or the device loss that caused it.
     pub fn error(&self, device: &str, message: &dyn Display) -> RenderError {
         let lost = self.known(|known| known.lost.clone());
         lost.unwrap_or_else(|| DeviceFault::Other(message.to_string()))
@@ -112,7 +112,7 @@ impl Failure {
     }
 }
 
-/// Returns the error for a device that could not be opened.
+/// Returns the error of a device that cannot be opened.
 pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
     let says = |text: &str| {
         let mut causes = std::iter::successors(Some(error), |error| (*error).source());

@@ -1,15 +1,15 @@
 //! Vulkan float controls: guarantees for 32-bit arithmetic that SPIR-V can request.
 
-/// Float controls that a kernel requests or a device supports (Vulkan 1.2, "Float Controls"). Without a request, the
-/// behavior depends on the driver.
+/// Float controls that a kernel requests or a device supports (Vulkan 1.2, "Float Controls"). Without a request,
+/// drivers differ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FloatControls {
-    /// Rounding to nearest even: `RoundingModeRTE`. Otherwise Vulkan allows either neighbor of the exact result.
+    /// Rounding to nearest even: `RoundingModeRTE`. Else Vulkan allows either neighbor of the exact result.
     pub rounding: bool,
-    /// Signed zeros, infinities and NaN: `SignedZeroInfNanPreserve`. Otherwise a driver may assume that infinities and
-    /// NaN do not occur, and that the sign of zero is irrelevant.
+    /// Signed zeros, infinities and NaN: `SignedZeroInfNanPreserve`. Else a driver may assume that infinities and NaN
+    /// do not occur, and ignore the sign of zero.
     pub signed_zeros: bool,
-    /// Denormals: `DenormPreserve`. Otherwise a driver may flush them to zero.
+    /// Denormals: `DenormPreserve`. Else a driver may flush them to zero.
     pub denormals: bool,
 }
 
@@ -27,7 +27,7 @@ impl FloatControls {
         denormals: true,
     };
 
-    /// Returns the float controls that an adapter supports, which requires Vulkan 1.2.
+    /// Returns an adapter's float controls, which require Vulkan 1.2.
     #[cfg(any(windows, target_os = "linux", target_os = "android", target_os = "freebsd"))]
     pub(super) fn of(adapter: &wgpu::Adapter) -> FloatControls {
         use ash::vk;
@@ -49,12 +49,12 @@ impl FloatControls {
                 .raw_instance()
                 .get_physical_device_properties2(vulkan.raw_physical_device(), &mut properties);
         }
-        // Lavapipe of Mesa 22.3.6 converts infinities and NaN to finite numbers if asked to preserve them, and
+        // Lavapipe of Mesa 22.3.6 converts infinities and NaN to finite numbers if asked to preserve them, but
         // preserves them otherwise.
         let lavapipe = vulkan
             .physical_device_capabilities()
             .is_driver(vk::DriverId::MESA_LLVMPIPE);
-        // Without independence, all float widths need the same setting, but kernels only request it for 32 bits.
+        // Without independence, all float widths need the same setting, but kernels only request 32 bits.
         let alone = |independence| independence != vk::ShaderFloatControlsIndependence::NONE;
         FloatControls {
             rounding: found.shader_rounding_mode_rte_float32 == vk::TRUE && alone(found.rounding_mode_independence),
@@ -63,7 +63,6 @@ impl FloatControls {
         }
     }
 
-    /// Returns no float controls on platforms without Vulkan.
     #[cfg(not(any(windows, target_os = "linux", target_os = "android", target_os = "freebsd")))]
     pub(super) fn of(_: &wgpu::Adapter) -> FloatControls {
         FloatControls::NONE

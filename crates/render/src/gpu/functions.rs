@@ -1,20 +1,20 @@
-//! Locations of the functions in a WGSL text, found without a parser because the text may be wrong.
+//! Locations of functions in a WGSL text, without a parser because it may be wrong.
 
 use std::ops::Range;
 
-/// A function in a text, with byte offsets.
+/// A function, with byte offsets.
 pub struct FunctionText<'a> {
     /// Name.
     pub name: &'a str,
     /// Offset of `fn`.
     pub start: usize,
-    /// Return type as written; empty if the function returns nothing.
+    /// Return type as written, or empty.
     pub result: &'a str,
-    /// Body, including both braces.
+    /// Includes both braces.
     pub body: Range<usize>,
 }
 
-/// Returns the functions of a text, up to the first one with unmatched braces.
+/// Returns the functions up to the first unmatched brace.
 pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
     let plain = without_comments(text);
     let mut found = Vec::new();
@@ -30,7 +30,7 @@ pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
         let Some(close) = closing(&plain, open) else { break };
         let head = &plain[start..open];
         let result = head.rfind("->").map_or("", |arrow| &text[start + arrow + 2..open]);
-        // Attributes of a result come before its type.
+        // Attributes of a result precede its type.
         let result = result.rsplit(')').next().unwrap_or_default().trim();
         found.push(FunctionText {
             name,
@@ -43,7 +43,7 @@ pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
     found
 }
 
-/// Returns the text with comments replaced by blanks; byte offsets do not change.
+/// Blanks out comments; byte offsets do not change.
 pub fn without_comments(text: &str) -> String {
     let mut plain = text.as_bytes().to_vec();
     let mut i = 0;
@@ -68,7 +68,7 @@ pub fn without_comments(text: &str) -> String {
     String::from_utf8(plain).unwrap_or_default() // whole characters were replaced
 }
 
-/// Returns true if two texts are equal, except for comments and white space.
+/// Returns true if only comments and white space differ.
 pub fn is_same_code(a: &str, b: &str) -> bool {
     // WGSL nests block comments, and ends line comments at more characters than `\n`.
     let is_simple =
@@ -77,7 +77,6 @@ pub fn is_same_code(a: &str, b: &str) -> bool {
     a == b || (is_simple(a) && is_simple(b) && code(a).split_whitespace().eq(code(b).split_whitespace()))
 }
 
-/// Finds the next occurrence of a word, with no letter or digit beside it.
 fn next_word(text: &str, from: usize, word: &str) -> Option<usize> {
     let part_of_name = |c: char| c.is_alphanumeric() || c == '_';
     text[from..]
@@ -86,7 +85,7 @@ fn next_word(text: &str, from: usize, word: &str) -> Option<usize> {
         .find(|&i| !text[..i].ends_with(part_of_name) && !text[i + word.len()..].starts_with(part_of_name))
 }
 
-/// Returns the offset of the brace that closes the one at `open`.
+/// Returns the closing brace of the one at `open`.
 fn closing(text: &str, open: usize) -> Option<usize> {
     let mut depth = 0usize;
     for (i, byte) in text.bytes().enumerate().skip(open) {

@@ -1,5 +1,5 @@
-//! Checks of the interface between the program and a kernel: entry point, workgroup size, bindings, layouts and
-//! overrides. The built-in kernel is the reference. Devices accept mismatches and render garbage.
+//! Checks of a kernel's interface: entry point, workgroup size, bindings, layouts and overrides. The built-in kernel is
+//! the reference. Devices accept mismatches and render garbage.
 
 use naga::{
     AddressSpace, ArraySize, GlobalVariable, Handle, Module, ShaderStage, Span, StorageAccess, Type, TypeInner,
@@ -12,7 +12,7 @@ use super::naga_messages::type_name;
 use crate::error::ShaderError;
 use wgray_scene::Integrator;
 
-/// Returns the interface errors of a kernel that naga accepts. Outputs are only checked if `whole`, which requires all
+/// Returns the interface errors of a kernel that naga accepts; those of outputs only if `whole`, which requires all
 /// function bodies.
 pub fn mistakes(
     kernel: &Kernel,
@@ -54,7 +54,7 @@ impl Sides<'_> {
         self.found
     }
 
-    /// Checks that the kernel writes all buffers that the program reads back.
+    /// Checks that the kernel writes all buffers that are read back.
     fn results(&mut self, own: &ValidKernel, right: &ValidKernel) {
         let entry = self.kernel.entry_point;
         let at = |module: &Module, binding| {
@@ -94,7 +94,7 @@ impl Sides<'_> {
         self.found.push(error);
     }
 
-    /// Returns the first character of the file that contains a span of the built-in kernel.
+    /// Returns the first character of the file with a span of the built-in kernel.
     fn file_with(&self, span: Span) -> Option<Span> {
         let (file, ..) = self.built_in.locate(span.to_range()?.start)?;
         self.source.start_of(file).map(|start| Span::from(start..start + 1))
@@ -180,7 +180,6 @@ impl Sides<'_> {
         }
     }
 
-    /// Returns how a variable differs from the binding of the program.
     fn difference(&self, variable: &GlobalVariable, known: &GlobalVariable) -> Option<String> {
         let name = variable.name.as_deref().unwrap_or_default();
         if variable.space != known.space {
@@ -251,8 +250,8 @@ struct Layouts<'a> {
 }
 
 impl Layouts<'_> {
-    /// Returns the first difference of two memory layouts. Members may have any names, except that of a reference
-    /// member at another offset.
+    /// Returns the first difference of two memory layouts. Member names are free, except one of the reference at
+    /// another offset.
     fn difference(&self, own: Handle<Type>, right: Handle<Type>, path: &str) -> Option<String> {
         match (&self.own.types[own].inner, &self.right.types[right].inner) {
             (

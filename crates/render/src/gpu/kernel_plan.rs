@@ -1,4 +1,4 @@
-//! The kernel that a device would run for a scene, predicted without opening the device.
+//! Prediction of the kernel for a scene on a device, without opening the device.
 
 use super::adapter::GpuInfo;
 use super::bake::bake_if_small;
@@ -9,17 +9,17 @@ use crate::records::Packed;
 /// The kernel of a scene and its memory use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KernelPlan {
-    /// The kernel's entry point.
+    /// Entry point.
     pub entry: &'static str,
-    /// The scene is part of the kernel's source, as constants.
+    /// The scene is constants in the source.
     pub baked: bool,
     /// Lines of WGSL.
     pub lines: usize,
-    /// Size of the scene's buffers in bytes.
+    /// Bytes of the scene's buffers.
     pub scene_bytes: u64,
 }
 
-/// Predicts the kernel for a packed scene on a device.
+/// Predicts the kernel.
 pub fn plan_kernel(packed: &Packed, info: &GpuInfo) -> KernelPlan {
     let kernel = if packed.sampling.adaptive { &ADAPTIVE } else { &RENDER };
     let baked = info.is_software().then(|| bake_if_small(packed)).flatten();

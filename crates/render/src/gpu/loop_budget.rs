@@ -1,33 +1,32 @@
-//! Maximum number of samples per dispatch for which software Vulkan truncates no loops.
+//! Samples per dispatch for which software Vulkan truncates no loops.
 
 use crate::records::{MAX_PATH_LEAVES, Packed, SAMPLE_BLOCK};
 
-/// Iterations of all loops together after which the llvmpipe of Mesa 22.3 ends every loop of an invocation. An
-/// iteration counts if any lane of the vector needs it.
+/// Iterations of all loops after which Mesa 22.3's llvmpipe ends every loop of an invocation. An iteration counts if
+/// any lane needs it.
 const MAX_ROUNDS: f64 = 65_535.0;
-/// Estimated number of primitives that may occlude a block of light samples.
+/// Primitives that may occlude a block of light samples, estimated.
 const CANDIDATES: f64 = 4.0;
 
-/// Estimated iterations of a BVH traversal: nodes, leaves, triangles.
+/// Iterations of a BVH traversal, estimated: nodes, leaves, triangles.
 const ROUNDS_OF_TREE: f64 = 150.0;
 
 /// Bounces after which Russian roulette has ended nearly all paths: a reflectance of 95 % leaves 0.95^100 = 0.6 %.
 const MAX_ROULETTE_BOUNCES: u32 = 100;
 
-/// Estimated number of surfaces that a ray skips by alpha before a hit.
+/// Surfaces skipped by alpha before a hit, estimated.
 const ROUNDS_OF_PASSING: f64 = 4.0;
 
-/// Estimated iterations of a texture lookup.
 const ROUNDS_OF_LOOKUP: f64 = 8.0;
 
-/// Returns the estimated maximum number of samples per dispatch. If it is too high, a truncated dispatch is repeated
-/// with fewer samples, which only costs time. If it is too low, additional dispatches cost time.
+/// Returns the estimated maximum number of samples per dispatch. Errors only cost time: truncated dispatches are
+/// repeated with fewer samples, and more dispatches take longer.
 pub fn samples_per_dispatch(packed: &Packed, baked: bool) -> u32 {
     let samples = MAX_ROUNDS / rounds_of_sample(packed, baked);
     (samples as u32).max(1)
 }
 
-/// Estimates the loop iterations of one sample; at least 1.
+/// Estimates a sample's loop iterations; at least 1.
 fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
     let s = &packed.specialization;
     let all = packed.kinds().map(|(_, range)| range.len()).sum::<usize>() as f64;
@@ -36,18 +35,18 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
         .map(|count| count.div_ceil(SAMPLE_BLOCK as usize))
         .sum::<usize>() as f64;
     let casters = casting().sum::<usize>() as f64;
-    // Scenes in buffers are read by loops, baked scenes by statements.
+    // Scenes in buffers are read by loops, baked ones by statements.
     let (of_hit, of_lists) = if baked { (0.0, lists) } else { (all, lists + casters) };
     let in_tree = if s.tlas_kinds == 0 { 0.0 } else { ROUNDS_OF_TREE };
     let of_hit = of_hit + in_tree;
     // Camera rays skip camera-invisible surfaces.
     let of_start = 1.0 + f64::from(s.camera_invisible) * (1.0 + of_hit) * 2.0;
     if packed.integrator.follows_paths() {
-        // Each bounce is an iteration, with a BSDF ray, a shadow ray and texture lookups.
+        // Each bounce has a BSDF ray, a shadow ray and texture lookups.
         let to_light = if baked { in_tree } else { casters + in_tree };
         let passing = if s.alpha_surfaces == 0 { 1.0 } else { ROUNDS_OF_PASSING };
         let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(MAX_ROULETTE_BOUNCES)));
-        // Descent of the light tree to select an emitter, and ascent for the PDF of a hit emitter.
+        // Light tree: descent to select an emitter, ascent for the PDF of a hit emitter.
         let levels = 2.0 * f64::from(packed.lighting.nodes.len().max(1).ilog2());
         let of_bounce = 1.0 + of_hit + to_light + levels + f64::from(s.lookups) * ROUNDS_OF_LOOKUP;
         return of_start + (bounces + 1.0) * passing * of_bounce;

@@ -1,8 +1,8 @@
-//! The memory in use on a device, for the message when an allocation fails.
+//! Memory in use on a device, for messages about failed allocations.
 
 use crate::error::RenderError;
 
-/// The memory in use on a device, in bytes.
+/// Memory in use in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Held {
     /// The scene's buffers.
@@ -13,12 +13,12 @@ pub struct Held {
     pub copies: u64,
 }
 
-/// The name of an allocation and its size in bytes.
+/// Name of an allocation, and size in bytes.
 pub type FailedAllocation = (String, u64);
 
 impl Held {
-    /// Adds the failed allocation, if it is known, and the memory in use to an out-of-memory error that has no message
-    /// yet. Other errors are returned unchanged.
+    /// Adds the failed allocation, if known, and the memory in use to an out-of-memory error without a message. Keeps
+    /// other errors.
     pub fn explain(&self, error: RenderError, asked: Option<&FailedAllocation>) -> RenderError {
         match error {
             RenderError::OutOfMemory { device, message: None } => RenderError::OutOfMemory {
@@ -52,7 +52,7 @@ impl Held {
     }
 }
 
-/// Formats a size in MiB with one decimal, so that small sizes are not printed as 0.
+/// Formats MiB with one decimal, so that small sizes are not 0.
 fn mebibytes(bytes: u64) -> String {
     format!("{:.1}", bytes as f64 / f64::from(1 << 20))
 }

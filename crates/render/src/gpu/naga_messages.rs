@@ -1,4 +1,4 @@
-//! Messages of naga, with names of the source in place of naga's indices of types, values and functions.
+//! Messages of naga, with source names in place of naga's indices.
 
 use std::error::Error;
 
@@ -12,7 +12,7 @@ use naga::{Function, Module, Span, Type, WithSpan};
 use super::compose::Source;
 use super::functions::functions;
 
-/// Scalar types in naga's messages, and their WGSL names.
+/// Scalar types of naga, and in WGSL.
 const SCALARS: [(&str, &str); 4] = [
     ("Scalar { kind: Float, width: 4 }", "f32"),
     ("Scalar { kind: Sint, width: 4 }", "i32"),
@@ -20,7 +20,7 @@ const SCALARS: [(&str, &str); 4] = [
     ("Scalar { kind: Bool, width: 1 }", "bool"),
 ];
 
-/// Returns the message of an error in a module that was parsed from `text`.
+/// Returns the message of an error in a module parsed from `text`.
 pub fn message(module: &Module, text: &str, error: &ValidationError) -> String {
     let (function, message) = match error {
         ValidationError::Function { handle, name, source } => (
@@ -42,10 +42,10 @@ pub fn message(module: &Module, text: &str, error: &ValidationError) -> String {
     names.replaced(&message)
 }
 
-/// Returns the location and the message of a parse error.
+/// Returns a parse error's location and message.
 pub fn parse_message(error: &ParseError, source: &Source) -> (Option<Span>, String) {
     let labels: Vec<(Span, &str)> = error.labels().collect();
-    // Prefers the location with the wrong value, not the one that gives the reason.
+    // Prefers the wrong value to the one that gives the reason.
     let has_type = |(_, label): &&(Span, &str)| label.starts_with("this expression has type");
     let chosen = labels.iter().find(has_type).or(labels.first());
     let mut message = without_debug(error.message());
@@ -53,7 +53,7 @@ pub fn parse_message(error: &ParseError, source: &Source) -> (Option<Span>, Stri
     if !label.is_empty() && label != "see msg" && !message.contains(label) {
         message += &format!(" ({label})");
     }
-    // A name that is defined twice: the other definition may be in any file.
+    // The other definition of a name may be in any file.
     let other = labels
         .iter()
         .find(|(_, label)| label.starts_with("previous definition"));
@@ -63,7 +63,7 @@ pub fn parse_message(error: &ParseError, source: &Source) -> (Option<Span>, Stri
     (chosen.map(|(span, _)| *span), message)
 }
 
-/// Returns the location of a validation error.
+/// Returns a validation error's location.
 pub fn place(text: &str, error: &WithSpan<ValidationError>) -> Option<Span> {
     let span = error.spans().map(|(span, _)| *span).last();
     span.or_else(|| match error.as_inner() {
@@ -75,7 +75,7 @@ pub fn place(text: &str, error: &WithSpan<ValidationError>) -> Option<Span> {
     })
 }
 
-/// Removes the fields of Rust's records, such as `Struct { members: … }`.
+/// Removes fields of Rust's records, such as `Struct { members: … }`.
 fn without_debug(message: &str) -> String {
     match (message.find(" { "), message.rfind('}')) {
         (Some(start), Some(end)) if start < end => [&message[..start], &message[end + 1..]].concat(),
@@ -83,7 +83,7 @@ fn without_debug(message: &str) -> String {
     }
 }
 
-/// Returns an error's message with those of its causes.
+/// Returns an error's message with its causes.
 pub fn chain(error: &dyn Error) -> String {
     let mut message = error.to_string();
     let mut source = error.source();
@@ -98,7 +98,7 @@ pub fn chain(error: &dyn Error) -> String {
     message
 }
 
-/// The names of a module, and of the function that has an error.
+/// Names of a module, and of the function with an error.
 struct Names<'a> {
     module: &'a Module,
     text: &'a str,
@@ -106,7 +106,7 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// Returns a message with names in place of indices, `[3]`. The words before an index determine what it refers to.
+    /// Returns a message with names for indices, `[3]`. The words before one determine what it refers to.
     fn replaced(&self, message: &str) -> String {
         let (mut out, mut rest) = (String::new(), message);
         while let Some(start) = rest.find('[') {
@@ -164,7 +164,7 @@ impl Names<'_> {
         self.quoted(self.module.global_expressions.get_span(handle))
     }
 
-    /// Returns the source text of a value of the function, and its type.
+    /// Returns a value's source text and type.
     fn value(&self, i: usize, with_type: bool) -> Option<String> {
         let function = self.function?;
         let (handle, _) = function.expressions.iter().nth(i)?;
@@ -189,7 +189,7 @@ impl Names<'_> {
     }
 }
 
-/// Removes a type in Rust's form, ` (of type …)`, from the start of a message.
+/// Removes a type in Rust's form, ` (of type …)`, from the start.
 fn without_type(message: &str) -> &str {
     if !message.starts_with(" (of type ") {
         return message;
@@ -202,7 +202,6 @@ fn without_type(message: &str) -> &str {
     end.map_or(message, |end| &message[end + 1..])
 }
 
-/// Returns the name of a type in WGSL.
 pub fn type_name(module: &Module, ty: naga::Handle<Type>) -> String {
     let mut out = String::new();
     let written = module.to_ctx().write_type(ty, &mut out);

@@ -1,15 +1,15 @@
-//! Nesting limits of shaders. The recursion of naga would overflow the stack on deeper expressions.
+//! Nesting limits of shaders: on deeper expressions, naga's recursion would overflow the stack.
 
 use std::ops::Range;
 
 use super::functions::without_comments;
 
-/// Maximum depth of operators, brackets and member accesses in an expression.
+/// Maximum depth of operators, brackets and member accesses.
 const OPERATORS: usize = 1000;
 /// Maximum number of `else if` in all enclosing blocks.
 const ALTERNATIVES: usize = 400;
 
-/// Returns the location of code that is nested too deeply, and the violated rule.
+/// Returns the location of too deep code, and the violated rule.
 pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
     let plain = without_comments(text);
     let bytes = plain.as_bytes();

@@ -19,19 +19,19 @@ const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
 const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
 const WRITE: BufferBindingType = BufferBindingType::Storage { read_only: false };
 
-/// The bind groups of `shaders/bindings.wgsl`: per dispatch, per scene, and the shapes of the scene.
+/// Bind groups of `shaders/bindings.wgsl`: per dispatch, per scene, and shapes of the scene.
 pub const GROUPS: [&[BufferBindingType]; 3] = [
     &[UNIFORM, WRITE, WRITE],
     &[UNIFORM, UNIFORM, UNIFORM, UNIFORM, READ, READ],
     &[READ, READ, READ, READ],
 ];
 
-/// Index of the bind group per dispatch. Its last binding contains the slider values, if the kernel has any.
+/// Bind group per dispatch. Its last binding has the slider values, if any.
 pub const DISPATCH_GROUP: usize = 0;
-/// Index of the bind group of the scene. Its last bindings contain the texels.
+/// Bind group of the scene. Its last bindings have the texels.
 pub const SCENE: usize = 1;
 
-/// Number of storage buffers, without those for further texels.
+/// Number of storage buffers, without further texels.
 pub const STORAGE_BUFFERS: usize = {
     let (mut count, mut group) = (0, 0);
     while group < GROUPS.len() {
@@ -50,8 +50,7 @@ pub const STORAGE_BUFFERS: usize = {
 /// WebGPU guarantees 8 storage buffers per shader stage by default.
 const _: () = assert!(STORAGE_BUFFERS <= 8);
 
-/// Returns the bind group layouts of every kernel, with `more_texels` further texel buffers and, if the kernel has
-/// sliders, their values.
+/// Returns every kernel's bind group layouts, with `more_texels` further texel buffers and slider values, if any.
 pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) -> Vec<wgpu::BindGroupLayout> {
     let layout = |(group, types): (usize, &&[BufferBindingType])| {
         let more = match group {
@@ -81,7 +80,7 @@ pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) ->
     GROUPS.iter().enumerate().map(layout).collect()
 }
 
-/// Creates a bind group of buffers, in the order of their bindings.
+/// Creates a bind group of buffers, in binding order.
 pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
     let entries: Vec<wgpu::BindGroupEntry> = (0..)
         .zip(buffers)
@@ -97,9 +96,8 @@ pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&w
     })
 }
 
-/// Compiles a kernel: with `exact` to SPIR-V whose float operations are executed as written, else from WGSL by wgpu.
-/// Both are validated by naga first, so that the error messages are the same. A pipeline in the cache of the device is
-/// returned at once.
+/// Compiles a kernel: with `exact` to SPIR-V that is executed as written, else from WGSL by wgpu. naga validates both
+/// first, for the same error messages. Pipelines in the device's cache are returned at once.
 pub fn pipeline(
     device: &Device,
     layouts: &[wgpu::BindGroupLayout],

@@ -1,4 +1,4 @@
-//! Compiled pipelines of a device, so that a kernel that was compiled before is ready at once.
+//! Compiled pipelines of a device, ready at once.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,7 +7,7 @@ use super::compose::{Kernel, Source};
 use super::rounding::Rounding;
 use crate::records::Specialization;
 
-/// Maximum number of pipelines. The least recently used one is dropped.
+/// Maximum number of pipelines. The least recently used is dropped.
 const CAPACITY: usize = 32;
 
 /// Hash of everything that a pipeline is compiled from.
@@ -15,7 +15,7 @@ const CAPACITY: usize = 32;
 pub struct Key([u8; 32]);
 
 impl Key {
-    /// Returns the key of a kernel. The text determines the bindings.
+    /// Returns a kernel's key. The text determines the bindings.
     pub fn new(kernel: &Kernel, source: &Source, constants: &Specialization, exact: Option<Rounding>) -> Key {
         let mut hasher = blake3::Hasher::new();
         hasher.update(format!("{} {exact:?} {constants:?}\n", kernel.entry_point).as_bytes());
@@ -24,12 +24,11 @@ impl Key {
     }
 }
 
-/// The pipelines, from the least to the most recently used. Clones share them.
+/// From least to most recently used, shared by clones.
 #[derive(Clone, Default)]
 pub struct PipelineCache(Arc<Mutex<VecDeque<(Key, wgpu::ComputePipeline)>>>);
 
 impl PipelineCache {
-    /// Returns a pipeline that was added.
     pub fn get(&self, key: Key) -> Option<wgpu::ComputePipeline> {
         let mut pipelines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let position = pipelines.iter().position(|(known, _)| *known == key)?;
@@ -39,7 +38,6 @@ impl PipelineCache {
         Some(pipeline)
     }
 
-    /// Adds a pipeline.
     pub fn add(&self, key: Key, pipeline: &wgpu::ComputePipeline) {
         let mut pipelines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         pipelines.retain(|(known, _)| *known != key);

@@ -1,4 +1,4 @@
-//! Dead code elimination by the constants of a kernel. Drivers do this too, but after inlining, at far greater cost.
+//! Dead code elimination by a kernel's constants. Drivers do this only after inlining, at far greater cost.
 
 use naga::compact::{KeepUnused, compact};
 use naga::{Arena, Block, Expression, Literal, Module, Statement};
@@ -18,7 +18,7 @@ pub fn prune(module: &mut Module) {
     compact(module, KeepUnused::No);
 }
 
-/// Returns a block without dead branches, and true if it ends in a jump.
+/// Returns a block without dead branches, and true if it jumps at the end.
 fn taken(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
     let mut out = Block::new();
     for (statement, span) in block.span_into_iter() {

@@ -26,11 +26,11 @@ use crate::records::{Camera, DispatchParams, FirstHit, Packed, Specialization};
 use wgray_image::Region;
 use wgray_scene::Integrator;
 
-/// Compilation options of the kernels of a scene.
+/// Compilation options of kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Passthrough of SPIR-V that is executed as written, with this rounding of quotients and square roots. `None` lets
-    /// wgpu compile the WGSL.
+    /// SPIR-V that is executed as written, with this rounding of quotients and square roots. `None` lets wgpu compile
+    /// the WGSL.
     pub exact: Option<Rounding>,
     /// Embeds a small scene in the kernel as constants.
     pub baked: bool,
@@ -55,46 +55,45 @@ pub struct Gpu {
     first_hits: Option<wgpu::ComputePipeline>,
     scene: SceneBuffers,
     work: wgpu::Buffer,
-    /// Completion record of a dispatch: the kernel's buffer, and the mappable copy.
+    /// The kernel's completion record, and its mappable copy.
     completion: [wgpu::Buffer; 2],
     /// Film rows before the last dispatch, for `undo`.
     before: Option<wgpu::Buffer>,
     film: Option<(Target, FilmState)>,
     pending: Option<Pending>,
     rules: Rules,
-    /// Estimated maximum number of samples per dispatch without truncated loops.
+    /// Estimated maximum without truncated loops.
     samples_per_dispatch: u32,
     slider_values: Option<wgpu::Buffer>,
     timer: Option<Timer>,
     dispatches: Vec<Dispatch>,
 }
 
-/// Duration of a dispatch.
+/// A timed dispatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dispatch {
     /// Entry point of the kernel.
     pub kernel: &'static str,
     /// Duration.
     pub took: Duration,
-    /// True if measured by the device, else the time from submission to the observed completion.
+    /// True if measured by the device, else until the observed completion.
     pub by_device: bool,
-    /// Number of pixel samples, or of pixels for kernels without samples.
+    /// Pixel samples, or pixels for kernels without samples.
     pub samples: u64,
 }
 
-/// Submitted work, of which one dispatch is running.
+/// Submitted work; one dispatch is running.
 struct Pending {
     tile: Region,
-    /// Samples that are not known to be in the film.
+    /// Samples not known to be in the film.
     samples: Range<u32>,
     /// End of the samples of the running dispatch.
     end: u32,
     start: Instant,
-    /// Mapping that completes when the dispatch has ended.
+    /// Completes when the dispatch has ended.
     completion: Mapping,
 }
 
-/// Inputs to compile further kernels for the same scene.
 struct Kernels {
     shaders: Shaders,
     integrator: Integrator,
@@ -106,14 +105,14 @@ struct Kernels {
     sliders: Vec<Slider>,
 }
 
-/// A buffer with a record per pixel of a region, and the bind group of the kernel that writes it.
+/// A record per pixel of a region, and the bind group of the kernel that writes it.
 struct Target {
     region: Region,
     buffer: wgpu::Buffer,
     group: wgpu::BindGroup,
 }
 
-/// Film rows that contain a tile: a piece of each of the film's lists, in bytes.
+/// Film rows that contain a tile: a piece of each list, in bytes.
 struct Rows {
     lists: u64,
     list: u64,
@@ -137,7 +136,7 @@ impl Rows {
         self.lists * self.size
     }
 
-    /// Returns the offset of each piece in the film, and in a copy of all pieces.
+    /// Returns each piece's offset in the film, and in a copy of all pieces.
     fn pieces(&self) -> impl Iterator<Item = (u64, u64)> {
         (0..self.lists).map(|i| (i * self.list + self.start, i * self.size))
     }
@@ -145,17 +144,17 @@ impl Rows {
 
 const FIRST_HITS_RECORD: usize = size_of::<FirstHit>();
 
-/// Range of the loop by which each pixel detects truncation. A truncated loop runs once.
+/// Range of the loop that detects truncation. A truncated loop runs once.
 const LOOP_PROBE: UVec2 = UVec2::new(0, 4);
 
 impl Gpu {
-    /// Compiles the kernel for a scene, uploads the scene and dispatches the kernel once with no samples, since drivers
-    /// compile at the first dispatch.
+    /// Compiles the kernel, uploads the scene and dispatches the kernel without samples, since drivers compile at the
+    /// first dispatch.
     pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
         Gpu::with_sliders(device, packed, shaders, options, Vec::new())
     }
 
-    /// Like [`Gpu::new`], with overrides that are read from a buffer. They are 0 until [`Gpu::set_sliders`].
+    /// Like [`Gpu::new`], with overrides read from a buffer: 0 until [`Gpu::set_sliders`].
     pub fn with_sliders(
         device: &Device,
         packed: &Packed,
@@ -214,12 +213,12 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// Returns the overrides that are read from a buffer, in buffer order.
+    /// Returns the overrides read from a buffer, in its order.
     pub fn sliders(&self) -> &[Slider] {
         &self.kernels.sliders
     }
 
-    /// Sets the values of the sliders as bits, and discards the film.
+    /// Sets the sliders as bits, and discards the film.
     ///
     /// # Errors
     ///
@@ -241,7 +240,7 @@ impl Gpu {
         Ok(())
     }
 
-    /// Returns the dispatches that have ended since the previous query.
+    /// Returns the dispatches that ended since the last call.
     pub fn dispatches(&mut self) -> Vec<Dispatch> {
         std::mem::take(&mut self.dispatches)
     }
@@ -251,8 +250,7 @@ impl Gpu {
         &self.device
     }
 
-    /// Uploads a changed scene and discards the film. Returns false, without changes, if the scene needs another
-    /// kernel.
+    /// Uploads a changed scene and discards the film. Returns false, without changes, if it needs another kernel.
     ///
     /// # Errors
     ///
@@ -315,7 +313,7 @@ impl Gpu {
         result.map_err(|error| self.held().explain(error, asked.as_ref()))
     }
 
-    /// Dispatches a kernel over a tile of a target after `copies`, and starts mapping its completion record.
+    /// Dispatches a kernel over a tile after `copies`, and starts mapping its completion record.
     fn dispatch(
         &self,
         pipeline: &wgpu::ComputePipeline,
@@ -360,8 +358,7 @@ impl Gpu {
         })
     }
 
-    /// Returns true if a finished dispatch is complete: the driver truncated no loop of any pixel. Records its duration
-    /// if timing is enabled.
+    /// Returns true if the driver truncated no loop of a finished dispatch. Records its duration if timing is enabled.
     fn ran_whole(
         &mut self,
         kernel: &'static str,
@@ -392,7 +389,7 @@ impl Gpu {
         }
     }
 
-    /// Saves the film rows of a tile, and dispatches as many samples as are expected to be complete.
+    /// Saves the film rows of a tile, and dispatches as many samples as should complete.
     fn dispatch_part(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
         let rows = Rows::of(film, tile);
@@ -425,8 +422,7 @@ impl Gpu {
         Ok(())
     }
 
-    /// Ends a finished dispatch and submits the next one, if any. A truncated dispatch is undone and repeated with half
-    /// the samples.
+    /// Ends a finished dispatch and submits the next one. A truncated one is repeated with half the samples.
     fn end_part(&mut self, pending: Pending) -> Result<(), RenderError> {
         let Pending {
             tile,
@@ -468,7 +464,6 @@ impl Gpu {
         })
     }
 
-    /// Advances the pending work if its dispatch has ended.
     fn step(&mut self) -> Result<(), RenderError> {
         let Some(pending) = self.pending.take() else {
             return Ok(());
@@ -483,8 +478,7 @@ impl Gpu {
         }
     }
 
-    /// Discards the film after an error. The completion buffer is replaced, since it may still be mapped, and copies to
-    /// it would fail.
+    /// Discards the film after an error, and the completion buffer, since copies to it would fail while it is mapped.
     fn or_lost<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
         let result = self.explained(result, None);
         if result.is_err() {
@@ -511,7 +505,7 @@ impl Gpu {
         }
     }
 
-    /// Returns the error for a single sample that exceeds the loop limit of the driver.
+    /// Returns the error for a single sample that exceeds the driver's loop limit.
     fn truncation_error(&self) -> RenderError {
         RenderError::LoopTruncated {
             device: self.device.info.name.clone(),
@@ -525,12 +519,12 @@ fn kernel_of(adaptive: bool) -> &'static Kernel {
 
 const RECEIPT: u64 = size_of::<[u32; 2]>() as u64;
 
-/// Creates the mappable buffer for a completion record and the timestamps of its dispatch.
+/// Creates the mappable buffer for a completion record and timestamps.
 fn completion_staging(device: &Device) -> wgpu::Buffer {
     device.buffer(RECEIPT + TIMES, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }
 
-/// Converts the records of a kernel to a film. They contain its non-empty lists in order.
+/// Converts a kernel's records, the non-empty lists in order, to a film.
 fn film_of(region: Region, film_layout: FilmLayout, records: &[Vec4]) -> Film {
     let mut film = Film::of(region, film_layout);
     let lists = film.lists_mut().filter(|list| !list.is_empty());

@@ -1,5 +1,4 @@
-//! Correctly rounded quotients and square roots on devices whose own are not: naga modules with the operations replaced
-//! by calls.
+//! Correctly rounded quotients and square roots on other devices: calls replace the operations of naga modules.
 
 use std::collections::HashMap;
 
@@ -12,16 +11,14 @@ use naga::{
 /// Implementation of quotients and square roots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
-    /// Operations of the device: correctly rounded on lavapipe, within 2.5 ULP on GPUs (WGSL, section 15.7.4).
+    /// The device's operations: correctly rounded on lavapipe, within 2.5 ULP on GPUs (WGSL, section 15.7.4).
     Device,
-    /// Functions of `shaders/rounding.wgsl`: correctly rounded everywhere, but slower.
+    /// Functions of `shaders/rounding.wgsl`: correctly rounded, but slower.
     Software,
 }
 
-/// Calls by the expression that they replace.
 type Calls = HashMap<Handle<Expression>, (Handle<Function>, Vec<Handle<Expression>>)>;
 
-/// Replacements by number of components.
 const QUOTIENTS: [&str; 4] = ["quotient", "quotient2", "quotient3", "quotient4"];
 const SQUARE_ROOTS: [&str; 4] = ["square_root", "square_root2", "square_root3", "square_root4"];
 
@@ -30,9 +27,9 @@ const SQUARE_ROOTS: [&str; 4] = ["square_root", "square_root2", "square_root3", 
 #[error("there is no function '{0}'")]
 pub struct MissingFunction(&'static str);
 
-/// Replaces all float quotients and square roots by calls of the functions of `shaders/rounding.wgsl`.
+/// Replaces all float quotients and square roots by calls of `shaders/rounding.wgsl`.
 pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), MissingFunction> {
-    // These functions use the operations of the device.
+    // These use the device's operations.
     let own = [named(module, QUOTIENTS[0])?, named(module, SQUARE_ROOTS[0])?];
     let mut in_functions = Vec::new();
     for (handle, function) in module.functions.iter() {
@@ -86,7 +83,7 @@ fn calls_of(module: &Module, function: &Function, info: &FunctionInfo) -> Result
     Ok(calls)
 }
 
-/// Splits the evaluation of expressions at each replaced one, and inserts its call.
+/// Splits evaluation at each replaced expression, and inserts its call.
 fn call(block: &mut Block, expressions: &mut Arena<Expression>, calls: &Calls) {
     for (statement, span) in std::mem::take(block).span_into_iter() {
         let Statement::Emit(range) = statement else {

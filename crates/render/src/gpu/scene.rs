@@ -12,7 +12,7 @@ use super::texels::TexelParts;
 use crate::error::RenderError;
 use crate::records::{Camera, FILTER_BINS_MAX, Packed};
 
-/// Returns the memory that a scene needs on a device, in bytes.
+/// Returns a scene's memory on a device, in bytes.
 pub fn bytes_of_scene(packed: &Packed) -> u64 {
     let of_rows = rows(packed).len() + node_rows_count(packed) + mesh_rows_count(packed);
     let sizes = [
@@ -25,7 +25,6 @@ pub fn bytes_of_scene(packed: &Packed) -> u64 {
     sizes.iter().map(|size| *size as u64).sum()
 }
 
-/// Buffers and bind groups of a scene.
 pub struct SceneBuffers {
     camera: wgpu::Buffer,
     /// Groups 1 and 2 of `shaders/bindings.wgsl`: the scene, and its shapes.

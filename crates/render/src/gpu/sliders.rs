@@ -1,5 +1,5 @@
-//! Overrides in shaders as sliders of the development mode: kernels read their values from a uniform buffer, so that a
-//! new value needs no compiler.
+//! Overrides in shaders as sliders of the development mode: kernels read them from a uniform buffer, without
+//! recompilation.
 
 use std::ops::Range;
 
@@ -13,31 +13,31 @@ use super::pipeline::{DISPATCH_GROUP, GROUPS};
 use crate::error::ShaderError;
 use wgray_scene::Integrator;
 
-/// The binding of the slider values in the dispatch group, after the bindings that all kernels have.
+/// Binding of the values in the dispatch group, after those of all kernels.
 const BINDING: usize = GROUPS[DISPATCH_GROUP].len();
-/// The name of the buffer of values in a kernel.
+/// Name of the buffer of values.
 const VALUES: &str = "slider_values";
 
 /// An override with a default value: `override NAME: TYPE = VALUE; // LOW..HIGH`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Slider {
-    /// The file in the folder of shaders.
+    /// File in the folder of shaders.
     pub file: String,
-    /// The name of the override.
+    /// Name of the override.
     pub name: String,
-    /// Its line, counted from 1.
+    /// Its line, from 1.
     pub line: usize,
     /// Its type.
     pub kind: Kind,
-    /// The minimum of a number.
+    /// Minimum of a number.
     pub min: f64,
-    /// The maximum.
+    /// Maximum.
     pub max: f64,
-    /// The value in the file.
+    /// Value in the file.
     pub default: Value,
 }
 
-/// The type of an override, by its name in WGSL.
+/// Type of an override, by its WGSL name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -51,7 +51,7 @@ pub enum Kind {
     Bool,
 }
 
-/// The value of an override.
+/// Value of an override.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
@@ -71,7 +71,6 @@ impl Kind {
         }
     }
 
-    /// Returns the least and the largest value of the type.
     fn limits(self) -> [f64; 2] {
         match self {
             Kind::F32 => [f32::MIN, f32::MAX].map(f64::from),
@@ -83,7 +82,7 @@ impl Kind {
 }
 
 impl Slider {
-    /// Returns a value clamped to the range, and rounded if it must be an integer; `None` if it is of another type.
+    /// Returns a value clamped to the range, rounded for an integer; `None` if of another type.
     pub fn clamped(&self, value: Value) -> Option<Value> {
         match (self.kind, value) {
             (Kind::Bool, Value::Bool(_)) => Some(value),
@@ -93,7 +92,7 @@ impl Slider {
         }
     }
 
-    /// Returns the bits of a value in the buffer.
+    /// Returns a value's bits in the buffer.
     pub fn bits(&self, value: Value) -> u32 {
         match (self.kind, value) {
             (_, Value::Bool(on)) => on.into(),
@@ -104,8 +103,7 @@ impl Slider {
     }
 }
 
-/// Returns the sliders of the kernel that renders: the overrides that have a default value and are not needed to
-/// compile.
+/// Returns the sliders of the kernel that renders: overrides with a default value that compilation does not need.
 pub fn sliders(shaders: &Shaders, integrator: Integrator, adaptive: bool) -> Vec<Slider> {
     if !shaders.files().any(|(_, text)| text.contains("override")) {
         return Vec::new();
@@ -117,7 +115,7 @@ pub fn sliders(shaders: &Shaders, integrator: Integrator, adaptive: bool) -> Vec
     })
 }
 
-/// Returns a kernel's text that reads the sliders' values from the buffer. Lines stay where they are.
+/// Returns a kernel's text that reads sliders from the buffer, without moving lines.
 ///
 /// # Errors
 ///
@@ -159,7 +157,7 @@ pub fn with_buffer(source: Source, kernel: &Kernel, sliders: &[Slider]) -> Resul
     Ok(source)
 }
 
-/// Returns the sliders of a kernel, and the places of their declarations.
+/// Returns a kernel's sliders, and the places of their declarations.
 fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Slider, Range<usize>)> {
     let module = checked.module();
     module.overrides.iter().filter_map(move |(handle, declared)| {
@@ -173,7 +171,7 @@ fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Sli
             return None;
         }
         let (kind, default) = match module.global_expressions[(*init)?] {
-            // The digits of the file, not those of the nearest f64.
+            // The file's digits, not those of the nearest f64.
             Expression::Literal(Literal::F32(x)) => (Kind::F32, Value::Number(x.to_string().parse().ok()?)),
             Expression::Literal(Literal::I32(x)) => (Kind::I32, Value::Number(x.into())),
             Expression::Literal(Literal::U32(x)) => (Kind::U32, Value::Number(x.into())),
@@ -197,7 +195,7 @@ fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Sli
     })
 }
 
-/// Returns whether an override determines the size of an array or of a workgroup, or is part of another declaration.
+/// Returns true for overrides in the size of an array or workgroup, or in another declaration.
 fn is_needed_to_compile(module: &Module, handle: Handle<Override>) -> bool {
     let in_expressions = module
         .global_expressions
@@ -207,7 +205,7 @@ fn is_needed_to_compile(module: &Module, handle: Handle<Override>) -> bool {
     in_expressions || module.types.iter().any(|(_, ty)| is_size(&ty.inner))
 }
 
-/// Returns the range in a comment after a declaration, `// LOW..HIGH`, or else one around the value.
+/// Returns the range in a comment after a declaration, `// LOW..HIGH`, else one around the value.
 fn range_of(kind: Kind, default: Value, rest: &str) -> [f64; 2] {
     let Value::Number(value) = default else {
         return kind.limits();

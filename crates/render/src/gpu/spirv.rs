@@ -1,11 +1,11 @@
-//! SPIR-V transformations that forbid drivers to fuse or reorder float operations, and request float controls.
+//! SPIR-V transformations that prevent drivers from fusing or reordering float operations, and request float controls.
 
 use super::float_controls::FloatControls;
 
-/// Opcodes of float arithmetic that naga emits: negate, add, subtract, multiply, divide, vector times scalar, dot.
+/// Float arithmetic that naga emits: negate, add, subtract, multiply, divide, vector times scalar, dot.
 pub const ARITHMETIC: [u16; 7] = [127, 129, 131, 133, 136, 142, 148];
 
-/// Opcodes of conversions between floats and integers.
+/// Conversions between floats and integers.
 pub const CONVERSIONS: [u16; 4] = [109, 110, 111, 112];
 
 const OP_DECORATE: u32 = 71;
@@ -14,7 +14,7 @@ const FIRST_TYPE: u16 = 19; // OpTypeVoid
 const LAST_TYPE: u16 = 39; // OpTypeForwardPointer
 const HEADER: usize = 5;
 
-// Opcodes of the first sections of a module, in their order (SPIR-V 1.6, section 2.4).
+// Opcodes of a module's first sections, in order (SPIR-V 1.6, section 2.4).
 const OP_CAPABILITY: u16 = 17;
 const OP_EXTENSION: u16 = 10;
 const OP_EXT_INST_IMPORT: u16 = 11;
@@ -24,10 +24,10 @@ const OP_EXECUTION_MODE: u16 = 16;
 
 /// Extension of the float controls before SPIR-V 1.4.
 const FLOAT_CONTROLS: &[u8] = b"SPV_KHR_float_controls";
-/// Float width of the controls in bits.
+/// Bits of the controlled floats.
 const WIDTH: u32 = 32;
 
-/// Returns the instructions of a module: opcode and words. The first word contains opcode and length.
+/// Returns a module's instructions: opcode, and words, of which the first has opcode and length.
 pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     let mut rest = module.get(HEADER..).unwrap_or(&[]);
     std::iter::from_fn(move || {
@@ -38,14 +38,13 @@ pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     })
 }
 
-/// Returns the end of the leading instructions whose opcodes match.
 fn end_of(module: &[u32], kind: impl Fn(u16) -> bool) -> usize {
     let first = instructions(module).take_while(|(opcode, _)| kind(*opcode));
     HEADER + first.map(|(_, words)| words.len()).sum::<usize>()
 }
 
-/// Decorates all float operations with `NoContraction` (SPIR-V 1.6, section 3.20), so that each is rounded separately.
-/// Conversions too: Mesa would turn f32(i32(x)) into a truncation, which keeps the sign of -0.
+/// Decorates all float operations with `NoContraction` (SPIR-V 1.6, section 3.20), for separate rounding; conversions
+/// too, since Mesa would turn f32(i32(x)) into a truncation, which keeps the sign of -0.
 pub fn forbid_contraction(module: &[u32]) -> Vec<u32> {
     let decorations = instructions(module)
         .filter(|(opcode, _)| ARITHMETIC.contains(opcode) || CONVERSIONS.contains(opcode))
@@ -105,7 +104,7 @@ fn instruction(opcode: u16, words: usize) -> u32 {
     (words as u32) << 16 | u32::from(opcode)
 }
 
-/// Returns `OpExtension` with a name, which is zero-terminated and padded with zeros to whole words.
+/// Returns `OpExtension` with a name, zero-terminated and zero-padded to whole words.
 fn extension(name: &[u8]) -> Vec<u32> {
     let mut bytes = name.to_vec();
     bytes.resize((name.len() / 4 + 1) * 4, 0);
@@ -136,7 +135,7 @@ mod tests {
         checked.exact_entry("half", &[], Rounding::Device, controls).unwrap()
     }
 
-    /// Returns the index of an instruction's section; `None` inside functions and for opcodes among the types.
+    /// Returns an instruction's section; `None` inside functions and among the types.
     fn section(opcode: u16) -> Option<usize> {
         let sections: [&[u16]; 9] = [
             &[17],

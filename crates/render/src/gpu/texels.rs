@@ -1,4 +1,4 @@
-//! Buffer limits of a device: scenes that exceed them are rejected, and texels are split across several buffers.
+//! Buffer limits of a device: scenes beyond are rejected, and texels are split across buffers.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
 use crate::error::RenderError;
 use crate::records::Packed;
 
-/// Distribution of texels to buffers. All but the last have 2^shift words.
+/// Distribution of texels. All buffers but the last have 2^shift words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TexelParts {
     /// Number of buffers, at least 1.
@@ -19,7 +19,7 @@ pub struct TexelParts {
 }
 
 impl TexelParts {
-    /// Returns the distribution for a scene, or an error if the scene exceeds the limits of the device.
+    /// Returns the distribution for a scene, or an error beyond the device's limits.
     pub fn of(info: &GpuInfo, packed: &Packed) -> Result<TexelParts, RenderError> {
         let largest = info.largest_binding.min(info.largest_buffer);
         let too_large = |message: String| RenderError::TooLarge {
@@ -57,7 +57,7 @@ impl TexelParts {
         Ok(TexelParts { count, shift })
     }
 
-    /// Returns the texels of each buffer.
+    /// Returns each buffer's texels.
     pub fn split<'a>(&self, texels: &'a [u32]) -> impl Iterator<Item = &'a [u32]> + use<'a> {
         let size = 1 << self.shift;
         (0..self.count)
@@ -65,8 +65,8 @@ impl TexelParts {
             .map(move |rest| &rest[..rest.len().min(size)])
     }
 
-    /// Returns WGSL with the function of `shaders/texels.wgsl` for several buffers, and their bindings except the
-    /// first. `None` for one buffer.
+    /// Returns WGSL with the function of `shaders/texels.wgsl` for several buffers, and their bindings but the first.
+    /// `None` for one.
     pub fn wgsl(&self) -> Option<String> {
         if self.count == 1 {
             return None;

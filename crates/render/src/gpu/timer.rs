@@ -6,10 +6,9 @@ use wgpu::BufferUsages;
 
 use super::device::Device;
 
-/// Size in bytes of the timestamps of a dispatch: start and end.
+/// Bytes of a dispatch's timestamps: start and end.
 pub const TIMES: u64 = 2 * size_of::<u64>() as u64;
 
-/// Timestamps of dispatches, on devices that support them.
 pub struct Timer {
     clock: Option<Clock>,
 }
@@ -22,7 +21,7 @@ struct Clock {
 }
 
 impl Timer {
-    /// Creates a timer, which returns no durations if the device has no clock.
+    /// Creates a timer, which returns nothing if the device has no clock.
     pub fn new(device: &Device) -> Timer {
         let has_clock = device.device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         Timer {

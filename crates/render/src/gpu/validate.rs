@@ -1,4 +1,4 @@
-//! Validation of all kernels of a scene without a device; reports all errors at once.
+//! Validation of a scene's kernels without a device; reports all errors at once.
 
 use rayon::prelude::*;
 
@@ -12,24 +12,24 @@ use super::rounding::Rounding;
 use crate::error::{ShaderError, ShaderErrors};
 use crate::records::Packed;
 
-/// Maximum number of reported errors of a kernel.
+/// Maximum errors reported of a kernel.
 const MOST: usize = 16;
 
-/// The representation of the scene in the checked kernels.
+/// Representation of the scene in the checked kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Forms {
     /// In buffers.
     Buffers,
-    /// In buffers and, if it is small enough, as constants.
+    /// In buffers and, if small enough, as constants.
     All,
 }
 
-/// Compiles every kernel for a scene to SPIR-V, without a driver, and compares its interface with the bindings of the
-/// program.
+/// Compiles every kernel of a scene to SPIR-V, without a driver, and compares its interface with the program's
+/// bindings.
 ///
 /// # Errors
 ///
-/// All errors, without duplicates that several kernels share. In each function only the first error is found.
+/// All errors, without duplicates of several kernels. Only the first one in each function is found.
 pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result<(), ShaderErrors> {
     let baked = (forms == Forms::All).then(|| bake_if_small(packed)).flatten();
     let mut scenes = vec![None];
@@ -48,7 +48,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
             errors.push(error);
         }
     }
-    // An error in a declaration also causes errors in the code that the program generates from it; these are omitted.
+    // An error in a declaration also causes errors in code generated from it; these are omitted.
     if errors.iter().any(|error| is_in_file(error, shaders)) {
         errors.retain(|error| is_in_file(error, shaders));
     }
@@ -59,7 +59,6 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
     }
 }
 
-/// Returns true if the location of an error is in a shader file.
 fn is_in_file(error: &ShaderError, shaders: &Shaders) -> bool {
     let file = error.place.split(':').next();
     shaders.files().any(|(name, _)| Some(name) == file)
@@ -79,9 +78,8 @@ fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError
     errors
 }
 
-/// Finds the errors in all functions, although naga stops at the first error: a function with an error gets an empty
-/// body, which does not matter to its callers. The rest is a kernel that naga accepts, unless an error is outside all
-/// bodies.
+/// Finds the errors in all functions, although naga stops at the first one: a function with an error gets an empty
+/// body, which its callers accept. The rest is valid, unless an error is outside all bodies.
 fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Source, ValidKernel)>) {
     let mut errors: Vec<ShaderError> = Vec::new();
     loop {
@@ -100,7 +98,7 @@ fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Sourc
         };
         let culprit = match at {
             Some(at) => texts.iter().position(|text| (text.start..text.body.end).contains(&at)),
-            // naga reports no location: the error is in the function without whose body it disappears.
+            // naga reports no location: the error disappears with the body of its function.
             None => {
                 (0..texts.len()).find(|i| check_at(&emptied(*i)).err().map(|(error, _)| error).as_ref() != Some(&error))
             }
@@ -135,8 +133,7 @@ mod tests {
         shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
     ";
 
-    /// Returns the messages for the built-in shaders with parts of files replaced; an empty part is the end of the
-    /// file.
+    /// Returns the messages for built-in shaders with parts of files replaced; an empty part is the end.
     fn said(edits: &[(&str, &str, &str)]) -> Vec<String> {
         let mut shaders = Shaders::built_in();
         for (name, old, new) in edits {
@@ -343,7 +340,6 @@ mod tests {
         );
     }
 
-    /// Messages never contain naga's internal indices.
     #[test]
     fn messages_name_what_is_in_the_source() {
         let with = |body: &str| {
@@ -389,8 +385,7 @@ mod tests {
             ("let x = camera == camera;", "Incompatible operands"),
         ] {
             let messages = with(body);
-            // Find the message of this error: only two of the three kernels have `film`, and the third reports another
-            // error.
+            // Only two of the three kernels have `film`; the third reports another error.
             let line = messages
                 .iter()
                 .find(|line| line.contains(wanted))

@@ -19,31 +19,30 @@ use wgray_image::memory::fallible;
 pub enum Flow {
     /// Continue with the next dispatch.
     Continue,
-    /// Stop a render of all bands together as soon as every pixel has a sample; otherwise continue.
+    /// Stop a render of all bands together once every pixel has a sample; otherwise continue.
     TimeIsUp,
     /// Cancel the work.
     Cancel,
 }
 
 impl From<bool> for Flow {
-    /// Maps true to [`Flow::Continue`] and false to [`Flow::Cancel`].
     fn from(is_extensible: bool) -> Flow {
         if is_extensible { Flow::Continue } else { Flow::Cancel }
     }
 }
 
-/// Callback after each dispatch, with the region of the band and the fraction of all work that is done, 0 to 1.
+/// Callback after each dispatch, with the region of the band and the done fraction of all work, 0 to 1.
 pub type Watch<'a> = dyn FnMut(&mut dyn Backend, Region, f64) -> Result<Flow, RenderError> + 'a;
 
-/// Renders the bands of a region from the top, and adapts the size of dispatches to the measured speed. Pieces from a
-/// checkpoint are not rendered again.
+/// Renders the bands of a region from the top, with dispatches sized by the measured speed. Pieces from a checkpoint
+/// are not rendered again.
 pub struct Bands<'a> {
     store: &'a mut dyn CheckpointStore,
     bands: VecDeque<Band>,
     samples: u32,
-    /// True once bands that are rendered together are complete; `None` if they are rendered one after the other.
+    /// Completion of bands rendered together; `None` if one after the other.
     whole: Option<bool>,
-    /// Number of samples at the end of the current pass, under [`Bands::in_passes`].
+    /// Samples at the end of the current pass, under [`Bands::in_passes`].
     pass: Option<u32>,
     steps: Steps,
     /// Samples over all pixels, in finished bands and in total.
@@ -51,17 +50,17 @@ pub struct Bands<'a> {
     total: f64,
     /// Time and duration of the last checkpoint.
     kept: (Instant, Duration),
-    /// Samples over all pixels that were rendered, not loaded.
+    /// Samples over all pixels, rendered, not loaded.
     rendered: f64,
 }
 
 /// A rendered band.
 pub struct FinishedBand {
-    /// The pixels.
+    /// Its pixels.
     pub film: Film,
-    /// Minimum number of samples of a pixel.
+    /// Minimum samples of a pixel.
     pub min_samples: u32,
-    /// Number of samples requested per pixel so far; under adaptive sampling a maximum.
+    /// Samples requested per pixel so far; under adaptive sampling a maximum.
     pub requested_samples: u32,
     /// Number of camera rays.
     pub camera_rays: u64,
@@ -105,9 +104,7 @@ struct Band {
 
 enum State {
     New,
-    /// In the checkpoint store.
     Stored(StoredPiece),
-    /// In memory.
     Here(FilmPiece),
 }
 
@@ -117,14 +114,14 @@ enum End {
     TimeIsUp,
 }
 
-/// Target duration of a pass over a film, after which it is copied.
+/// Target duration between copies of a film.
 const PASS: Duration = Duration::from_secs(1);
 
-/// Minimum rows of a shortened band, without and with adaptive sampling, which adds two rows for the neighbors.
+/// Minimum rows of a shortened band, without and with adaptive sampling, which adds two.
 const MIN_ROWS: [u32; 2] = [16, 64];
 
 impl<'a> Bands<'a> {
-    /// Splits a region into bands, and takes over the pieces of a store, which must lie in the region.
+    /// Splits a region into bands, and takes over a store's pieces, which must lie in it.
     pub fn new(
         region: Region,
         samples: u32,
@@ -190,8 +187,8 @@ impl<'a> Bands<'a> {
         self.bands.iter().map(|band| band.region.pixels()).sum()
     }
 
-    /// Renders and returns the next band; `None` after the last one. After an error, the next call resumes the same
-    /// band from its last checkpoint, possibly on another backend. Calls `made` whenever progress is stored.
+    /// Renders and returns the next band; `None` after the last one. After an error, the next call resumes the band
+    /// from its last checkpoint, possibly on another backend. Calls `made` whenever progress is stored.
     ///
     /// # Errors
     ///
@@ -224,9 +221,9 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// Renders one more pass over all bands, of one or several samples per pixel. Returns the number of samples of
-    /// every pixel; `None` if they are complete or the time is up, after which [`Bands::render_next`] returns the
-    /// bands. After an error the pass can be continued, and [`Bands::last_pass`] returns the pass before it.
+    /// Renders one more pass over all bands, of one or more samples per pixel. Returns the samples of every pixel;
+    /// `None` if they are complete or the time is up, after which [`Bands::render_next`] returns the bands. After an
+    /// error the pass can be continued, and [`Bands::last_pass`] returns the one before it.
     ///
     /// # Errors
     ///
@@ -256,7 +253,7 @@ impl<'a> Bands<'a> {
         Ok(Some(self.passed_samples()))
     }
 
-    /// Returns the number of samples of every pixel after the last whole pass.
+    /// Returns the samples of every pixel after the last whole pass.
     pub fn passed_samples(&self) -> u32 {
         let samples = |band: &Band| match &band.passed {
             Some(piece) => piece.reached.pass.start,
@@ -285,8 +282,8 @@ impl<'a> Bands<'a> {
         Ok(())
     }
 
-    /// Returns the number of samples at the end of the pass that follows `have` samples. A pass is long enough to
-    /// amortize the copies of films. Every power of two ends a pass.
+    /// Returns the samples at the end of the pass after `have`, long enough to amortize copies. Every power of two ends
+    /// a pass.
     fn end_of_pass(&self, have: u32) -> u32 {
         let count = match self.bands.len() {
             1 => (self.steps.speed().unwrap_or(0.0) * PASS.as_secs_f64() / self.pixels() as f64) as u32,
@@ -296,7 +293,7 @@ impl<'a> Bands<'a> {
         have.saturating_add(count.max(1)).min(power).min(self.samples)
     }
 
-    /// Returns the fraction of the samples in finished bands that were rendered, not loaded: 0 to 1.
+    /// Returns the rendered (not loaded) fraction of the samples in finished bands: 0 to 1.
     pub fn fraction_rendered(&self) -> f64 {
         if self.done > 0.0 {
             (self.rendered / self.done).min(1.0)
@@ -305,7 +302,6 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// Renders all bands together until they are complete or the time is up.
     fn grow(
         &mut self,
         backend: &mut dyn Backend,
@@ -320,12 +316,12 @@ impl<'a> Bands<'a> {
             if self.work_on_all(until, backend, watch, made)? == End::TimeIsUp || until >= self.samples {
                 return Ok(());
             }
-            // Each round copies the films of all bands: with many samples a round adds a quarter.
+            // A round copies all films: with many samples it adds a quarter.
             until = (until + (until / 4).max(1)).min(self.samples);
         }
     }
 
-    /// Renders all bands until their pixels have `until` samples, or the time is up.
+    /// Renders until all pixels have `until` samples, or the time is up.
     fn work_on_all(
         &mut self,
         until: u32,
@@ -479,7 +475,7 @@ impl<'a> Bands<'a> {
         Ok(())
     }
 
-    /// Stores the other bands in memory that have changed since they were stored.
+    /// Stores the other changed bands in memory.
     fn keep_others(&mut self, i: usize) {
         let kept = self.store.pieces();
         for (k, band) in self.bands.iter().enumerate() {
@@ -509,7 +505,6 @@ impl Band {
         }
     }
 
-    /// Number of samples that every pixel has.
     fn samples(&self, all: u32) -> u32 {
         self.reached().map_or(0, |reached| reached.pass.start.min(all))
     }
@@ -520,8 +515,7 @@ impl Band {
     }
 }
 
-/// Checks that an amount of memory is available, by an allocation that is freed at once. A later failure would abort
-/// the program.
+/// Checks that memory is available, by an allocation that is freed at once. A later failure would abort the program.
 ///
 /// # Errors
 ///

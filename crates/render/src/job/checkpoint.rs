@@ -1,5 +1,5 @@
-//! Checkpoints: a file that receives every finished piece of an image, and at intervals the unfinished one, so that an
-//! interrupted job can resume. One process writes it at a time; others wait.
+//! Checkpoints: a file that receives finished pieces of an image, and at intervals the unfinished one, to resume an
+//! interrupted job. One process writes it at a time; others wait.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -28,18 +28,18 @@ pub enum CheckpointError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// Description of the difference.
+        /// The difference.
         what: String,
     },
-    /// The file is not a checkpoint that this program can read.
+    /// Not a checkpoint that this program can read.
     #[error("{}: cannot resume from this file: {what}; choose another name or delete it", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Description of the error.
+        /// The error.
         what: String,
     },
-    /// The caller stopped waiting for the process that writes the file.
+    /// The caller stopped waiting for another process.
     #[error("{}: still in use by another process", .0.display())]
     Busy(PathBuf),
     /// The file cannot be read or written.
@@ -54,15 +54,15 @@ pub enum CheckpointError {
 
 /// Options for opening a checkpoint.
 pub struct CheckpointOptions<'a> {
-    /// Path of the file, or of a folder in which each job has its own file.
+    /// Path of the file, or of a folder with a file per job.
     pub path: PathBuf,
     /// Resume from an existing file.
     pub resume: bool,
-    /// Interval at which the unfinished piece is written.
+    /// Interval between writes of the unfinished piece.
     pub interval: Duration,
-    /// Called at intervals while another process writes the file; returns true to keep waiting.
+    /// Called while another process writes the file; returns true to keep waiting.
     pub wait: Box<dyn FnMut() -> bool + 'a>,
-    /// Reports problems that do not end the work.
+    /// Receives problems that do not end the work.
     pub report: Box<dyn FnMut(&str) + 'a>,
 }
 
@@ -76,27 +76,27 @@ pub struct Checkpoint<'a> {
     key: Key,
     film_layout: FilmLayout,
     entries: Vec<Entry>,
-    /// Pieces that no later one replaces, by their first rows.
+    /// Pieces not replaced by later ones, by their first rows.
     latest: BTreeMap<u32, usize>,
     /// End of the last complete piece.
     end: u64,
     interval: Duration,
     report: Box<dyn FnMut(&str) + 'a>,
-    /// Length below which rewriting the file is not tried again after a failure.
+    /// Length below which rewriting is not tried again after a failure.
     untidy: u64,
-    /// Flags of problems that were reported: a failed write, a lost file.
+    /// Reported problems: a failed write, a lost file.
     reported: [bool; 2],
 }
 
-/// Replaced pieces stay in the file until they take more bytes than this and than the pieces in use.
+/// Replaced pieces are kept until they take more bytes than this and than the pieces in use.
 const WASTE: u64 = 64 << 20;
-/// Interval between two attempts to lock a file that another process writes.
+/// Interval between attempts to lock a file in use.
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
-/// Number of attempts before waiting is reported.
+/// Attempts before waiting is reported.
 const QUIET_RETRIES: u32 = 20;
 
 impl<'a> Checkpoint<'a> {
-    /// Creates a checkpoint for a job, or resumes an existing one as soon as no other process writes it.
+    /// Creates a job's checkpoint, or resumes it once no other process writes it.
     ///
     /// # Errors
     ///
@@ -171,7 +171,7 @@ impl<'a> Checkpoint<'a> {
             };
             match file.try_lock() {
                 Err(TryLockError::WouldBlock) => {
-                    // A process that is being killed ends within a second; that is not worth a message.
+                    // A process that is being killed ends within a second: no message.
                     rounds += 1;
                     if rounds == QUIET_RETRIES {
                         report(&format!(
@@ -188,7 +188,7 @@ impl<'a> Checkpoint<'a> {
                 // Some file systems have no locks.
                 Err(TryLockError::Error(_)) | Ok(()) => {}
             }
-            // The process that held the lock may have replaced the file.
+            // The process with the lock may have replaced the file.
             if !is_at(&file, path) {
                 continue;
             }
@@ -218,7 +218,7 @@ impl<'a> Checkpoint<'a> {
             path: name.clone(),
             error,
         };
-        // Left by a process that was killed while it rewrote the file.
+        // Left by a process killed while it rewrote the file.
         wgray_image::remove_stale_beside(path);
         let (found, key, start) = pieces_file::read_header(&mut file).map_err(unreadable)?;
         let what = match found.part {
@@ -280,12 +280,12 @@ impl<'a> Checkpoint<'a> {
         let needed: u64 = lengths.sum();
         let bound = (2 * needed + WASTE).max(self.untidy);
         if self.end > bound && self.rewrite(|temporary, path| temporary.persist(path)).is_err() {
-            // The disk may be full, or the file may not be replaceable. Nothing is lost; a later call tries again.
+            // The disk may be full, or the file not replaceable. Nothing is lost; a later call tries again.
             self.untidy = 2 * self.end;
         }
     }
 
-    /// Rewrites the file with the pieces in use, and renames it into place.
+    /// Writes the pieces in use to a new file, and renames it into place.
     fn rewrite(
         &mut self,
         name: impl Fn(NamedTempFile, &Path) -> Result<File, tempfile::PersistError>,
@@ -314,7 +314,7 @@ impl<'a> Checkpoint<'a> {
         Ok(())
     }
 
-    /// Restores the file if it was deleted. If another file is in its place, keeps that one and reports it.
+    /// Restores a deleted file. Keeps and reports another file in its place.
     fn still_there(&mut self) -> io::Result<()> {
         if is_at(&self.file, &self.path) && self.file.metadata()?.len() >= self.end {
             return Ok(());
@@ -340,10 +340,10 @@ impl<'a> Checkpoint<'a> {
         }
     }
 
-    /// Reports the first piece that could not be written. Later ones are still tried.
+    /// Reports the first piece that could not be written; later ones are tried.
     fn noted(&mut self, result: io::Result<()>) {
         if let Err(error) = result {
-            // Readers drop an incomplete piece, but it takes space on the disk.
+            // Readers drop an incomplete piece, but it takes space.
             let _ = self.file.set_len(self.end);
             self.tell_once(
                 0,
@@ -397,7 +397,7 @@ impl CheckpointStore for Checkpoint<'_> {
     }
 }
 
-/// Creates the file, which is locked and has its whole header from the moment it exists.
+/// Creates the file, locked and with its whole header from the start.
 fn start(path: &Path, header: &Header) -> io::Result<(File, Key, u64)> {
     let (temporary, key, end) = temporary(path, header)?;
     temporary.as_file().sync_data()?;
@@ -405,14 +405,12 @@ fn start(path: &Path, header: &Header) -> io::Result<(File, Key, u64)> {
     Ok((file, key, end))
 }
 
-/// Creates a locked temporary file with a header beside `path`.
 fn temporary(path: &Path, header: &Header) -> io::Result<(NamedTempFile, Key, u64)> {
     let mut temporary = wgray_image::beside(path)?;
     let (key, end) = pieces_file::write_header(temporary.as_file_mut(), header)?;
     Ok((temporary, key, end))
 }
 
-/// Returns whether a path leads to an open file.
 fn is_at(file: &File, path: &Path) -> bool {
     #[cfg(unix)]
     {

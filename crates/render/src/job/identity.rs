@@ -1,4 +1,4 @@
-//! Identity of a job: two jobs with the same identity produce the same bits, so one can resume what another left.
+//! Identity of a job: jobs with the same identity produce the same bits, so that one can resume another.
 
 use bytemuck::bytes_of;
 use serde::{Deserialize, Serialize};
@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 use crate::records::{Packed, PackedMesh, Specialization};
 use wgray_image::Region;
 
-/// Maximum side of an image in pixels, and maximum samples per pixel, as in scenes.
+/// Maximum image side in pixels, and samples per pixel, as in scenes.
 const MAX_COUNT: u32 = 65_536;
 
-/// Everything that determines the bits of a film. The device is not part of it.
+/// Everything that determines a film's bits, not the device.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
-    /// Version of the program.
+    /// Program version.
     pub version: String,
     /// Hash of the shader files.
     pub shaders: String,
-    /// Hash of the packed scene, which includes the values of overriding options.
+    /// Hash of the packed scene, including overriding options.
     pub scene: String,
-    /// Width and height of the whole image in pixels.
+    /// Width and height of the whole image.
     pub picture: [u32; 2],
     /// Rendered pixels: x0, y0, x1, y1.
     pub region: [u32; 4],
@@ -27,14 +27,14 @@ pub struct Identity {
     pub pixel_samples: u32,
     /// True if sampling is adaptive.
     pub adaptive: bool,
-    /// True if the film has layers that are means over the samples.
+    /// True if the film has layers.
     pub layers: bool,
-    /// True if rounding is done in software.
+    /// True for rounding in software.
     pub exact_rounding: bool,
 }
 
 impl Identity {
-    /// Returns the identity of rendering `region` of a scene.
+    /// Returns the identity of rendering `region`.
     pub fn of(scene: &Packed, region: Region, exact_rounding: bool) -> Identity {
         let film_layout = scene.film_layout();
         Identity {
@@ -50,7 +50,7 @@ impl Identity {
         }
     }
 
-    /// Returns a file name that is unique to this job.
+    /// Returns a file name unique to this job.
     pub fn file_name(&self) -> String {
         let Identity {
             version,
@@ -80,7 +80,7 @@ impl Identity {
         Region { x0, y0, x1, y1 }
     }
 
-    /// Rejects sizes and regions that this program never writes, as an untrusted file may contain them.
+    /// Rejects sizes and regions that this program never writes: files are untrusted.
     pub fn check(&self) -> Result<(), String> {
         let [width, height] = self.picture;
         let sides = 1..=MAX_COUNT;
@@ -104,8 +104,7 @@ impl Identity {
         }
     }
 
-    /// Describes the first difference of another job from this one: "its size is A, not B". Returns `None` if they are
-    /// equal.
+    /// Describes the first difference of another job: "its size is A, not B".
     pub fn difference(&self, other: &Identity) -> Option<String> {
         let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
         let short = |hash: &str| hash.get(..16).unwrap_or(hash).to_owned();
@@ -152,7 +151,7 @@ impl Identity {
     }
 }
 
-/// Returns the hash of a packed scene.
+/// Returns a packed scene's hash.
 pub fn hash_of_scene(scene: &Packed) -> String {
     let Packed {
         origin,
@@ -201,10 +200,10 @@ fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
     hasher.update(bytes_of(&[mesh.low, mesh.high]));
 }
 
-/// Minimum length of a list that is hashed by all threads.
+/// Minimum length of a list hashed by all threads.
 const PARALLEL_BYTES: usize = 1 << 20;
 
-/// Hashes bytes with their length in front, so that no two lists of lists hash alike.
+/// Hashes bytes after their length, so that no two lists of lists hash alike.
 fn list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
     hasher.update(&(bytes.len() as u64).to_le_bytes());
     match bytes.len() >= PARALLEL_BYTES {

@@ -24,17 +24,17 @@ pub use part::{PartError, PartHeader, Parts, Tile, read_part, write_part};
 pub use piece::{CheckpointStore, FilmPiece, INTERVAL, NoCheckpoint, StoredPiece};
 pub use steps::{Order, SampleProgress, Steps};
 
-/// Target duration of a dispatch: long enough to hide its overhead, short enough for watchdogs and cancellation.
+/// Target duration of a dispatch: hides its overhead, and suits watchdogs and cancellation.
 const DISPATCH_DURATION: Duration = Duration::from_millis(60);
 
 /// Partition of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WorkSplit {
-    /// Maximum size of a film in pixels.
+    /// Maximum film size in pixels.
     pub band_pixels: u64,
-    /// Samples per dispatch; `None` adapts to the speed.
+    /// Samples per dispatch; `None` adapts to speed.
     pub samples_per_dispatch: Option<u32>,
-    /// Rows per dispatch; `None` adapts to the speed.
+    /// Rows per dispatch; `None` adapts to speed.
     pub rows_per_dispatch: Option<u32>,
 }
 
@@ -50,7 +50,8 @@ impl Default for WorkSplit {
 }
 
 impl WorkSplit {
-    /// Returns [`WorkSplit::default`], with smaller bands for layers: a film takes no more memory than an adaptive one.
+    /// Returns [`WorkSplit::default`], with smaller bands for layers, so that a film takes no more memory than an
+    /// adaptive one.
     pub fn of(film_layout: FilmLayout) -> WorkSplit {
         const LISTS: u64 = 3;
         let split = WorkSplit::default();
@@ -61,7 +62,7 @@ impl WorkSplit {
     }
 }
 
-/// Splits a region into bands of whole rows that fit a film, from the top. A region without pixels has none.
+/// Splits a region into bands of whole rows that fit a film, from the top; none without pixels.
 pub fn bands(region: Region, split: &WorkSplit, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
     let [width, height] = [region.width(), region.height()].map(|n| u64::from(n.max(1)));
     let rows = (split.band_pixels.min(largest_film) / width).clamp(1, height) as u32;
@@ -73,8 +74,7 @@ pub fn bands(region: Region, split: &WorkSplit, largest_film: u64) -> impl Itera
     })
 }
 
-/// Returns the first hits of the rays through the pixel centers of a region, row by row from the top, in dispatches of
-/// bounded size.
+/// Returns the first hits through a region's pixel centers, row by row from the top, in dispatches of bounded size.
 pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<FirstHit>, RenderError> {
     const CALL_PIXELS: u64 = 1 << 18;
     let split = WorkSplit {
@@ -88,8 +88,8 @@ pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<First
     Ok(hits)
 }
 
-/// Renders a region band by band, from the top, and passes each band to `output`. `progress` receives the fraction of
-/// the work that is done, 0 to 1, and returns true to continue.
+/// Renders an image band by band from the top, and passes each to `output`. `progress` receives the done fraction of
+/// the work, 0 to 1, and returns true to continue.
 pub fn render(
     backend: &mut dyn Backend,
     region: Region,
@@ -120,7 +120,7 @@ mod tests {
 
     use super::*;
 
-    /// A backend that records its dispatches.
+    /// Records its dispatches.
     struct Notes(Vec<(Region, Range<u32>)>);
 
     impl Backend for Notes {

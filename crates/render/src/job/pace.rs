@@ -2,24 +2,24 @@
 
 use std::time::Duration;
 
-/// The measured speed. Work counts samples over all pixels; speed is work per second.
+/// Measured speed: work (samples over all pixels) per second.
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     /// Target duration of a dispatch.
     call: Duration,
     speed: Option<f64>,
-    /// Speed of dispatches in which no pixel skips samples.
+    /// Speed if no pixel skips samples.
     speed_of_all: f64,
-    /// Maximum work of a dispatch, after a larger one has failed.
+    /// Maximum work, after a larger dispatch has failed.
     most: f64,
 }
 
 impl Pace {
     /// Small enough for the slowest device and scene.
     const FIRST_CALL: f64 = 16384.0;
-    /// Maximum speedup from pixels that skip samples under adaptive sampling. In the next tile none may skip.
+    /// Maximum speedup from skipped samples under adaptive sampling. In the next tile no pixel may skip any.
     const MAX_OUTLIER_RATIO: f64 = 8.0;
-    /// Minimum work of a dispatch: one workgroup.
+    /// Minimum work: one workgroup.
     const LEAST: f64 = 64.0;
 
     pub fn new(call: Duration) -> Pace {
@@ -41,17 +41,17 @@ impl Pace {
         self.speed = Some(speed.min(Self::MAX_OUTLIER_RATIO * self.speed_of_all));
     }
 
-    /// Halves the maximum after a failed dispatch, which may have taken too long.
+    /// Halves the maximum: a failed dispatch may have taken too long.
     pub fn failed(&mut self, work: f64) {
         self.most = self.most.min(work / 2.0);
     }
 
-    /// Discards the speed, as the work or the device changes.
+    /// Discards the speed of another work or device.
     pub fn forget(&mut self) {
         self.speed = None;
     }
 
-    /// Prepares for a new film, in which no pixel skips samples at first.
+    /// Prepares for a film, in which no pixel skips samples at first.
     pub fn start_film(&mut self) {
         self.speed = self.speed.map(|speed| speed.min(self.speed_of_all));
     }

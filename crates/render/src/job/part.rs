@@ -1,5 +1,4 @@
-//! Parts of an image that are rendered by separate processes and merged: files of finished pieces, with first hits if
-//! layers need them.
+//! Parts of an image that separate processes render: files of finished pieces, with first hits if layers need them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -21,7 +20,7 @@ use wgray_image::Region;
 use wgray_image::blocking_path;
 use wgray_scene::{Integrator, ViewSettings, ViewTransform};
 
-/// The contents of a part's header that the merged image needs besides the films.
+/// Data for the merged image besides the films.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartHeader {
@@ -31,18 +30,18 @@ pub struct PartHeader {
     pub aovs: Vec<String>,
     /// True if the image has alpha.
     pub alpha: bool,
-    /// Bits (f32) of the distance that a PNG of the depth maps to half brightness.
+    /// Bits (f32) of the distance of half brightness in a PNG of the depth.
     pub middle_depth: u32,
     /// Name of the view transform.
     pub view_transform: String,
     /// Bits (f64) of the exposure in stops.
     pub exposure: u64,
-    /// Metadata of the image as names and texts, except those of the renderer.
+    /// Metadata of the image, except the renderer's.
     pub metadata: Vec<(String, String)>,
 }
 
 impl PartHeader {
-    /// Returns the reason why another part does not belong to the same image, if any.
+    /// Returns why another part does not belong to the same image, if it does not.
     fn difference(&self, other: &PartHeader, view_is_given: bool) -> Option<&'static str> {
         let view = |header: &PartHeader| (header.view_transform.clone(), header.exposure);
         if (&self.aovs, self.alpha) != (&other.aovs, other.alpha) {
@@ -56,7 +55,7 @@ impl PartHeader {
         }
     }
 
-    /// Rejects headers that this program never writes: unfinished pieces, layers without data, and invalid depths and
+    /// Rejects headers that this program never writes: unfinished pieces, layers without data, invalid depths and
     /// exposures.
     fn check(&self, identity: &Identity, entries: &[Entry]) -> Result<(), String> {
         let samples = identity.pixel_samples;
@@ -89,7 +88,7 @@ impl PartHeader {
         exposure.map(drop).map_err(|rule| format!("its exposure {rule}"))
     }
 
-    /// Header of a part.
+    /// Returns the header of a part.
     pub fn of(tile: Tile, layout: &Layout, metadata: Metadata) -> PartHeader {
         PartHeader {
             tile,
@@ -114,7 +113,7 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Returns the part's rows of a region, balanced to one row; `None` if the region has fewer rows than parts.
+    /// Returns the part's rows of a region, balanced to one row; `None` with fewer rows than parts.
     pub fn rows(self, region: Region) -> Option<Region> {
         let Tile { number, of } = self;
         let height = u64::from(region.height());
@@ -134,7 +133,7 @@ impl std::fmt::Display for Tile {
     }
 }
 
-/// Writes a part: the finished bands that `render` passes to the sink.
+/// Writes a part: the finished bands that `render` passes on.
 ///
 /// # Errors
 ///
@@ -187,7 +186,7 @@ pub enum PartError {
     Bad {
         /// The file.
         path: PathBuf,
-        /// Description of the error.
+        /// The error.
         what: String,
     },
     /// Missing rows.
@@ -200,16 +199,16 @@ pub enum PartError {
 pub struct Parts {
     /// The job.
     pub identity: Identity,
-    /// The header, equal in all parts except for the tile.
+    /// The header, equal in all parts except the tile.
     pub header: PartHeader,
-    /// Paths and hash keys. Files are opened for each read, as the number of open files is limited.
+    /// Paths and hash keys. Files are opened per read, as the number of open files is limited.
     files: Vec<(PathBuf, Key)>,
-    /// The file and the entry of each piece, by its first row.
+    /// Each piece's file and entry, by first row.
     pieces: BTreeMap<u32, (usize, Entry)>,
 }
 
 impl Parts {
-    /// Opens the parts of an image in any order. Checks that they are complete, of one job, and cover every row once.
+    /// Opens all parts of an image, in any order. Checks that they are complete, of one job, and cover every row once.
     /// Their view settings must agree unless `view_is_given`.
     ///
     /// # Errors
@@ -257,7 +256,6 @@ impl Parts {
         }
     }
 
-    /// Returns the first and the last row of the first gap.
     fn gap(&self) -> Option<(u32, u32)> {
         let Region { y0, y1, .. } = self.identity.region();
         let mut next = y0;
@@ -270,7 +268,7 @@ impl Parts {
         (next < y1).then(|| (next, y1 - 1))
     }
 
-    /// Returns the layout of the merged image, without names that this version of the program does not know.
+    /// Returns the layout of the merged image, without names unknown to this version.
     pub fn layout(&self) -> Layout {
         let Identity {
             picture, pixel_samples, ..
@@ -304,7 +302,7 @@ impl Parts {
     ///
     /// # Errors
     ///
-    /// Errors of the sink, and files that can no longer be read.
+    /// Errors of the sink, and unreadable files.
     pub fn read(&self, sink: &mut Sink) -> Result<(), RenderError> {
         let Identity { adaptive, layers, .. } = self.identity;
         for (number, entry) in self.pieces.values() {
@@ -326,7 +324,7 @@ impl Parts {
     }
 }
 
-/// Describes missing rows, with the missing parts if all parts have the same count.
+/// Describes missing rows, with the missing parts if all count the same.
 fn missing(from: u32, to: u32, tiles: &[Tile]) -> String {
     let rows = match from == to {
         true => format!("row {from} is missing"),
@@ -399,7 +397,7 @@ mod tests {
     use super::*;
     use crate::film::Film;
 
-    /// Returns the error of a part of 4 x 3 pixels with a modified header and piece; empty if it is valid.
+    /// Returns the error of a part of 4 x 3 pixels with a modified header and piece, or an empty text.
     fn error_of(change: impl Fn(&mut Header, &mut FilmPiece)) -> String {
         let region = Region::whole(4, 3);
         let mut header = Header {
@@ -451,7 +449,7 @@ mod tests {
         header.part.as_mut().unwrap()
     }
 
-    /// Files with correct hashes that the program never writes. Fuzzing found that the first case panicked.
+    /// Files with correct hashes that are never written. Fuzzing found that the first case panicked.
     #[test]
     fn what_no_program_writes_is_refused() {
         assert_eq!(error_of(|_, _| ()), "");

@@ -7,14 +7,14 @@ use crate::error::RenderError;
 use crate::film::Film;
 use wgray_image::Region;
 
-/// Rows of an image with the samples that they have so far. Any backend can continue it, with the same bits.
+/// Rows of an image with their samples so far. Any backend can continue it, with the same bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmPiece {
-    /// Whole rows of the region of the job.
+    /// Whole rows of the job's region.
     pub region: Region,
     /// Samples of the film's pixels.
     pub reached: SampleProgress,
-    /// Film of the region. If the piece is unfinished, includes the neighbors that determine its sample counts.
+    /// Film of the region; if unfinished, with the neighbors that determine its sample counts.
     pub film: Film,
 }
 
@@ -33,7 +33,7 @@ pub struct StoredPiece {
 
 /// Storage of pieces while others are rendered.
 pub trait CheckpointStore {
-    /// Returns the pieces from the top. No two of them share a row.
+    /// Returns the pieces from the top, without shared rows.
     fn pieces(&self) -> Vec<StoredPiece>;
 
     /// Loads a piece.
@@ -43,7 +43,7 @@ pub trait CheckpointStore {
     /// Unreadable pieces.
     fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError>;
 
-    /// Stores a piece, and replaces one of the same rows. A failure is reported and does not stop the work.
+    /// Stores a piece in place of those of the same rows. Reports a failure, without stopping the work.
     fn keep(&mut self, piece: &FilmPiece);
 
     /// Flushes all stored pieces to the disk.
@@ -52,11 +52,11 @@ pub trait CheckpointStore {
     /// Interval between checkpoints of unfinished pieces.
     fn interval(&self) -> Duration;
 
-    /// Returns true if pieces should take about one interval each.
+    /// Returns true if pieces should take about one interval.
     fn small_pieces(&self) -> bool;
 }
 
-/// A store that drops everything: the work survives a lost device, but not the process.
+/// Drops everything: the work survives a lost device, but not the process.
 #[derive(Debug)]
 pub struct NoCheckpoint;
 

@@ -1,13 +1,13 @@
-//! File format of checkpoints and parts: a header that identifies the job, then pieces, each with a hash. Numbers are
+//! File format of checkpoints and parts: a header that identifies the job, then hashed pieces. Numbers are
 //! little-endian. Files are only appended to, so that complete pieces stay intact.
 //!
 //! | part | bytes |
 //! | --- | --- |
 //! | file | [`MAGIC`], header, pieces |
 //! | header | length (u32), JSON of a [`Header`], BLAKE3 hash of both |
-//! | piece | 14 words (see `Head`), hash of them, lists of the film, first hits, hash of all preceding bytes |
+//! | piece | 14 words (see `Head`), their hash, lists of the film, first hits, hash of all preceding bytes |
 //!
-//! The hashes of pieces are keyed with the hash of the header, so that pieces of other files are rejected.
+//! Pieces' hashes are keyed with the header's, so that pieces of other files are rejected.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -24,35 +24,31 @@ use crate::film::{Film, FilmLayout};
 use crate::records::FirstHit;
 use wgray_image::Region;
 
-/// First bytes of the file. Text conversions damage them.
+/// First bytes of the file, damaged by text conversions.
 pub const MAGIC: &[u8; 16] = b"\x89wgray pieces\r\n\x1a";
 
-/// Version of the format.
 pub const FORMAT: u32 = 2;
 
-/// Maximum length of the header in bytes.
 const MAX_HEADER_BYTES: u32 = 1 << 20;
 
-/// Header of a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
     /// [`FORMAT`].
     pub format: u32,
-    /// The job.
     pub identity: Identity,
     /// Data for the merged image; `None` in a checkpoint.
     pub part: Option<PartHeader>,
 }
 
-/// Location and contents of a piece in a file.
+/// Location and contents of a piece.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
     pub region: Region,
     pub film: Region,
     /// Samples of the film's pixels.
     pub reached: SampleProgress,
-    /// True if the first hits of its rows follow the film.
+    /// True if first hits follow the film.
     pub has_hits: bool,
     pub start: u64,
     pub end: u64,
@@ -74,11 +70,11 @@ impl Entry {
 
 /// Result of scanning a file.
 pub struct Contents {
-    /// All complete pieces, in file order.
+    /// Complete pieces, in file order.
     pub entries: Vec<Entry>,
-    /// Offset after the last complete piece, or after the header.
+    /// Offset after the last complete piece or the header.
     pub end: u64,
-    /// Number of damaged or incomplete bytes after `end`.
+    /// Damaged or incomplete bytes after `end`.
     pub damaged: u64,
 }
 
@@ -86,14 +82,14 @@ const WORDS: usize = 14;
 const HASH: usize = blake3::OUT_LEN;
 const HEAD: u64 = (4 * WORDS + HASH) as u64;
 
-/// A reader or writer that counts and hashes its bytes.
+/// Counts and hashes the bytes of a reader or writer.
 struct HashingStream<T> {
     inner: T,
     hasher: blake3::Hasher,
     bytes: u64,
 }
 
-/// Hash of a file's header, which keys the hashes of its pieces.
+/// Hash of the header.
 pub type Key = [u8; HASH];
 
 impl<T> HashingStream<T> {
@@ -125,7 +121,7 @@ impl<W: Write> HashingStream<W> {
         Ok(())
     }
 
-    /// Writes the hash of all bytes so far. Later hashes include it.
+    /// Writes the hash of all bytes so far, including hashes.
     fn put_hash(&mut self) -> io::Result<()> {
         let hash = self.hash();
         self.put(&hash)
@@ -160,7 +156,7 @@ impl<R: Read> HashingStream<R> {
         Ok(())
     }
 
-    /// Reads a hash. Returns true if it is that of all bytes so far.
+    /// Reads a hash. Returns true if it is correct.
     fn is_whole(&mut self) -> io::Result<bool> {
         let (hash, mut found) = (self.hash(), [0; HASH]);
         self.get(&mut found)?;
@@ -168,7 +164,7 @@ impl<R: Read> HashingStream<R> {
     }
 }
 
-/// Writes the magic and the header. Returns the hash and the number of bytes.
+/// Writes magic and header. Returns the hash and the number of bytes.
 pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u64)> {
     let text = serde_json::to_vec(header)?;
     let mut out = HashingStream::new(out);
@@ -202,7 +198,7 @@ pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
     if !input.is_whole().map_err(cut)? {
         return Err(cut(io::ErrorKind::InvalidData.into()));
     }
-    // The message names the program version even if that version has other header fields.
+    // The message names the program version, even one with other header fields.
     let header: Header = serde_json::from_slice(&text).map_err(|_| {
         let version = serde_json::from_slice(&text).ok().and_then(|value: serde_json::Value| {
             let version = value.get("identity")?.get("version")?.as_str()?;
@@ -247,7 +243,7 @@ impl Head {
         })
     }
 
-    /// Decodes a head; `None` if it is not valid for the job.
+    /// Returns `None` if the words are not valid for the job.
     fn of(words: &[u32; WORDS], identity: &Identity) -> Option<Head> {
         let &[x0, y0, x1, y1, fx0, fy0, fx1, fy1, start, end, x, y, flags, _] = words;
         let region = |x0, y0, x1, y1| Region { x0, y0, x1, y1 };
@@ -291,7 +287,7 @@ impl Head {
     }
 }
 
-/// Writes a piece, with the first hits of its rows if `hits` is not empty. Returns the number of bytes.
+/// Writes a piece, with first hits unless `hits` is empty. Returns the number of bytes.
 pub fn write_piece(out: &mut impl Write, key: &Key, piece: &FilmPiece, hits: &[FirstHit]) -> io::Result<u64> {
     let lists: Vec<_> = piece.film.lists().collect();
     let head = Head {
@@ -312,7 +308,7 @@ pub fn write_piece(out: &mut impl Write, key: &Key, piece: &FilmPiece, hits: &[F
     Ok(out.bytes)
 }
 
-/// Scans the pieces of a file, up to the first one that is incomplete or damaged. `header` is the end of the header.
+/// Scans the pieces up to the first incomplete or damaged one. `header` is the end of the header.
 pub fn scan(file: &File, identity: &Identity, key: &Key, header: u64) -> io::Result<Contents> {
     let length = file.metadata()?.len();
     let mut input = BufReader::with_capacity(1 << 20, file);
@@ -374,7 +370,7 @@ fn next_entry(
     }))
 }
 
-/// Reads a piece and its first hits, if it has any.
+/// Reads a piece and its first hits, if any.
 pub fn read_piece(
     file: &File,
     key: &Key,
@@ -411,7 +407,7 @@ pub fn read_piece(
     Ok((piece, hits))
 }
 
-/// Returns the numbers of the pieces that no later one replaces, from the top. `entries` are in file order.
+/// Returns the pieces that no later one replaces, from the top. `entries` are in file order.
 pub fn latest(entries: &[Entry]) -> Vec<usize> {
     let mut rows = std::collections::BTreeMap::<u32, usize>::new();
     for (number, entry) in entries.iter().enumerate() {
@@ -420,9 +416,9 @@ pub fn latest(entries: &[Entry]) -> Vec<usize> {
     rows.into_values().collect()
 }
 
-/// Adds a piece to a map from first rows to numbers, and removes all pieces that share rows with it.
+/// Adds a piece to a map from first rows to numbers, replacing those that share rows.
 pub fn replace(rows: &mut std::collections::BTreeMap<u32, usize>, entries: &[Entry], number: usize, region: Region) {
-    // The pieces are disjoint, so only the last one that starts above can overlap.
+    // Pieces are disjoint: only the last one that starts above can overlap.
     let above = rows
         .range(..region.y0)
         .next_back()

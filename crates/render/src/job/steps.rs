@@ -11,24 +11,24 @@ use crate::backend::Backend;
 use crate::error::RenderError;
 use wgray_image::Region;
 
-/// Order of the samples of a film. The result does not depend on it.
+/// Order of a film's samples, which does not change the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Fills a dispatch with samples of a few rows. A kernel that adds more samples at once is faster.
+    /// Fills a dispatch with samples of a few rows. Kernels that add more samples at once are faster.
     Rows,
     /// A few samples of all pixels at a time, for progressive display.
     Pixels,
 }
 
-/// Minimum number of rows of a dispatch under [`Order::Rows`]: two rows of workgroups on a GPU.
+/// Minimum rows of a dispatch under [`Order::Rows`]: two rows of workgroups on a GPU.
 const ROWS: u32 = 16;
 
 /// Samples of the pixels of a film.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SampleProgress {
-    /// Range of samples in progress; all earlier ones are complete. Empty when all samples are.
+    /// Samples in progress; all earlier ones are complete. Empty when all are.
     pub pass: Range<u32>,
-    /// Column and row of the first pixel without them, in row order.
+    /// Column and row of the first pixel without them.
     pub next: [u32; 2],
 }
 
@@ -39,10 +39,9 @@ pub struct Steps {
     order: Order,
     pace: Pace,
     region: Region,
-    /// The region, and the neighbors that need pilot samples.
+    /// The region, and neighbors that need pilot samples.
     film: Region,
     samples: u32,
-    /// Number of samples that all pixels get.
     of_all: u32,
     until: u32,
     reached: SampleProgress,
@@ -63,7 +62,7 @@ impl Dispatch {
 }
 
 impl Steps {
-    /// Creates an empty sequence. A dispatch aims to take `call`.
+    /// Creates an empty sequence, of dispatches that take about `call`.
     pub fn new(split: &WorkSplit, call: Duration, order: Order) -> Steps {
         Steps {
             split: *split,
@@ -82,7 +81,7 @@ impl Steps {
         }
     }
 
-    /// Starts a film of a region, with the speed measured so far. The film has the pixels of [`Steps::film`].
+    /// Starts a film of a region, of the pixels [`Steps::film`]. Keeps the measured speed.
     pub fn start(&mut self, backend: &dyn Backend, region: Region, samples: u32) {
         self.region = region;
         self.samples = samples;
@@ -101,7 +100,7 @@ impl Steps {
         self.next_pass_if_ended();
     }
 
-    /// Stops when all pixels have this number of samples. A pass in progress is completed first.
+    /// Stops when all pixels have this number of samples, and the pass in progress is complete.
     pub fn stop_at(&mut self, samples: u32) {
         self.until = samples.min(self.samples);
         let SampleProgress { pass, next } = &self.reached;
@@ -115,7 +114,7 @@ impl Steps {
         self.film
     }
 
-    /// Returns the samples of the film's pixels, between two dispatches.
+    /// Returns the samples of the film's pixels, between dispatches.
     pub fn reached(&self) -> &SampleProgress {
         &self.reached
     }
@@ -125,7 +124,7 @@ impl Steps {
         self.pace.forget();
     }
 
-    /// Drops a failed dispatch. The next ones are smaller.
+    /// Drops a failed dispatch and makes the next ones smaller.
     pub fn failed(&mut self) {
         self.pace.forget();
         if let Some(call) = self.call.take() {
@@ -133,7 +132,7 @@ impl Steps {
         }
     }
 
-    /// Makes the next dispatch, and returns its samples over all pixels; `None` once the film is complete.
+    /// Makes the next dispatch, and returns its samples over all pixels; `None` if complete.
     pub fn step(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
         if !self.submit(backend)? {
             return Ok(None);
@@ -142,7 +141,7 @@ impl Steps {
         Ok(self.end_call())
     }
 
-    /// Submits the next dispatch without waiting; [`Steps::poll`] completes it. Returns false if the film is complete.
+    /// Submits the next dispatch, for [`Steps::poll`]. Returns false if the film is complete.
     pub fn submit(&mut self, backend: &mut dyn Backend) -> Result<bool, RenderError> {
         if self.is_done() {
             return Ok(false);
@@ -158,7 +157,6 @@ impl Steps {
         Ok(true)
     }
 
-    /// Returns whole rows, or a part of a row if a whole one does not fit a dispatch.
     fn next_tile(&self) -> Region {
         let region = self.region_of_pass();
         let width = u64::from(region.width().max(1));
@@ -182,7 +180,7 @@ impl Steps {
         }
     }
 
-    /// Returns the samples over all pixels of the submitted dispatch if it has ended.
+    /// Returns the samples over all pixels of the submitted dispatch, once it has ended.
     pub fn poll(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
         Ok(if backend.poll()? { self.end_call() } else { None })
     }
@@ -225,13 +223,13 @@ impl Steps {
         self.reached.pass.start
     }
 
-    /// Returns the number of samples of every pixel of a row.
+    /// Returns the number of samples of every pixel in a row.
     pub fn samples_of_row(&self, y: u32) -> u32 {
         let SampleProgress { pass, next } = &self.reached;
         if y < next[1] { pass.end } else { pass.start }
     }
 
-    /// Returns the samples over all pixels per second, after the first dispatch.
+    /// Returns the samples per second over all pixels, after the first dispatch.
     pub fn speed(&self) -> Option<f64> {
         self.pace.speed()
     }
@@ -251,7 +249,7 @@ impl Steps {
     }
 }
 
-/// Returns the region of the film for a region: with its neighbors under adaptive sampling.
+/// Returns the pixels of the film of a region: with neighbors under adaptive sampling.
 pub(super) fn film_of(backend: &dyn Backend, region: Region, samples: u32) -> Region {
     match backend.samples_of_all() < samples {
         true => backend.around(region),

@@ -1,5 +1,5 @@
-//! Arbitrary output variables (AOVs): values of the first hit through each pixel's center, statistics of adaptive
-//! sampling, and means over the samples.
+//! Arbitrary output variables (AOVs): first hits through pixel centers, adaptive sampling statistics, and means over
+//! samples.
 
 use glam::Vec3;
 
@@ -13,24 +13,24 @@ use wgray_scene::Integrator;
 pub enum Aov {
     /// Outward geometric normal.
     Normal,
-    /// Outward shading normal: of the first hit, without normal maps; under the path integrator the mean over the
-    /// samples, with normal maps. The mean of different normals is shorter than 1.
+    /// Outward shading normal: of the first hit, without normal maps; under the path integrator the mean over samples,
+    /// with normal maps, shorter than 1 where they differ.
     ShadingNormal,
     /// Distance along the ray.
     Depth,
     /// Texture coordinates.
     Uv,
-    /// Index of the shape in the scene file; in a mesh, index of the triangle.
+    /// Index of the shape in the scene file; in a mesh, of the triangle.
     Primitive,
     /// Index of the shape in the scene file: `[[shapes]]`, then `[[instances]]`, then lights.
     Instance,
-    /// Barycentric coordinates of the second and third vertex in a triangle of a mesh.
+    /// Barycentric coordinates of a mesh triangle's second and third vertex.
     Barycentric,
-    /// Albedo of the surfaces, including those behind mirrors and glass.
+    /// Albedo, also behind mirrors and glass.
     Albedo,
-    /// Radiance that was scattered once.
+    /// Radiance scattered once.
     Direct,
-    /// Radiance that was scattered more often. The sum of emission, direct and indirect is the image.
+    /// Radiance scattered more often. Emission, direct and indirect add up to the image.
     Indirect,
     /// Unscattered radiance of emitters and the environment.
     Emission,
@@ -45,9 +45,9 @@ pub enum Aov {
 pub enum AovSource {
     /// First hit of the ray through the pixel's center.
     FirstHit,
-    /// Mean over the pixel's samples, with the weights of the radiance. Only under the path integrator.
+    /// Mean over samples, weighted as the radiance. Only under the path integrator.
     Samples,
-    /// Statistics of adaptive sampling. Only under adaptive sampling.
+    /// Adaptive sampling statistics.
     Adaptive,
 }
 
@@ -57,9 +57,9 @@ pub enum Channel {
     Float(&'static str, fn(&FirstHit) -> f32),
     /// An integer of the first hit.
     Whole(&'static str, fn(&FirstHit) -> u32),
-    /// A component of the mean of a film's layer.
+    /// A component of a layer's mean.
     Mean(&'static str, Layer, usize),
-    /// A component of the shading normal: of the mean if the film has layers, else of the first hit.
+    /// A component of the shading normal: of the mean with layers, else of the first hit.
     ShadingNormal(&'static str, usize),
     /// Number of samples.
     Count(&'static str),
@@ -81,7 +81,7 @@ impl Channel {
         matches!(self, Channel::Whole(..) | Channel::Count(_))
     }
 
-    /// Returns the bytes of pixel `i` of a band.
+    /// Returns the bytes of a band's pixel `i`.
     pub fn bytes(&self, band: Band, i: usize) -> [u8; 4] {
         match self {
             Channel::Float(_, value) => value(&band.hits[i]).to_ne_bytes(),
@@ -121,7 +121,7 @@ impl Aov {
         Aov::Variance,
     ];
 
-    /// Returns the source under an integrator, which may lack it: see [`Aov::missing`].
+    /// Returns the source under an integrator, which may lack it: [`Aov::missing`].
     pub fn source(self, integrator: Integrator) -> AovSource {
         match self {
             Aov::ShadingNormal if integrator.has_layers() => AovSource::Samples,
@@ -129,7 +129,7 @@ impl Aov {
         }
     }
 
-    /// Returns the reason why renders with these settings lack the variable, if they do.
+    /// Returns why renders with these settings lack the variable, if they do.
     pub fn missing(self, integrator: Integrator, adaptive: bool) -> Option<&'static str> {
         match self.source(integrator) {
             AovSource::Adaptive if !adaptive => Some("needs adaptive sampling"),
@@ -138,7 +138,7 @@ impl Aov {
         }
     }
 
-    /// Returns the layer of the film that it displays as a radiance image.
+    /// Returns the layer it displays as a radiance image.
     pub fn light(self) -> Option<Layer> {
         self.channels().iter().find_map(|channel| match channel {
             Channel::Mean(_, layer, _) => Some(*layer),
@@ -227,9 +227,9 @@ impl Aov {
         }
     }
 
-    /// Returns the color of pixel `i` of a band in a PNG, before quantization to 8 bits; black without a hit.
+    /// Returns the color of a band's pixel `i` in a PNG, before quantization; black without a hit.
     ///
-    /// - Albedo and radiance: linear; the view transform is applied later.
+    /// - Albedo and radiance: linear, before the view transform.
     /// - Normals: mapped from [-1, 1] to [0, 1].
     /// - Depth d: `1 / (1 + (d / middle)^4)`.
     /// - Texture coordinates: fractional parts in red and green.
@@ -242,7 +242,7 @@ impl Aov {
             return film.layer(layer, i).into();
         }
         match self {
-            // The mean color over the samples: those without a hit count as black.
+            // Samples without a hit count as black.
             Aov::ShadingNormal if film.has_layers() => {
                 Vec3::from(film.layer(Layer::Normal, i)) * 0.5 + 0.5 * film.alpha(i)
             }
@@ -255,7 +255,7 @@ impl Aov {
         }
     }
 
-    /// Returns [`Aov::color`] for a first hit. Variables of other sources have the color of [`Aov::Instance`].
+    /// Returns [`Aov::color`] for a first hit; other sources look like [`Aov::Instance`].
     pub fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
         if hit.shape == NO_INDEX {
             return Vec3::ZERO;
@@ -272,8 +272,8 @@ impl Aov {
     }
 }
 
-/// Returns a color for an index: hues a golden section of the circle apart, so that consecutive indices differ clearly,
-/// in three lightnesses. None of them is black.
+/// Returns a color for an index, never black: hues a golden section of the circle apart, so that consecutive indices
+/// differ clearly, in three lightnesses.
 fn number_color(number: u32) -> Vec3 {
     const GOLDEN_SECTION: u32 = 0x9e37_79b9; // of 2^32
     let hue = number.wrapping_mul(GOLDEN_SECTION) as f32 / u32::MAX as f32 * 6.0;

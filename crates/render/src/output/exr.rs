@@ -1,4 +1,4 @@
-//! OpenEXR files: scan lines of 32-bit or 16-bit samples, compressed without loss, written block by block.
+//! OpenEXR files: scan lines of 32-bit or 16-bit samples, lossless, written block by block.
 
 use std::fs::File;
 use std::io::{self, BufReader, Seek, Write};
@@ -19,9 +19,9 @@ use super::{Band, ExrType, Layout, Metadata, Pending, Pixels, SaveOptions, Sink}
 use crate::error::RenderError;
 use crate::film::mean;
 
-/// Writes the radiance as R, G, B, premultiplied by alpha, the alpha as A, and the AOVs as further channels of the same
-/// part. The display window is the whole image, the data window the region. Returns the number of finite values that
-/// became infinite.
+/// Writes the radiance as R, G, B, premultiplied by alpha, the alpha as A, and AOVs as further channels of the part.
+/// The display window is the whole image, the data window the region. Returns the number of finite values that became
+/// infinite.
 pub fn write(
     files: &mut [Pending],
     layout: &Layout,
@@ -34,7 +34,7 @@ pub fn write(
     let columns = columns(layout);
     let header = header(layout, options, &columns);
     let mut too_large = 0;
-    // The library calls the closure, so errors of the render bypass it.
+    // Errors of the render bypass the library, which calls the closure.
     let mut failed = None;
     let written = write_blocks(file, [header].into_iter().collect(), true, |meta, writer| {
         let mut rows = Rows {
@@ -68,7 +68,7 @@ enum Column {
     Aov(&'static Channel),
 }
 
-/// Returns the channels in the order of the file, which is alphabetical.
+/// Returns the channels in the file's order, alphabetical.
 fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
     let mut columns: Vec<_> = ["R", "G", "B"].into_iter().zip((0..).map(Column::Radiance)).collect();
     if layout.alpha {
@@ -114,24 +114,22 @@ fn header(layout: &Layout, options: &SaveOptions, columns: &[(&str, Column)]) ->
         width as usize,
         height as usize,
     ))));
-    // The library keeps attributes of other names in a hash map and would write them in a random order.
+    // Other attributes are in a hash map and would be written in random order.
     header.own_attributes.software_name = options.metadata.software().map(text);
     header.own_attributes.comments = options.metadata.lines().as_deref().map(text);
     header
 }
 
-/// Encodes text as UTF-8; the format does not define an encoding.
+/// Encodes text as UTF-8, since the format defines no encoding.
 fn text(text: &str) -> Text {
     Text::from_bytes_unchecked(text.as_bytes().iter().copied().collect())
 }
 
-/// Collects rows into blocks.
 struct Rows<'a, W: Write + Seek> {
     columns: &'a [(&'static str, Column)],
     layout: &'a Layout,
     meta: MetaData,
     writer: &'a mut ChunkWriter<W>,
-    /// 16-bit floats.
     half: bool,
     /// Rows per compressed block.
     block_rows: usize,
@@ -182,7 +180,7 @@ impl<W: Write + Seek> Rows<'_, W> {
     }
 }
 
-/// Returns the bytes of a row, channel by channel, and the number of finite values that became infinite in 16 bits.
+/// Returns a row's bytes, channel by channel, and the number of finite values that became infinite in 16 bits.
 fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, half: bool) -> (Vec<u8>, u64) {
     let mut bytes = Vec::with_capacity(4 * columns.len() * pixels.len());
     let mut too_large = 0;
@@ -213,7 +211,6 @@ fn plain(error: Error) -> io::Error {
     }
 }
 
-/// Reads the metadata in the header of an EXR file.
 pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     let meta = MetaData::read_from_buffered(file, false).ok()?;
     let attributes = &meta.headers.first()?.own_attributes;
@@ -222,7 +219,7 @@ pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     Some(Metadata::from_lines(software, &comments.unwrap_or_default()))
 }
 
-/// Reads the channels R, G and B of an EXR file's first layer. Colors with alpha are premultiplied, hence over black.
+/// Reads R, G and B of an EXR file's first layer. Colors with alpha are premultiplied, hence over black.
 ///
 /// # Errors
 ///

@@ -15,11 +15,10 @@ use crate::error::RenderError;
 use crate::film::mean;
 use wgray_image::memory::fallible;
 
-/// Bytes per pixel that the WebP encoder allocates besides the image: a copy of four channels, and the file in a buffer
-/// that doubles as it grows.
+/// Bytes per pixel that the WebP encoder allocates: a copy of four channels, and the file in a buffer that doubles.
 const WEBP_BESIDE: u64 = 12;
 
-/// Writes the radiance. A JPEG of an image with alpha is composited over black.
+/// Writes the radiance, in a JPEG composited over black.
 pub fn write(
     files: &mut [Pending],
     format: Format,
@@ -42,7 +41,7 @@ pub fn write(
         Format::WebP => layout.region.pixels() * WEBP_BESIDE,
         _ => 0,
     };
-    // Allocated before rendering, as a later failure would abort the process. The encoder's part is freed at once.
+    // Before rendering, as a later failure would abort the process. The encoder's part is freed at once.
     let mut pixels: Vec<u8> = room(bytes).ok_or(RenderError::Memory(bytes + beside))?;
     room(beside).ok_or(RenderError::Memory(bytes + beside))?;
     render(&mut |band| {
@@ -95,7 +94,7 @@ fn set_exif(encoder: &mut impl ImageEncoder, exif: Option<Vec<u8>>) -> io::Resul
     }
 }
 
-/// Reads the metadata in the Exif tags of a JPEG or WebP file.
+/// Reads Exif tags of a JPEG or WebP file.
 pub(super) fn read_metadata(mut file: BufReader<File>) -> Option<Metadata> {
     let exif = exif::Reader::new().read_from_container(&mut file).ok()?;
     let text = |tag| match &exif.get_field(tag, In::PRIMARY)?.value {
@@ -106,7 +105,6 @@ pub(super) fn read_metadata(mut file: BufReader<File>) -> Option<Metadata> {
     Some(Metadata::from_lines(text(Tag::Software), &lines))
 }
 
-/// Encodes metadata as Exif: the program as Software, all else as lines of ImageDescription.
 fn exif(metadata: &Metadata) -> io::Result<Option<Vec<u8>>> {
     let tags = [
         (Tag::Software, metadata.software().map(str::to_owned)),

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::{Metadata, exr, flat, png};
 use wgray_image::panic_guard::catch_panic;
 
-/// Reads the metadata of an image that this program wrote, in any of its formats; `None` for other files. The format is
-/// detected from the first bytes.
+/// Reads the metadata of an image by this program, in any of its formats, detected from the first bytes; `None` for
+/// other files.
 pub fn read_metadata(path: &Path) -> Option<Metadata> {
     let mut file = BufReader::new(File::open(path).ok()?);
     let start = file.fill_buf().ok()?;
@@ -19,7 +19,7 @@ pub fn read_metadata(path: &Path) -> Option<Metadata> {
     } else {
         flat::read_metadata
     };
-    // The file may be from anywhere, and the readers are made for good files.
+    // The file may be from anywhere; the readers are made for good ones.
     let metadata = catch_panic(|| read(file)).ok().flatten();
     metadata.filter(|metadata| {
         metadata

@@ -1,5 +1,5 @@
 //! Image files: PNG, JPEG and WebP with display values, OpenEXR with linear values. PNG and OpenEXR are written row by
-//! row, so that an image need not fit memory. Files have temporary names until they are complete.
+//! row, so that an image need not fit memory. Files have temporary names until complete.
 
 mod aov;
 mod exr;
@@ -26,17 +26,17 @@ pub use target::{Format, Layers, SaveReport, Target, files, save};
 /// Contents of an image file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// Width and height of the whole image in pixels.
+    /// Size of the whole image in pixels.
     pub picture: (u32, u32),
     /// Pixels to write.
     pub region: Region,
     /// Layers besides the radiance.
     pub aovs: Vec<Aov>,
-    /// True if the image has alpha, which requires layers in the film. Colors are premultiplied.
+    /// True if the image has alpha, which requires film layers. Colors are premultiplied.
     pub alpha: bool,
     /// Distance of half brightness in a PNG of the depth.
     pub middle_depth: f32,
-    /// Number of samples of full brightness in a PNG of the sample counts.
+    /// Sample count of full brightness in a PNG.
     pub max_samples: u32,
     /// View transform and exposure, except in an EXR.
     pub view: ViewSettings,
@@ -47,9 +47,9 @@ pub struct Layout {
 pub struct Band<'a> {
     /// The radiance.
     pub film: &'a Film,
-    /// First hits of the same pixels; empty if no [`Aov`] of the layout needs them ([`AovSource::FirstHit`]).
+    /// First hits of these pixels; empty if no [`Aov`] of the layout needs them ([`AovSource::FirstHit`]).
     pub hits: &'a [FirstHit],
 }
 
-/// Receives the bands of a region in order, from the top.
+/// Receives a region's bands from the top.
 pub type Sink<'a> = dyn FnMut(Band) -> Result<(), RenderError> + 'a;

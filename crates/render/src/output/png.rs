@@ -13,7 +13,7 @@ use crate::error::RenderError;
 use crate::film::mean;
 use wgray_image::GAMMA;
 
-/// Encodes 8-bit RGB as a PNG in memory, with fast compression.
+/// Encodes 8-bit RGB as a PNG in memory, compressing fast.
 ///
 /// # Errors
 ///
@@ -28,7 +28,7 @@ pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     Ok(file)
 }
 
-/// Reads the Latin-1 text chunks before the pixels of a PNG.
+/// Reads Latin-1 text chunks before the pixels.
 pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     let reader = Decoder::new(file).read_info().ok()?;
     let texts = reader.info().uncompressed_latin1_text.iter();
@@ -46,7 +46,7 @@ fn encoder<W: Write>(file: W, (width, height): (u32, u32), color: ColorType, dep
     png
 }
 
-/// Writes the radiance to the first file and the AOVs to those after it.
+/// Writes radiance to the first file, AOVs to the others.
 pub fn write(
     files: &mut [Pending],
     layout: &Layout,
@@ -90,8 +90,7 @@ pub fn write(
     Ok(())
 }
 
-/// Adds metadata to the header: as Latin-1 text chunks, which every reader supports, or as UTF-8 if the text requires
-/// it.
+/// Adds metadata: Latin-1 text chunks, which every reader supports, or UTF-8 if required.
 fn write_metadata<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) -> Result<(), EncodingError> {
     for (name, text) in metadata.pairs.iter().cloned() {
         match text.chars().all(|c| c <= '\u{ff}') {
@@ -102,7 +101,6 @@ fn write_metadata<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) 
     Ok(())
 }
 
-/// Returns the bytes of all pixels of a band: of the radiance, or of an AOV.
 fn bytes(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> Vec<u8> {
     match (content, layout.alpha) {
         (None, true) => rounded(band, depth, |i| {
@@ -122,7 +120,7 @@ fn bytes(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> 
     }
 }
 
-/// Quantizes the pixels of a band, whose values are from 0 to 1.
+/// Quantizes pixels from 0 to 1.
 fn rounded<const N: usize>(band: Band, depth: BitDepth, pixel: impl Fn(usize) -> [f64; N] + Sync) -> Vec<u8> {
     let pixels = (0..band.film.sums.len()).into_par_iter();
     match depth {

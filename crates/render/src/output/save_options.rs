@@ -32,10 +32,10 @@ impl Default for SaveOptions {
 }
 
 impl SaveOptions {
-    /// Default quality of JPEG files. Losses are invisible in images without text or sharp edges.
+    /// Default JPEG quality. Losses are invisible in images without text or sharp edges.
     pub const QUALITY: u8 = 90;
 
-    /// Returns the options for files with display values, whose metadata (if any) include the view settings.
+    /// Returns the options for display values, whose metadata (if any) include the view settings.
     pub(super) fn of(&self, view: ViewSettings) -> SaveOptions {
         let mut shown = self.clone();
         let pairs = &mut shown.metadata.pairs;
@@ -57,7 +57,7 @@ pub enum BitDepth {
     Sixteen,
 }
 
-/// Type of the float channels of an OpenEXR file. Integer channels are always u32.
+/// Float channels of an OpenEXR file. Integer channels are always u32.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ExrType {
     /// 32 bits, as computed.
@@ -80,7 +80,7 @@ impl ExrType {
     }
 }
 
-/// Compression of an OpenEXR file, always lossless.
+/// Lossless compression of an OpenEXR file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ExrCompression {
     /// Uncompressed.
@@ -92,7 +92,7 @@ pub enum ExrCompression {
     /// Deflate, in blocks of 16 rows.
     #[default]
     Zip,
-    /// Wavelets, in blocks of 32 rows. Efficient for noise.
+    /// Wavelets, in blocks of 32 rows: efficient for noise.
     Piz,
 }
 
@@ -106,7 +106,7 @@ impl ExrCompression {
         ExrCompression::Piz,
     ];
 
-    /// Returns the name in options, which is that of the format.
+    /// Returns the name in options and in the format.
     pub const fn name(self) -> &'static str {
         match self {
             ExrCompression::None => "none",
@@ -131,8 +131,8 @@ impl ExrCompression {
 /// Metadata of an image file: names and texts, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Metadata {
-    /// The name of the program is under [`Metadata::SOFTWARE`]. Other names are 1 to 79 ASCII characters, without
-    /// leading or trailing spaces.
+    /// [`Metadata::SOFTWARE`] names the program. Other names are 1 to 79 ASCII characters, without leading or trailing
+    /// spaces.
     pub pairs: Vec<(String, String)>,
 }
 
@@ -160,7 +160,7 @@ impl Metadata {
         }
     }
 
-    /// Returns all pairs except the software, one per line: `seed: 0`.
+    /// Returns all other pairs, one per line: `seed: 0`.
     pub(super) fn lines(&self) -> Option<String> {
         let others = self.pairs.iter().filter(|(name, _)| name != Metadata::SOFTWARE);
         let lines: Vec<String> = others.map(|(name, text)| format!("{name}: {text}")).collect();

@@ -1,4 +1,4 @@
-//! Output of one render to several image files, which receive the same rows.
+//! Output of a render to several image files, which receive the same rows.
 
 use std::path::{Path, PathBuf};
 
@@ -8,13 +8,13 @@ use crate::error::RenderError;
 /// A format of image files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Display RGB of 8 or 16 bits per channel, with linear alpha if the image has it. [`Aov`]s are separate files.
+    /// Display RGB of 8 or 16 bits per channel, with linear alpha if any. [`Aov`]s are separate files.
     Png,
-    /// Linear float RGB, with alpha if the image has it. [`Aov`]s are further layers.
+    /// Linear float RGB, with alpha if any. [`Aov`]s are further layers.
     Exr,
-    /// Display RGB of 8 bits per channel, lossy. No alpha and no [`Aov`]s. Kept in memory until complete.
+    /// Display RGB of 8 bits per channel, lossy, without alpha and [`Aov`]s. Kept in memory until complete.
     Jpeg,
-    /// Like [`Format::Jpeg`], but lossless, and with alpha if the image has it.
+    /// Like [`Format::Jpeg`], but lossless, and with alpha if any.
     WebP,
 }
 
@@ -32,7 +32,7 @@ impl Format {
         }
     }
 
-    /// Returns the format of a file by its extension: `.png`, `.exr`, `.jpg`, `.jpeg` or `.webp`.
+    /// Returns a file's format by its extension: `.png`, `.exr`, `.jpg`, `.jpeg` or `.webp`.
     pub fn of(path: &Path) -> Option<Format> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         let known = |format: &Format| extension == format.name() || (*format == Format::Jpeg && extension == "jpg");
@@ -48,7 +48,7 @@ impl Format {
         }
     }
 
-    /// Returns the maximum side in pixels if it is below that of scenes.
+    /// Returns the maximum side in pixels, if below that of scenes.
     pub const fn longest_side(self) -> Option<u32> {
         match self {
             Format::Png | Format::Exr => None,
@@ -57,7 +57,7 @@ impl Format {
         }
     }
 
-    /// Checks a size against the limit of the format.
+    /// Checks a size against the format's limit.
     ///
     /// # Errors
     ///
@@ -86,7 +86,7 @@ impl Format {
 /// Location of the [`Aov`]s of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layers {
-    /// In the file of the image.
+    /// In the image file.
     Inside,
     /// In separate files.
     Beside,
@@ -99,18 +99,18 @@ pub enum Layers {
 pub struct Target {
     /// Their format.
     pub format: Format,
-    /// The files in the order of [`files`].
+    /// Files in the order of [`files`].
     pub files: Vec<Pending>,
 }
 
-/// Result of writing images.
+/// Report on written images.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SaveReport {
-    /// Files in which finite values became infinite, as 16-bit floats end at 65,504, and the number of these values.
+    /// Files in which finite values became infinite (16-bit floats end at 65,504), and the number of these values.
     pub too_large: Vec<(String, u64)>,
 }
 
-/// Returns the files of an image: the path itself, and `NAME.normal.png` etc. for the [`Aov`]s of a PNG.
+/// Returns an image's files: the path itself, and `NAME.normal.png` etc. for the [`Aov`]s of a PNG.
 pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
     let mut files = vec![path.to_owned()];
     if format.layers() == Layers::Beside {
@@ -122,8 +122,8 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
     files
 }
 
-/// Writes the bands that `render` passes to the sink to all targets. Files are renamed into place when all are
-/// complete. On failure existing files are unchanged.
+/// Writes the bands that `render` passes on to all targets. Files are renamed into place when all are complete. On
+/// failure existing files are unchanged.
 ///
 /// # Errors
 ///
@@ -142,7 +142,7 @@ pub fn save(
     Ok(saved)
 }
 
-/// Passes every band to `before` and then to the targets. Writers pull bands from a callback, so they are nested.
+/// Passes every band to `before`, then to the targets. Writers pull bands from a callback, so they are nested.
 fn write(
     targets: &mut [Target],
     layout: &Layout,

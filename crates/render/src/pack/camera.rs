@@ -19,7 +19,7 @@ pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u3
         Projection::Panorama => (PANORAMA, 1.0),
     };
     let lens = camera.lens;
-    // The first corner of the aperture polygon is at the top.
+    // The aperture polygon's first corner is at the top.
     let (sin, cos) = lens
         .filter(|lens| lens.blades > 0)
         .map_or((0.0, 1.0), |lens| (FRAC_PI_2 + lens.rotation).sin_cos());

@@ -18,22 +18,22 @@ use wgray_scene::{Color, Scene, Texels, TextureKind};
 /// The emitters of a scene.
 #[derive(Default)]
 pub struct PackedEmitters {
-    /// The lights, the emitters and the light tree.
+    /// Lights, emitters and light tree.
     pub lighting: Lighting,
-    /// The probability of sampling the environment map.
+    /// Probability of sampling the environment map.
     pub environment: f64,
-    /// [`Instance::leaves`](super::Instance::leaves) of each instance; empty without a light tree.
+    /// [`Instance::leaves`](super::Instance::leaves) per instance; empty without a light tree.
     pub instance_leaves: Vec<u32>,
 }
 
-/// Maximum number of emitters that an alias table selects by power alone; more use a light tree.
+/// Maximum number of emitters selected by power alone; more use a light tree.
 pub const MAX_LISTED_EMITTERS: usize = 16;
-/// Maximum number of emitters in a light tree, which takes about 100 bytes each. More are selected by power alone.
+/// Maximum number of emitters in a light tree, at about 100 bytes each. More are selected by power alone.
 const MAX_TREE_EMITTERS: usize = 500_000;
 
 /// Collects all emitters: primitives, delta lights, triangles of meshes and the environment map. Sets
-/// [`Material::density`], the PDF of samples on emissive surfaces. `environment_integral` is the integral of the
-/// environment map over all directions, if the scene has one.
+/// [`Material::density`], the PDF of samples on emissive surfaces. `environment_integral` is the map's over all
+/// directions.
 pub fn emitters(
     scene: &Scene,
     materials: &mut [Material],
@@ -59,7 +59,7 @@ pub fn emitters(
         .collect();
     let mut packed = PackedEmitters::default();
     let mut powers = Vec::new();
-    // Material of each emitter; a unique number for lights without one.
+    // Each emitter's material; a unique number for lights without one.
     let mut kinds = Vec::new();
     for (i, (primitive, _)) in (0..).zip(primitives) {
         let material = &materials[primitive.material as usize];
@@ -126,7 +126,7 @@ pub fn emitters(
     }
     let total: f64 = powers.iter().sum();
     for (material, strength) in materials.iter_mut().zip(strengths) {
-        // With a tiny total, the value of an emissive material without surfaces could overflow.
+        // With a tiny total, the value of an unused emissive material could overflow.
         material.density = if total > 0.0 {
             (strength / total).min(f64::from(f32::MAX)) as f32
         } else {
@@ -152,8 +152,8 @@ pub fn emitters(
 }
 
 /// Defensive sampling of near emitters: scales the power of each kind so that a quarter of the samples are uniform over
-/// all emitters, and a strong emitter that is occluded does not starve the others. Returns the factors of the kinds;
-/// none if only one kind exists.
+/// all emitters, and an occluded strong emitter does not starve the others. Returns the factors of the kinds; none for
+/// a single kind.
 fn defend(powers: &mut [f64], kinds: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
     let mut near: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
     for (i, (power, kind)) in powers.iter().zip(kinds).enumerate() {
@@ -210,7 +210,6 @@ fn environment_light() -> Light {
     }
 }
 
-/// Returns true if an emitter (instance, index of the light or triangle) is infinitely far away.
 fn is_far(lights: &[Light], &(instance, index): &(u32, u32)) -> bool {
     instance == 0 && matches!(lights[index as usize].kind, DIRECTIONAL | ENVIRONMENT)
 }
@@ -219,13 +218,12 @@ struct EmitterRef {
     /// Instance, and index of the light or triangle.
     places: Vec<(u32, u32)>,
     powers: Vec<f64>,
-    /// Mean radiance of each material.
     radiances: Vec<f64>,
     /// Power per area of each material.
     strengths: Vec<f64>,
 }
 
-/// Builds the light tree over all near emitters. The alias table selects the tree or a distant emitter.
+/// Builds the light tree over all near emitters. The alias table selects it or a distant emitter.
 fn with_tree(
     mut packed: PackedEmitters,
     materials: &mut [Material],
@@ -313,7 +311,6 @@ fn with_tree(
     packed
 }
 
-/// Returns the corners of a triangle of an instance, and its material.
 fn face(trees: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
     let instance = &trees.instances[number];
     let mesh = &trees.meshes[instance.mesh as usize];
@@ -328,7 +325,6 @@ fn face(trees: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
     )
 }
 
-/// Returns an emissive triangle for the light tree.
 fn tree_emitter_of_triangle([a, b, c]: [DVec3; 3], radiance: f64, two_sided: bool) -> TreeEmitter {
     let span = (b - a).cross(c - a);
     let area = 0.5 * span.length();
@@ -357,7 +353,7 @@ fn tree_emitter(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f6
     match light.kind {
         POINT => return point(Cone::ALL),
         SPOT => {
-            // Conservative: full intensity within `spread`, then the falloff is below the cosine of the angle beyond.
+            // Conservative: full intensity within `spread`, then below the cosine of the angle beyond.
             let angle = |below_one: f64| (1.0 - below_one).clamp(-1.0, 1.0).acos();
             let cone = f64::from(light.cone);
             let (outer, inner) = (angle(cone), angle(cone - 1.0 / f64::from(light.falloff)));
@@ -399,8 +395,8 @@ fn tree_emitter(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f6
     }
 }
 
-/// Builds an alias table: for each weight a threshold and an alias index. Vose, "A Linear Algorithm for Generating
-/// Random Numbers with a Given Distribution", IEEE TSE 17(9), 1991.
+/// Builds an alias table: thresholds and alias indices. Vose, "A Linear Algorithm for Generating Random Numbers with a
+/// Given Distribution", IEEE TSE 17(9), 1991.
 fn table(weights: &[f64]) -> Vec<(f32, u32)> {
     let mean = weights.iter().sum::<f64>() / weights.len() as f64;
     let mut rest: Vec<f64> = weights.iter().map(|weight| weight / mean).collect();
@@ -417,7 +413,7 @@ fn table(weights: &[f64]) -> Vec<(f32, u32)> {
     table
 }
 
-/// Returns the power of a spot light of intensity 1. The falloff is the square of a ramp that is linear in the cosine.
+/// Returns the power of a spot light of intensity 1. The falloff is a squared ramp, linear in the cosine.
 fn spot_power(light: &Light) -> f64 {
     let (cone, ramp) = (f64::from(light.cone), 1.0 / f64::from(light.falloff));
     2.0 * std::f64::consts::PI * (cone - ramp + ramp / 3.0)
@@ -427,7 +423,7 @@ fn mean(color: Vec3) -> f64 {
     color.as_dvec3().element_sum() / 3.0
 }
 
-/// Returns the mean component of a color, averaged over a texture.
+/// Returns a color's mean component, averaged over a texture.
 fn mean_of(scene: &Scene, color: &Color) -> f64 {
     let mean = |color: DVec3| color.element_sum() / 3.0;
     match *color {
@@ -453,7 +449,6 @@ fn mean_of(scene: &Scene, color: &Color) -> f64 {
     }
 }
 
-/// Returns the light of an emissive primitive.
 fn light_of(primitive: &Primitive, number: u32, material: &Material, t_max: f32) -> Light {
     let [u, v, _] = axes(primitive);
     Light {
@@ -472,7 +467,7 @@ fn light_of(primitive: &Primitive, number: u32, material: &Material, t_max: f32)
     }
 }
 
-/// Returns half the diagonal of the bounding box of all bounded geometry, 1 if it is empty.
+/// Returns half the diagonal of the box around bounded geometry, 1 if it is empty.
 fn radius(primitives: &[(Primitive, bool)], trees: &PackedBvh) -> f64 {
     let spheres = primitives.iter().filter(|(p, _)| p.kind != PLANE).map(|(p, _)| {
         let sphere = bounding_sphere(p);

@@ -1,5 +1,5 @@
-//! Single-scattering albedo tables of rough glass and of anisotropic microfacets, for multiple-scattering compensation.
-//! Computed by quadrature over visible normals.
+//! Single-scattering albedo tables of rough glass and anisotropic microfacets, for multiple-scattering compensation, by
+//! quadrature over visible normals.
 
 use glam::{DVec2, UVec2, Vec2, Vec3};
 
@@ -10,12 +10,12 @@ use crate::cpu::math::{dot, max};
 use crate::cpu::sequence::sobol_sample;
 use crate::cpu::specular::{fresnel, refracted_cosine};
 
-/// Number of sampled normals if the roughness is known, and per row if not. Sobol' points, since few microfacets tilt
-/// enough for total internal reflection, and a grid would miss them.
+/// Sampled normals if the roughness is known, and per row if not. Sobol' points: few microfacets tilt enough for total
+/// internal reflection, and a grid would miss them.
 const NORMAL_SAMPLES: (u32, u32) = (4096, 1024);
 
 /// Returns the tables of both sides, outside first. Rows: sqrt(alpha), 0 to 1; columns: cosine, 0 to 1. If `alpha` is
-/// known only the adjacent rows are computed, and the others are 1.
+/// known only the adjacent rows are computed, and others are 1.
 pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     let last = (ENERGY_SIZE - 1) as f32;
     let wanted = |row: u32| alpha.is_none_or(|alpha| (row as f32 - alpha.sqrt() * last).abs() < 1.0);
@@ -46,7 +46,7 @@ fn points(count: u32) -> Vec<Vec2> {
     (0..count).map(|i| sobol_sample(i, UVec2::new(1, 2))).collect()
 }
 
-/// Returns the single-scattering albedo of rough glass at a cosine, from reflection and transmission.
+/// Returns the single-scattering albedo of rough glass, by reflection and transmission.
 fn glass_albedo(index: f32, alpha: f32, cosine: f32, facets: &[Vec2]) -> f32 {
     let wo = Vec3::new(max(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine);
     glass_albedo_aniso(index, Vec2::splat(alpha), wo, facets)
@@ -73,7 +73,7 @@ fn glass_albedo_aniso(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32
     (sum / facets.len() as f64) as f32
 }
 
-/// Returns the single-scattering albedo of reflection with Schlick's Fresnel term, as F0 x + F90 y. Counterpart of
+/// Returns the single-scattering albedo of reflection with Schlick's Fresnel term, F0 x + F90 y: reference for
 /// `ggx_albedo`.
 fn schlick_albedo(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
     let mut sum = DVec2::ZERO;
@@ -96,15 +96,14 @@ pub enum TableLobes {
     Mirror,
     /// Rough glass, with the bits of its index: from outside, from inside.
     Glass(u32),
-    /// The F0 and F90 parts of reflection, and rough glass if it has an index.
+    /// The F0 and F90 parts of reflection, and rough glass with an index.
     PrincipledLobes(Option<u32>),
 }
 
-/// Number of rows by textured roughness and by textured anisotropy.
+/// Rows by textured roughness and anisotropy.
 const ROWS: (u32, u32) = (10, 6);
 
-/// Correction factor of the tables of glass: total internal reflection makes a kink, where linear interpolation is too
-/// low.
+/// Correction factor of glass tables: at the kink of total internal reflection, linear interpolation is too low.
 const KINK_CORRECTION: f32 = 1.004;
 
 /// Returns the table of anisotropic microfacets for `single_scatter_albedo_aniso`: the numbers of rows by roughness and
@@ -172,13 +171,13 @@ pub fn aniso_table(parts: TableLobes, roughness: Option<f32>, anisotropy: Option
     words
 }
 
-/// Returns the direction at table coordinates. Inverse of `aniso_table_position`.
+/// Inverts `aniso_table_position`.
 fn aniso_direction(alpha: Vec2, place: Vec2) -> Vec3 {
     let roughness = alpha.y + (alpha.x - alpha.y) * (place.x * place.x);
     let between = (roughness * roughness - alpha.y * alpha.y) / max(alpha.x * alpha.x - alpha.y * alpha.y, 1e-12);
     let along = max(0.0, if between > 1.0 { 1.0 } else { between });
     let half_way = 0.5 * roughness.sqrt();
-    // Root of the quadratic equation of `aniso_table_position`.
+    // Root of its quadratic equation.
     let b = 1.0 + 2.0 * half_way - 2.0 * place.y;
     let root = (b * b + 8.0 * half_way * place.y).sqrt();
     let cosine = max(0.5 * (root - b), 1e-3);

@@ -10,16 +10,15 @@ use super::{BACKGROUND, ENVIRONMENT_BLOCKS, ENVIRONMENT_INVISIBLE, ENVIRONMENT_M
 use wgray_scene::downsample::linear;
 use wgray_scene::{self as scene, EnvironmentImage, Scene};
 
-/// Maps with a smaller integral count as black, since their PDFs would approach the subnormal numbers.
+/// Darker maps count as black, since their PDFs would approach the subnormal numbers.
 const DARKEST: f64 = 1e-25;
-/// Blocks with a smaller fraction of the total power get no light samples; only BSDF samples find them.
+/// Blocks with a smaller share of the power get no light samples; only BSDF samples find them.
 const DARKEST_SHARE: f64 = 1e-12;
-/// Number of parts per side of a block; each part has its own mean direction.
+/// Parts per side of a block, each with its own mean direction.
 const PARTS: usize = 4;
 /// Approximate angular radius of a bin of normals.
 const BIN_RADIUS: f64 = 0.06;
 
-/// Location of the environment map in the texels, if the scene has one.
 #[derive(Default)]
 pub struct EnvironmentMap(Option<PackedMap>);
 
@@ -31,12 +30,12 @@ struct PackedMap {
     cells: usize,
     blocks: usize,
     shifts: u32,
-    /// Integral of the mean color component over all directions, by the cells.
+    /// Integral of the mean component over all directions, by cells.
     sum: f64,
 }
 
 impl EnvironmentMap {
-    /// Appends the image's texels and the sampling tables to the scene's texels.
+    /// Appends texels and sampling tables.
     pub fn of(scene: &Scene, texels: &mut Vec<u32>) -> EnvironmentMap {
         let image = scene
             .environment
@@ -58,7 +57,7 @@ impl EnvironmentMap {
             | bit(any(|environment| environment.background.is_some()), BACKGROUND)
     }
 
-    /// Returns the map's fields of the record. `share` is the probability of sampling the map.
+    /// Returns the map's fields. `share` is the probability of sampling it.
     pub fn record(&self, share: f64) -> Environment {
         let Some(map) = &self.0 else {
             return bytemuck::Zeroable::zeroed();
@@ -117,15 +116,14 @@ fn pack_map(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<PackedMa
     })
 }
 
-/// Partition of a map's cells into at most [`ENVIRONMENT_BLOCKS`] x [`ENVIRONMENT_BLOCKS`] blocks. Their sides are
-/// powers of two, except at the right and lower edges.
+/// Partition of the cells into at most [`ENVIRONMENT_BLOCKS`] x [`ENVIRONMENT_BLOCKS`] blocks. Sides are powers of two,
+/// except at the right and lower edges.
 struct Grid {
-    /// Size of the map in cells.
     width: usize,
     height: usize,
-    /// log2 of the width of a block in cells.
+    /// log2 of a block's width in cells.
     along: usize,
-    /// log2 of the height of a block in cells.
+    /// log2 of a block's height in cells.
     down: usize,
 }
 
@@ -138,7 +136,7 @@ struct Part {
 }
 
 impl Grid {
-    /// Returns the partition of a map of this size in texels.
+    /// Takes the size in texels.
     fn of(width: usize, height: usize) -> Grid {
         let most = ENVIRONMENT_BLOCKS as usize;
         let shift = |count: usize| (0..).find(|shift| (count - 1) >> shift < most).unwrap_or(0);
@@ -158,7 +156,6 @@ impl Grid {
         ((self.height - 1) >> self.down) + 1
     }
 
-    /// Number of words of the block tables.
     fn words(&self) -> usize {
         let (side, bins) = (ENVIRONMENT_BLOCKS as usize, (NORMAL_BINS * NORMAL_BINS) as usize + 1);
         self.rows() * side + bins * (self.rows() + 1) * (side + 1)
@@ -171,7 +168,6 @@ impl Grid {
         (0..self.rows()).flat_map(move |row| (0..self.columns()).map(move |column| (columns(column), rows(row))))
     }
 
-    /// Writes the alias table of the cells of each block.
     fn write_cells(&self, weights: &[f64], words: &mut Vec<u32>) {
         let table = |(columns, rows): (Range<usize>, Range<usize>)| {
             let places: Vec<(usize, usize)> = rows
@@ -199,7 +195,7 @@ impl Grid {
         }
     }
 
-    /// Writes the reciprocal power of the blocks, and their distribution per bin of normals and for all directions.
+    /// Writes reciprocal powers of blocks, and their distribution per bin of normals and for all directions.
     fn write_distributions(&self, weights: &[f64], axes: [DVec3; 3], sum: f64, words: &mut Vec<u32>) {
         let side = ENVIRONMENT_BLOCKS as usize;
         let mut powers = vec![0.0; self.rows() * side];
@@ -239,7 +235,6 @@ impl Grid {
         }
         let inverse = |power: &f64| if *power > 0.0 { (1.0 / power) as f32 } else { 0.0 };
         words.extend(powers.iter().map(inverse).map(f32::to_bits));
-        // Angular radius of a cell.
         let cell = ((PI / self.width as f64).powi(2) + (PI / 2.0 / image_rows).powi(2)).sqrt();
         let lobes: Vec<(usize, DVec3, f64, f64)> = (parts.iter())
             .map(|(block, Part { vector, power })| {
@@ -267,7 +262,7 @@ impl Grid {
     }
 }
 
-/// Returns the normal at the center of a bin. Inverse of `normal_bin`.
+/// Returns the normal at the center. Inverse of `normal_bin`.
 fn bin_normal(bin: u32) -> DVec3 {
     let at = |i: u32| f64::from(i) / f64::from(NORMAL_BINS - 1) * 2.0 - 1.0;
     let (x, y) = (at(bin % NORMAL_BINS), at(bin / NORMAL_BINS));
@@ -276,8 +271,8 @@ fn bin_normal(bin: u32) -> DVec3 {
     DVec3::new(folded(x, y), folded(y, x), z).normalize()
 }
 
-/// Returns the mean clamped cosine of directions with cosines uniform in m - r to m + r. Larger if only few are
-/// positive, so that light just above the horizon is sampled often enough.
+/// Returns the mean clamped cosine for cosines uniform in m - r to m + r. Larger if few are positive, so that light
+/// just above the horizon is sampled often enough.
 fn mean_cosine(m: f64, r: f64) -> f64 {
     if m >= r {
         m
@@ -288,7 +283,7 @@ fn mean_cosine(m: f64, r: f64) -> f64 {
     }
 }
 
-/// Writes the cumulative distributions of the rows, and of the blocks in each row.
+/// Writes cumulative distributions of rows, and of blocks in each row.
 fn write_bin(weights: &[f64], words: &mut Vec<u32>) {
     let rows: Vec<&[f64]> = weights.chunks(ENVIRONMENT_BLOCKS as usize).collect();
     let sums: Vec<f64> = rows.iter().map(|row| row.iter().sum()).collect();
@@ -297,7 +292,7 @@ fn write_bin(weights: &[f64], words: &mut Vec<u32>) {
 }
 
 /// Writes the cumulative distribution of up to [`ENVIRONMENT_BLOCKS`] weights in multiples of 2^-24, so that
-/// differences are exact. Intervals of zero weight are empty.
+/// differences are exact. Zero weights give empty intervals.
 fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
@@ -313,7 +308,7 @@ fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
     }
 }
 
-/// Returns the weight of each cell: mean of its corners times its solid angle.
+/// Returns the weights of cells: mean of the corners times the solid angle.
 fn weights(texels: &[u32], width: usize, height: usize) -> Vec<f64> {
     let value = |i: usize| {
         let parts = &texels[3 * i..3 * i + 3];
@@ -333,7 +328,6 @@ fn weights(texels: &[u32], width: usize, height: usize) -> Vec<f64> {
     weights
 }
 
-/// Returns the solid angle of a cell in a row.
 fn solid_angle(row: usize, width: usize, height: usize) -> f64 {
     let border = |row: f64| (row - 0.5).clamp(0.0, height as f64) / height as f64 * std::f64::consts::PI;
     let (above, below) = (border(row as f64), border(row as f64 + 1.0));
@@ -344,7 +338,7 @@ fn solid_angle(row: usize, width: usize, height: usize) -> f64 {
 
 /// Writes the alias table of weights with mean 1: Vose, "A Linear Algorithm for Generating Random Numbers with a Given
 /// Distribution", IEEE TSE 17(9), 1991. Scans replace the lists of small and large weights, which would use as much
-/// memory as the table. The first remaining large weight fills each small one.
+/// memory as the table. The first large weight fills each small one.
 fn write_table(mut rest: Vec<f64>, words: &mut Vec<u32>) {
     let start = words.len();
     words.extend((0..rest.len() as u32).flat_map(|i| [u32::MAX, i]));
@@ -352,7 +346,7 @@ fn write_table(mut rest: Vec<f64>, words: &mut Vec<u32>) {
     let mut large = next_large(&rest, 0);
     for i in 0..rest.len() {
         let mut small = i;
-        // A large weight before `i` that becomes small is filled at once; those after it are reached later.
+        // A large weight before `i` that becomes small is filled at once; later ones are reached in turn.
         while let Some(filling) = large
             && rest[small] < 1.0
         {
@@ -418,7 +412,6 @@ mod tests {
         }
     }
 
-    /// Returns the widths of the intervals of a cumulative distribution.
     fn widths(words: &[u32]) -> Vec<f64> {
         let bounds: Vec<f64> = words.iter().map(|bits| f64::from(f32::from_bits(*bits))).collect();
         assert_eq!((bounds[0], bounds[bounds.len() - 1]), (0.0, 1.0));

@@ -10,7 +10,7 @@ use wgray_scene::{PixelFilter, PixelFilterKind};
 /// Quadrature steps per lobe.
 const STEPS: usize = 1 << 14;
 
-/// Returns the unnormalized value of a filter at a distance from the pixel center in pixels; 0 beyond the radius.
+/// Returns a filter's unnormalized value at a distance from the pixel center in pixels; 0 beyond the radius.
 ///
 /// Mitchell: B = C = 1/3, scaled to the radius ("Reconstruction Filters in Computer Graphics", SIGGRAPH 1988, eq. 8).
 /// Gaussian: standard deviation of radius / 3, shifted to 0 at the radius. Blackman-Harris: four-term window with side
@@ -41,9 +41,8 @@ fn mitchell(x: f64) -> f64 {
     six_times / 6.0
 }
 
-/// Returns the [`FILTER_BINS_MAX`] equally likely bins of a filter: inner edge, outer edge, weight, 0. The bins of a
-/// lobe have equal integrals. Their weight corrects the rounding of the lobe's share to whole bins: close to 1,
-/// negative in negative lobes.
+/// Returns the [`FILTER_BINS_MAX`] equally likely bins of a filter: inner edge, outer edge, weight, 0. A lobe's bins
+/// have equal integrals. Their weight corrects the rounding to whole bins: close to 1, negative in negative lobes.
 pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
@@ -69,7 +68,7 @@ pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     table
 }
 
-/// An interval of a filter in which its sign is constant.
+/// An interval of constant sign.
 struct Lobe {
     start: f64,
     step: f64,
@@ -95,7 +94,7 @@ impl Lobe {
         self.sums[STEPS]
     }
 
-    /// Inverse of the cumulative distribution.
+    /// Inverts the cumulative distribution.
     fn quantile(&self, share: f64) -> f64 {
         let wanted = share * self.integral().abs();
         let above = self.sums.partition_point(|sum| sum.abs() <= wanted);

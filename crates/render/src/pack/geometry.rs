@@ -1,4 +1,4 @@
-//! Builds the TLAS over a scene's primitives and mesh instances.
+//! Builds the TLAS over primitives and mesh instances.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -13,11 +13,11 @@ use crate::records::{PackedBvh, PackedMesh};
 use wgray_scene::mesh::Mesh;
 use wgray_scene::{Geometry, Scene, Shape};
 
-/// Maximum number of bounded primitives without a BVH. Few are faster as constants in a linear loop.
+/// Maximum number of bounded primitives without a BVH: a few are faster as constants in a loop.
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
-/// Builds the BVH over a scene's mesh instances and these primitives, each with its index and true if it casts a
-/// shadow. Also returns [`Counts::item_padding`](super::Counts::room).
+/// Builds the BVH over mesh instances and these primitives, each with its index and true if it casts a shadow. Also
+/// returns [`Counts::item_padding`](super::Counts::room).
 pub fn trees(
     scene: &Scene,
     primitives: &[(u32, &Primitive, bool)],
@@ -83,9 +83,8 @@ pub fn trees(
     (trees, Vec4::new(BOX_PAD * condition_number, farthest, 0.0, 0.0))
 }
 
-/// Returns the meshes that are packed with vertex tangents: those with a normal map in any instance, and those that
-/// have tangents and a material with tangent directions (anisotropy, coat normal map). Without vertex tangents such
-/// directions use the tangents of the triangles.
+/// Returns the meshes packed with vertex tangents: those with a normal map in any instance, and those with tangents and
+/// a material with tangent directions (anisotropy, coat normal map), which else use the triangles' tangents.
 fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
     let needs_tangents = |mesh: &Mesh, material: &usize| {
         let material = &scene.materials[*material];
@@ -101,7 +100,7 @@ fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
 }
 
 impl PackedBvh {
-    /// Sets the buffer rows of the meshes in the instances. Nodes follow all other rows of the first buffer.
+    /// Sets the meshes' buffer rows in the instances. Nodes come last in the first buffer.
     fn place_rows(&mut self) {
         let mut node_row = self.mesh_nodes_row();
         let mut row = 0;

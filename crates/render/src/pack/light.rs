@@ -8,21 +8,21 @@ use super::primitive::parallelogram;
 use super::{DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, RECTANGLE, SPOT};
 use wgray_scene::{self as scene, Scene};
 
-/// `t_max` of shadow rays to directional lights: beyond any scene, with a finite square.
+/// `t_max` to directional lights: beyond any scene, with a finite square.
 pub(super) const DISTANT: f32 = 1e10;
 
-/// Minimum relative distance between the end of a shadow ray and the light sample, as a light may lie on a surface.
+/// Minimum relative distance from a shadow ray's end to the light sample, as lights may lie on surfaces.
 const BEFORE_LIGHT: f64 = 1e-5;
 
-/// Minimum range of the cosine over which a spot light falls off.
+/// Minimum range of the cosine of a spot light's falloff.
 const MIN_FALLOFF: f64 = 1e-12;
 
-/// `t_max` of shadow rays, as a multiple of the vector to the sample.
+/// Returns it relative to the vector to the sample.
 pub(super) fn t_max(shadow_epsilon: f64) -> f32 {
     (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
 }
 
-/// Packs the lights, rectangles first, and counts these. Each rectangle adds a primitive and a material.
+/// Packs the lights, rectangles first, and counts these, which add a primitive and a material each.
 pub(super) fn pack_lights(
     scene: &Scene,
     primitives: &mut Vec<Primitive>,
@@ -107,7 +107,6 @@ fn below_one(angle: f64) -> f64 {
     2.0 * (angle / 2.0).sin().powi(2)
 }
 
-/// Sets the primitives of area lights.
 pub(super) fn connect_lights(lights: &mut [Light], order: &[(Primitive, bool)], shapes: usize) {
     let mut of_number: BTreeMap<u32, u32> = BTreeMap::new();
     for (i, light) in (0..).zip(&*lights) {

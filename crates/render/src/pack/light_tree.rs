@@ -8,12 +8,12 @@ use rayon::prelude::*;
 
 use super::{LightNode, NO_INDEX};
 
-/// Number of buckets per axis for split candidates, section 4.4.
+/// Buckets per axis for split candidates, section 4.4.
 const BUCKETS: usize = 12;
-/// Number of binary splits after which nodes are split at the median, which bounds the depth.
+/// Binary splits after which nodes are split at the median, to bound the depth.
 const LIGHT_TREE_MAX_DEPTH: u32 = 48;
 
-/// Bounds of emission: normals within `spread` of the axis, and emission within `edge` of a normal.
+/// Bounds of emission: normals within `spread` of the axis, emission within `edge` of a normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Unit length.
@@ -22,7 +22,7 @@ pub struct Cone {
     pub spread: f64,
     /// θ_e, 0 to pi / 2.
     pub edge: f64,
-    /// True if the opposite directions are included.
+    /// Includes the opposite directions.
     pub two_sided: bool,
 }
 
@@ -63,8 +63,8 @@ impl Cone {
         if a.spread >= PI {
             return around;
         }
-        // The angle between unit vectors is 2 asin(chord / 2), without the cancellation of acos at small angles. The
-        // bound asin(x) <= x + (pi / 2 - 1) x^3 is cheaper and already decides most cases.
+        // The angle is 2 asin(chord / 2), without the cancellation of acos at small angles. The cheaper bound asin(x)
+        // <= x + (pi / 2 - 1) x^3 decides most cases.
         let chord = (a.axis - b.axis).length();
         let bound = chord + 0.25 * (FRAC_PI_2 - 1.0) * chord.powi(3);
         if bound + b.spread <= a.spread * (1.0 - 1e-12) {
@@ -98,23 +98,22 @@ impl Cone {
 /// An emitter in the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TreeEmitter {
-    /// Lower corner of the bounding box.
+    /// Lower corner of the box.
     pub low: DVec3,
-    /// Upper corner of the bounding box.
+    /// Upper corner of the box.
     pub high: DVec3,
     /// Bounds of the emission.
     pub cone: Cone,
-    /// Maximum intensity over all directions.
+    /// Maximum intensity.
     pub intensity: f64,
-    /// PDF of samples on the emitter by area, times the probability of selecting the tree.
+    /// PDF of samples by area, times the probability of selecting the tree.
     pub density: f64,
-    /// 0 for a light, else 1 + index of the mesh instance.
+    /// 0 for a light, else 1 + mesh instance.
     pub instance: u32,
     /// Index of the light, or of the triangle in its mesh.
     pub index: u32,
 }
 
-/// Bounds of several emitters.
 #[derive(Clone, Copy)]
 struct Bounds {
     low: DVec3,
@@ -153,7 +152,7 @@ impl Bounds {
         all.reduce(|a, b| a.with(&b))
     }
 
-    /// Cost of a node, numerator of equation 2. `room` enlarges the box, so that points have a cost too.
+    /// Returns the numerator of equation 2. `room` enlarges the box, so that points have a cost too.
     fn cost(&self, room: f64) -> f64 {
         let size = self.high - self.low + room;
         let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
@@ -161,13 +160,13 @@ impl Bounds {
     }
 }
 
-/// Maximum number of children of a node.
+/// Maximum children of a node.
 const WIDTH: usize = 4;
 
-/// Minimum number of emitters of a node whose children are built in parallel.
+/// Minimum emitters of a node whose children are built in parallel.
 const PARALLEL: usize = 2048;
 
-/// Builds the tree. The root is node 0.
+/// Builds the tree, root first.
 pub fn build(lamps: &[TreeEmitter]) -> Vec<LightNode> {
     build_with(lamps, PARALLEL)
 }
@@ -195,7 +194,7 @@ struct Builder<'a> {
 struct Part<'a> {
     order: &'a mut [u32],
     bounds: Bounds,
-    /// Number of binary splits above.
+    /// Binary splits above.
     level: u32,
 }
 
@@ -205,7 +204,7 @@ impl Builder<'_> {
         Some(Part { order, bounds, level })
     }
 
-    /// Appends a node and its descendants in depth-first order, and returns the index of the node.
+    /// Appends a node and its descendants depth first, and returns its index.
     fn add_subtree(&self, parent: u32, all: Part, nodes: &mut Vec<LightNode>) -> u32 {
         let number = nodes.len();
         let is_parallel = all.order.len() >= self.parallel;
@@ -242,7 +241,7 @@ impl Builder<'_> {
         number as u32
     }
 
-    /// Returns a node without the indices of its children, and the emitters of each child.
+    /// Returns a node without child indices, and the emitters of each child.
     fn node<'a>(&self, parent: u32, all: Part<'a>) -> (LightNode, Vec<Part<'a>>) {
         let size = (all.bounds.high - all.bounds.low).max_element();
         let room = if size > 0.0 { 1e-3 * size } else { 1.0 };
@@ -282,7 +281,7 @@ impl Builder<'_> {
 
     fn describe(&self, node: &mut LightNode, i: usize, bounds: &Bounds) {
         let center = (0.5 * (bounds.low + bounds.high)).as_vec3();
-        // Distance from the rounded center, with a margin.
+        // Distance from the rounded center.
         let far = (bounds.high - center.as_dvec3()).max(center.as_dvec3() - bounds.low);
         let radius = far.length() * (1.0 + 1e-6);
         let axis = bounds.cone.axis.as_vec3();
@@ -292,11 +291,11 @@ impl Builder<'_> {
         node.cosine[i] = bounds.cone.spread.cos() as f32;
         node.edge[i] = bounds.cone.edge.cos() as f32;
         node.sides[i] = if bounds.cone.two_sided { 2 } else { 1 };
-        // Above 0, which marks an existing child.
+        // Above 0, which marks a child.
         node.intensity[i] = ((bounds.intensity / self.total) as f32).max(f32::MIN_POSITIVE);
     }
 
-    /// Partitions emitters by the surface area orientation heuristic. Returns the size of the first part.
+    /// Partitions emitters by the surface area orientation heuristic. Returns the first part's size.
     fn split(&self, order: &mut [u32], level: u32) -> usize {
         let half = order.len() / 2;
         let middle = |i: &u32| {

@@ -21,19 +21,18 @@ pub struct Appearances {
     pub lookups: Vec<Lookup>,
     pub textures: Vec<Texture>,
     pub texels: Vec<u32>,
-    /// Location of each image's pyramid, by the address of the image.
+    /// Each image's pyramid, by address.
     places: BTreeMap<usize, u32>,
-    /// Levels that the textures of each image need.
+    /// Levels that each image needs.
     levels: BTreeMap<usize, u32>,
-    /// Records of the textures, with one per strength as a normal map.
+    /// Textures, with one per strength as a normal map.
     records: BTreeMap<(usize, Option<u64>), u32>,
-    /// Albedo tables of rough glass, by index of refraction and alpha (`None` if textured).
+    /// Tables of rough glass, by index of refraction and alpha (`None` if textured).
     energies: BTreeMap<(u32, Option<u32>), u32>,
-    /// Albedo tables of anisotropic microfacets, by parts, roughness and anisotropy.
+    /// Tables of anisotropic microfacets, by parts, roughness and anisotropy.
     aniso_table: BTreeMap<(TableLobes, Option<u32>, Option<u32>), u32>,
 }
 
-/// Camera visibility flags.
 fn camera_visibility(material: &scene::Material) -> u32 {
     match &material.reflection {
         _ if !material.visible => 1,
@@ -42,7 +41,7 @@ fn camera_visibility(material: &scene::Material) -> u32 {
     }
 }
 
-/// Record of microfacets. `resolve` looks up a textured roughness.
+/// Packs microfacets. `resolve` looks up a textured roughness.
 fn microfacet_record(
     facets: &Facets,
     resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
@@ -56,7 +55,7 @@ fn microfacet_record(
     }
 }
 
-/// Reduces microfacets to a delta BSDF if they are smooth everywhere. The same applies to glass that hardly refracts.
+/// Reduces smooth microfacets, and glass that hardly refracts, to a delta BSDF.
 fn reduce_to_delta(record: Material, textured: bool) -> Material {
     let polished = !textured && is_polished(&record);
     let kind = match record.kind {
@@ -90,8 +89,8 @@ impl Appearances {
         appearances
     }
 
-    /// Returns the maximum lookups of a material, and of a mirror or glass. Both are the overall maximum for the
-    /// path integrator, which evaluates all materials in one place.
+    /// Returns the maximum lookups of a material, and of a mirror or glass. Both are the overall maximum under `path`,
+    /// which evaluates all materials in one place.
     pub fn lookups(&self, integrator: Integrator) -> (u32, u32) {
         let most = |specular: bool| {
             let materials = self
@@ -123,12 +122,10 @@ impl Appearances {
         lookups.any(|lookup| lookup.purposes & purposes != 0)
     }
 
-    /// Bit mask of the texture kinds.
     pub fn kinds(&self) -> u32 {
         self.textures.iter().fold(0, |bits, texture| bits | 1 << texture.kind)
     }
 
-    /// Bit mask of the texel formats.
     pub fn formats(&self) -> u32 {
         let images = self.textures.iter().filter(|texture| texture.kind >= NEAREST);
         images.fold(0, |bits, texture| bits | 1 << texture.format)
@@ -254,7 +251,7 @@ impl Appearances {
         record
     }
 
-    /// Returns the start of the albedo table of rough glass, which is created on first use.
+    /// Returns the albedo table of rough glass, created on first use.
     fn energy(&mut self, record: &Material, textured: bool) -> u32 {
         let square = 0.5 * facet_alpha(record).length_squared();
         let alpha = if textured { None } else { Some(square.sqrt()) };
@@ -267,7 +264,7 @@ impl Appearances {
         })
     }
 
-    /// Like `energy`, for anisotropic microfacets. `rough` and `long` mean that roughness and anisotropy are textured.
+    /// Like `energy`, for anisotropic microfacets. `rough` and `long`: roughness and anisotropy are textured.
     fn aniso_table(&mut self, record: &Material, parts: TableLobes, rough: bool, long: bool) -> u32 {
         let known = |number: f32, textured: bool| (!textured).then_some(number);
         let (roughness, anisotropy) = (known(record.roughness, rough), known(record.anisotropy, long));
@@ -280,7 +277,7 @@ impl Appearances {
         })
     }
 
-    /// Returns the record of a color texture, or of a normal map if it has a strength.
+    /// Returns the record of a color texture, or with a strength of a normal map.
     fn texture(&mut self, scene: &Scene, i: usize, strength: Option<f64>) -> u32 {
         let key = (i, strength.map(f64::to_bits));
         if let Some(record) = self.records.get(&key) {
@@ -376,7 +373,7 @@ fn wrap(wrap: Wrap) -> u32 {
     }
 }
 
-/// Returns a key of an image, unique during the lifetime of the scene.
+/// Returns an image's key, unique during the lifetime of the scene.
 fn address(image: &Arc<Image>) -> usize {
     Arc::as_ptr(image).addr()
 }
@@ -385,12 +382,12 @@ fn levels_of(image: &Image, filter: TextureFilter) -> u32 {
     if filter.needs_levels() { image.levels() } else { 1 }
 }
 
-/// The lookups of a material: one per texture, with all of its purposes.
+/// A material's lookups: one per texture, with all purposes.
 #[derive(Default)]
 struct Lookups(Vec<Lookup>);
 
 impl Lookups {
-    /// A scalar has a channel and its position in `Lookup::channels`.
+    /// Scalars have a channel and its position in `Lookup::channels`.
     fn add(&mut self, texture: u32, uv_set: u32, purpose: u32, channel: Option<(Channel, u32)>) {
         let known = self.0.iter().position(|lookup| lookup.texture == texture);
         let place = known.unwrap_or_else(|| {
@@ -409,7 +406,6 @@ impl Lookups {
     }
 }
 
-/// Record of a principled material, without the shared parameters.
 fn principled(
     p: &scene::Principled,
     resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
@@ -461,7 +457,7 @@ fn principled(
     }
 }
 
-/// Resolves a scalar: a constant, or a channel of the texture that `resolve` looks up.
+/// Resolves a scalar: a constant, or a texture channel that `resolve` looks up.
 fn resolve_scalar(
     value: &Value,
     purpose: u32,

@@ -1,4 +1,4 @@
-//! Packs meshes into the records that both backends read.
+//! Packs meshes into records.
 
 use std::sync::Arc;
 
@@ -10,11 +10,10 @@ use crate::bvh::{Aabb, build};
 use crate::records::PackedMesh;
 use wgray_scene::mesh::{Mesh, VertexTangents};
 
-/// Maximum number of triangles in a leaf.
 const MAX_LEAF_SIZE: u32 = 4;
 
 impl PackedMesh {
-    /// Packs a mesh, with tangents for normal maps if it has the attributes. The result is cached in the mesh.
+    /// Packs a mesh, with tangents for normal maps if it has the attributes. The mesh caches the result.
     pub(crate) fn cached(mesh: &Arc<Mesh>, with_tangents: bool) -> Arc<PackedMesh> {
         struct WithTangents(Arc<PackedMesh>);
         if with_tangents && !mesh.uvs.is_empty() && !mesh.normals.is_empty() {
@@ -48,7 +47,7 @@ impl PackedMesh {
         let normal = |i: usize| mesh.normals.get(i).copied().unwrap_or_default();
         let own = mesh.positions.len();
         let count = own + copies.len();
-        // Index of the original of a duplicated vertex.
+        // The original of a duplicated vertex.
         let original = |i: usize| if i < own { i } else { copies[i - own] as usize };
         let vertices = (0..count).into_par_iter().map(original);
         let vertices = vertices.map(|i| mesh.positions[i].extend(uv(i).x));

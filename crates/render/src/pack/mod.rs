@@ -1,4 +1,4 @@
-//! Packs a validated scene into the records of both backends, and the constants that specialize kernels.
+//! Packs a validated scene into records, and constants that specialize kernels.
 
 mod camera;
 mod emitters;
@@ -34,8 +34,8 @@ use self::specialize::Parts;
 use crate::records::*;
 use wgray_scene::{PixelFilter, PixelFilterKind, Scene};
 
-/// Minimum offset of ray origins from a surface, relative to the largest coordinate: 32 ulp, the combined rounding
-/// error of the surface and a neighbor (`docs/decisions/shadow-rays.md`).
+/// Minimum offset of ray origins, relative to the largest coordinate: 32 ulp, the rounding error of a surface and a
+/// neighbor (`docs/decisions/shadow-rays.md`).
 const MIN_EPSILON: f64 = 32.0 / 16_777_216.0;
 
 /// Packs a scene.
@@ -122,7 +122,7 @@ pub fn pack(scene: &Scene) -> Packed {
     }
 }
 
-/// Packs the global parameters. `share` is the probability of sampling the environment map.
+/// Packs global values. `share` is the probability of sampling the environment map.
 fn environment(scene: &Scene, around: &EnvironmentMap, share: f64) -> Environment {
     let environment = scene.environment.as_ref();
     let background = environment.and_then(|environment| environment.background);
@@ -137,7 +137,7 @@ fn environment(scene: &Scene, around: &EnvironmentMap, share: f64) -> Environmen
     }
 }
 
-/// Counts the primitives of each kind, which are sorted by kind and by shadow casting, and the rows of the tables.
+/// Counts the sorted primitives of each kind, and the rows of tables.
 fn counts(
     order: &[(Primitive, bool)],
     area_lights: usize,
@@ -175,7 +175,7 @@ fn counts(
     }
 }
 
-/// Returns true if a filter is the box of one pixel, which weights all samples equally.
+/// Returns true for the box of one pixel, which weights all samples equally.
 fn is_pixel(filter: PixelFilter) -> bool {
     filter.kind == PixelFilterKind::Box && filter.radius == 0.5
 }

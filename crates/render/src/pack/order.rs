@@ -1,10 +1,10 @@
-//! The order of primitives: those outside of the BVH first, sorted by kind and by whether they can cast a shadow.
+//! Order of primitives: first those outside of the BVH, by kind and by whether they can cast a shadow.
 
 use super::shadow_casters::{can_cast_shadow, may_cast_shadow};
 use super::{MAX_LINEAR_PRIMITIVES, PLANE, Primitive};
 use wgray_scene::Scene;
 
-/// Primitives in their order, each with true if it can cast a shadow.
+/// Primitives in order, each with true if it can cast a shadow.
 pub struct SortedPrimitives {
     all: Vec<(Primitive, bool)>,
     outside: usize,
@@ -29,24 +29,21 @@ impl SortedPrimitives {
         SortedPrimitives { all, outside }
     }
 
-    /// Returns all primitives.
     pub fn all(&self) -> &[(Primitive, bool)] {
         &self.all
     }
 
-    /// Returns the primitives outside of the BVH.
     pub fn outside(&self) -> &[(Primitive, bool)] {
         &self.all[..self.outside]
     }
 
-    /// Returns the primitives in the BVH, with their indices.
+    /// Returns those in the BVH, with indices.
     pub fn in_bvh(&self) -> Vec<(u32, &Primitive, bool)> {
         let numbers = self.outside as u32..;
         let rest = numbers.zip(&self.all[self.outside..]);
         rest.map(|(i, (primitive, casts))| (i, primitive, *casts)).collect()
     }
 
-    /// Returns the primitives alone.
     pub fn into_primitives(self) -> Vec<Primitive> {
         self.all.into_iter().map(|(primitive, _)| primitive).collect()
     }

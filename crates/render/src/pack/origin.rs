@@ -1,5 +1,5 @@
-//! Origin of the packed coordinates, near the camera's target. A scene a thousand times its size away from the origin
-//! would lose ten of the 24 bits of f32.
+//! Origin of the packed coordinates, near the camera's target. A thousand times its size from the origin, a scene would
+//! lose ten of the 24 bits of f32.
 
 use std::borrow::Cow;
 
@@ -7,8 +7,8 @@ use glam::DVec3;
 
 use wgray_scene::{Camera, Light, Scene};
 
-/// Returns a point near the camera's target, on a grid with cells of a power of 2 that is at least the distance of the
-/// target. Scenes near the origin of the file keep their coordinates, and no coordinate gains digits.
+/// Returns a point near the camera's target, on a grid with cells of a power of 2 of at least the target's distance.
+/// Scenes near the file's origin keep their coordinates, and none gains digits.
 pub fn origin(camera: &Camera) -> DVec3 {
     let cell = camera.position.distance(camera.look_at).log2().ceil().exp2();
     (camera.look_at / cell).round() * cell

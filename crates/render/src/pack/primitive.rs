@@ -1,14 +1,14 @@
-//! Records of primitives, with their bounds and areas.
+//! Records of primitives, bounds and areas.
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::{CYLINDER, DISK, ELLIPSOID, PLANE, Primitive, RECTANGLE, Sphere, TRIANGLE};
 use wgray_scene::{Bounds, Geometry, Parallelogram, Scene};
 
-/// Factor by which bounding spheres are enlarged, for the rounding of the records.
+/// Enlarges bounding spheres, for the rounding of records.
 const SPHERE_MARGIN: f64 = 1.0 + 1e-5;
 
-/// Radius of a plane's bounding sphere: larger than any scene, with a finite square.
+/// Radius of a plane's bounding sphere: beyond any scene, with a finite square.
 const UNBOUNDED: f64 = 1e18;
 
 pub(super) fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
@@ -61,9 +61,8 @@ pub(super) fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: 
     )
 }
 
-/// Returns the primitive with these columns and this translation of the transform to world space. The anchor of a solid
-/// is a surface point towards the origin, so that coordinates near the origin keep their precision however large the
-/// solid is.
+/// Returns the primitive with these columns and this translation to world space. The anchor of a solid is a surface
+/// point towards the origin, so that coordinates near the origin keep their precision for any size.
 pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
     let to_local = columns.inverse();
     let rows = to_local.transpose();
@@ -78,7 +77,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
         anchor = (center + columns * outwards).as_vec3();
         middle = to_local * (center - anchor.as_dvec3());
     }
-    // `level` of a cylinder is that of its side.
+    // `level` of a cylinder is its side's.
     let square = match kind {
         CYLINDER => middle.truncate().length_squared(),
         _ => middle.length_squared(),
@@ -97,8 +96,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
     }
 }
 
-/// Returns a point on the surface of a cylinder near a local point: on a cap if the point is beyond it, else on the
-/// side.
+/// Returns a surface point near a local point: on a cap if that is beyond it, else on the side.
 fn nearest_of_cylinder(point: DVec3) -> DVec3 {
     let across = point.truncate();
     let across = match point.z.abs() > 1.0 && across.length() < 1.0 {
@@ -108,24 +106,22 @@ fn nearest_of_cylinder(point: DVec3) -> DVec3 {
     across.extend(point.z.clamp(-1.0, 1.0))
 }
 
-/// Returns the axes of local space in world space.
+/// Returns the local axes in world space.
 pub fn axes(primitive: &Primitive) -> [DVec3; 3] {
     let columns = columns(primitive);
     [columns.x_axis, columns.y_axis, columns.z_axis]
 }
 
-/// Returns the linear part of the transform to world space.
 fn columns(primitive: &Primitive) -> DMat3 {
     let [x, y, z] = [primitive.x, primitive.y, primitive.z].map(Vec3::as_dvec3);
     DMat3::from_cols(x, y, z).transpose().inverse()
 }
 
-/// Returns the origin of local space in world space.
 fn center(primitive: &Primitive) -> DVec3 {
     primitive.anchor.as_dvec3() + columns(primitive) * primitive.middle.as_dvec3()
 }
 
-/// Returns the bounding box, which is infinite for a plane.
+/// Returns the bounding box, infinite for a plane.
 pub fn bounding_box(primitive: &Primitive) -> Bounds {
     let [a, b, c] = axes(primitive);
     let center = center(primitive);
@@ -145,7 +141,7 @@ pub fn bounding_box(primitive: &Primitive) -> Bounds {
     (center - half, center + half)
 }
 
-/// Returns a bounding sphere, which is larger than any scene for a plane.
+/// Returns a bounding sphere, larger than any scene for a plane.
 pub fn bounding_sphere(primitive: &Primitive) -> Sphere {
     let [a, b, c] = axes(primitive);
     let center = center(primitive);
@@ -170,8 +166,7 @@ pub fn bounding_sphere(primitive: &Primitive) -> Sphere {
     }
 }
 
-/// Returns the area over which light samples are distributed: for an ellipsoid the estimate of `ellipsoid_area` in
-/// WGSL, for a plane 0.
+/// Returns the area for light samples: for an ellipsoid that of `ellipsoid_area` in WGSL, for a plane 0.
 pub fn area(primitive: &Primitive) -> f64 {
     let [u, v, w] = axes(primitive);
     let span = u.cross(v).length();
@@ -190,8 +185,8 @@ pub fn area(primitive: &Primitive) -> f64 {
     }
 }
 
-/// Returns the largest singular value of a linear map: the root of the largest eigenvalue of its transpose times
-/// itself, a symmetric matrix (Smith, "Eigenvalues of a Symmetric 3 x 3 Matrix", CACM 4(4), 1961).
+/// Returns a linear map's largest singular value: the root of the largest eigenvalue of its transpose times itself, a
+/// symmetric matrix (Smith, "Eigenvalues of a Symmetric 3 x 3 Matrix", CACM 4(4), 1961).
 fn largest_stretch(map: DMat3) -> f64 {
     let square = map.transpose() * map;
     let trace = |m: &DMat3| m.x_axis.x + m.y_axis.y + m.z_axis.z;

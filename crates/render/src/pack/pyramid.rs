@@ -8,8 +8,8 @@ use wgray_scene::downsample::{Level, decoded, half_of};
 use wgray_scene::texture::words;
 use wgray_scene::{Encoding, Image, Texels};
 
-/// Appends the table of an image's levels to the texels, and then the levels from the finest on, each row by row from
-/// the bottom. Returns the offset of the table.
+/// Appends the table of an image's levels, then the levels, finest first, row by row from the bottom. Returns the
+/// offset of the table.
 pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     let table = texels.len();
     let is_float = matches!(image.texels, Texels::Floats(_));
@@ -20,7 +20,7 @@ pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     }
     texels.resize(table + levels as usize, 0);
     let height = image.height as usize;
-    // The finest level is not decoded as a whole: its linear colors would use six times the memory of its texels.
+    // Not decoded as a whole: its linear colors would use six times the memory of its texels.
     let mut level = None;
     for i in 0..levels as usize {
         texels[table + i] = texels.len() as u32;
@@ -38,8 +38,7 @@ pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     table as u32
 }
 
-/// Appends rows of `words` words in parallel, to uninitialized memory: a single thread would touch all of it to zero
-/// it.
+/// Appends rows of `words` words in parallel, to uninitialized memory, which a single thread would have to zero.
 fn append<I: Iterator<Item = u32>>(
     texels: &mut Vec<u32>,
     (words, rows): (usize, usize),
@@ -101,21 +100,21 @@ fn steps(x: f64, encoding: Encoding) -> f64 {
     }
 }
 
-/// Packs a color in these steps into a word: see `unpacked_color` in `shaders/texel.wgsl`.
+/// Packs a color into a word, in these steps: see `unpacked_color` in `shaders/texel.wgsl`.
 fn packed(steps: [f64; 3]) -> u32 {
     let exponent = exponent(steps.into_iter().fold(0.0, f64::max));
     joined(steps.map(|x| mantissa(x, exponent)), exponent)
 }
 
-/// Returns the exponent of a color for its largest component, whose mantissa then has nine binary digits, or fewer if
-/// the smallest unit is too large for that.
+/// Returns the exponent for a color's largest component, with a mantissa of nine binary digits, or fewer if the
+/// smallest unit is too large.
 fn exponent(largest: f64) -> u32 {
     let exponent = ((largest as f32).to_bits() >> 23).clamp(103, 134) - 103;
     exponent + u32::from(largest * units(exponent) >= 511.5) // rounds to 512
 }
 
 fn mantissa(x: f64, exponent: u32) -> u32 {
-    // Rounds half up, without a call of the C library.
+    // Rounds half up, without calling the C library.
     let x = x * units(exponent);
     let whole = x as u32;
     whole.saturating_add(u32::from(x - f64::from(whole) >= 0.5)) // tables include exponents too small for x
@@ -125,12 +124,12 @@ fn joined([red, green, blue]: [u32; 3], exponent: u32) -> u32 {
     red | green << 9 | blue << 18 | exponent << 27
 }
 
-/// Returns [`packed`] of a linear color encoded as sRGB in 32-bit floats, in a third of the time; `None` if their error
-/// could change a bit.
+/// Returns [`packed`] of an sRGB-encoded color in 32-bit floats, in a third of the time; `None` if its error could
+/// change a bit.
 fn approximately_packed(color: DVec3) -> Option<u32> {
-    /// Bound of the relative error of the curve, some hundred units in the last place.
+    /// Bound of the curve's relative error, some hundred units in the last place.
     const ERROR: f64 = 1e-5;
-    /// Maximum distance of a mantissa, at most 512, from an integer at which its rounding is certain.
+    /// Maximum distance of a mantissa, at most 512, from an integer for certain rounding.
     const CERTAIN: f64 = 0.5 - 2.0 * 512.0 * ERROR;
     let steps = color.as_vec3().to_array().map(|x| {
         let curve = if x <= 0.003_130_8 {
@@ -146,17 +145,17 @@ fn approximately_packed(color: DVec3) -> Option<u32> {
         return None;
     }
     let mantissas = steps.map(|x| x * units(exponent));
-    // Truncation is faster than `round`, and equal where rounding is certain.
+    // Faster than `round`, and equal where rounding is certain.
     let rounded = mantissas.map(|x| (x + 0.5) as u32);
     let is_certain = (mantissas.iter().zip(rounded)).all(|(x, rounded)| (x - f64::from(rounded)).abs() < CERTAIN);
     is_certain.then(|| joined(rounded, exponent))
 }
 
-/// Tables of [`packed`] for bytes: most of the texels are those of the finest levels.
+/// Tables of [`packed`] for bytes: most texels are of the finest levels.
 struct PackedBytes {
-    /// Exponent of a color for its largest byte.
+    /// Exponent by the largest byte.
     exponents: [u32; 256],
-    /// For each exponent, the mantissas of all bytes.
+    /// Mantissas of all bytes, per exponent.
     mantissas: Vec<[u32; 256]>,
 }
 
@@ -180,7 +179,7 @@ impl PackedBytes {
     }
 }
 
-/// Returns the number of units of an exponent per 8-bit step, a power of two.
+/// Returns the units of an exponent per 8-bit step, a power of two.
 fn units(exponent: u32) -> f64 {
     f64::from(f32::from_bits((159 - exponent) << 23))
 }
@@ -189,7 +188,6 @@ fn units(exponent: u32) -> f64 {
 mod tests {
     use super::*;
 
-    /// Returns numbers that fill the unit interval evenly.
     fn additive(start: f64) -> impl Iterator<Item = f64> {
         (0..).map(move |i| (start + 0.618_033_988_749_895 * f64::from(i)).fract())
     }
@@ -222,7 +220,7 @@ mod tests {
 
     #[test]
     fn mantissas_above_511_have_the_next_exponent() {
-        // The largest mantissa of an exponent, and the smallest of the next one.
+        // The largest mantissa of an exponent, and the smallest of the next.
         for steps in [511.4 / units(20), 511.6 / units(20)] {
             assert_eq!(packed([steps; 3]) >> 27, exponent(steps), "{steps}");
         }

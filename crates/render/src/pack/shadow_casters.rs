@@ -1,5 +1,5 @@
-//! Selection of the primitives that can cast shadows. A flat primitive cannot if all shapes and lights lie on one side
-//! of its plane, like the walls of a room.
+//! Selection of primitives that can cast shadows: not flat ones with all shapes and lights on one side, like the walls
+//! of a room.
 
 use glam::DVec3;
 
@@ -7,13 +7,11 @@ use super::{MAX_LINEAR_PRIMITIVES, Primitive};
 use crate::cpu::primitive::is_solid;
 use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
 
-/// Maximum distance at which a point counts as on a plane, relative to the coordinates: the rounding of the plane's
-/// record.
+/// Maximum distance of points on a plane, relative to the coordinates: the rounding of the plane's record.
 const TOLERANCE: f64 = 1e-6;
 
-/// Returns, for each primitive outside of the BVH, whether it can occlude a surface from a light. If there are more
-/// than [`MAX_LINEAR_PRIMITIVES`], planes are not tested, because the time of each test is proportional to the number
-/// of shapes.
+/// Returns, for each primitive outside of the BVH, whether it can occlude a surface from a light. With more than
+/// [`MAX_LINEAR_PRIMITIVES`], planes are not tested, because each test takes time proportional to the number of shapes.
 pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     let is_tested = primitives.len() <= MAX_LINEAR_PRIMITIVES && !has_environment_map(scene);
     let casts =
@@ -21,11 +19,11 @@ pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     primitives.iter().map(casts).collect()
 }
 
-/// Returns true if the material of a primitive casts shadows.
+/// Returns true if a primitive's material casts shadows.
 pub fn may_cast_shadow(scene: &Scene, primitive: &Primitive) -> bool {
     match scene.shapes.get(primitive.shape as usize) {
         Some(shape) => casts_shadow(scene, shape.material),
-        // An area light that is an emitter occludes light from behind it.
+        // An area light that is an emitter occludes light from behind.
         None => scene.render.integrator.needs_emitters(),
     }
 }
@@ -35,7 +33,7 @@ pub fn casts_shadow(scene: &Scene, material: usize) -> bool {
     scene.render.shadows == Shadows::Opaque || !is_glass
 }
 
-/// Returns true if the scene has an environment map, whose light comes from both sides of every plane.
+/// Returns true for an environment map, which lights both sides of every plane.
 fn has_environment_map(scene: &Scene) -> bool {
     scene
         .environment
@@ -43,7 +41,7 @@ fn has_environment_map(scene: &Scene) -> bool {
         .is_some_and(|environment| environment.image.is_some())
 }
 
-/// Returns true if parts of shapes or lights lie on both sides of the plane of a flat primitive.
+/// Returns true if shapes or lights lie on both sides of a flat primitive's plane.
 fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
     let normal = primitive.z.as_dvec3().normalize();
     let center = primitive.anchor.as_dvec3();
@@ -65,7 +63,7 @@ fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
             shape.geometry.each_extreme(normal, |p| found |= point(p));
             found
         });
-    // Directional lights and planes, which extend to infinity, by direction.
+    // Directional lights and planes are infinite: by direction.
     let both_by_directions = both_by_shapes
         || scene.lights.iter().any(|light| match light {
             Light::Directional { direction, .. } => height(-direction.dot(normal), 1.0),
@@ -86,7 +84,7 @@ mod tests {
     use crate::pack::pack_shapes;
     use wgray_scene::Description;
 
-    /// Returns, for each primitive of a scene with these shapes, whether it can cast a shadow.
+    /// Returns, for each primitive, whether it can cast a shadow.
     fn casting(shapes: &str) -> Vec<bool> {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -9, 1], look_at = [0, 0, 0], fov = 45 }}\n\
@@ -98,7 +96,6 @@ mod tests {
 
     const FLOOR: &str = "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [1, 2, 3]\nnormal = [0.6, 0, 0.8]\n";
 
-    /// Returns a sphere whose center is at a height above the floor.
     fn ball(height: f64) -> String {
         let center = [1.0 + 0.6 * height, 2.0, 3.0 + 0.8 * height];
         format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = {center:?}\nradius = 1\n")

@@ -1,4 +1,4 @@
-//! Specialization of a kernel to the features that a scene uses, so that unused ones cost nothing.
+//! Specialization of a kernel to a scene's features, so that unused ones cost nothing.
 
 use glam::{UVec4, Vec3};
 
@@ -14,12 +14,12 @@ use crate::cpu::lobe::is_polished;
 use crate::records::{LOBES, Lobe, PackedBvh};
 use wgray_scene::{self as scene, Integrator, Pattern, Projection, Reflection, Samples, Scene};
 
-/// The parts of a packed scene that its specialization depends on.
+/// The parts of a scene that its specialization depends on.
 pub(super) struct Parts<'a> {
     pub scene: &'a Scene,
     pub appearances: &'a Appearances,
     pub materials: &'a [Material],
-    /// Number of area lights (rectangles), which are the first.
+    /// Number of area lights (rectangles), which come first.
     pub area_lights: usize,
     pub lights: &'a [Light],
     pub shining: &'a PackedEmitters,
@@ -30,7 +30,6 @@ pub(super) struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    /// Returns the specialization of the scene's kernels.
     pub fn specialization(&self) -> Specialization {
         let Parts {
             scene,
@@ -92,15 +91,15 @@ impl Parts<'_> {
         }
     }
 
-    /// Returns the bits of the kinds of primitives whose range in [`Counts`], up to `end`, is not empty.
+    /// Returns the bits of kinds with a nonempty range in [`Counts`], up to `end`.
     fn kinds(&self, end: fn(UVec4) -> u32) -> u32 {
         let kinds = (0..).zip(self.counts.primitives);
         kinds.fold(0, |bits, (kind, range)| bits | u32::from(end(range) > range.x) << kind)
     }
 }
 
-/// Returns the number of pilot samples of adaptive sampling: whole rounds, at least as many samples as an estimate of
-/// the variance requires, at most `most`.
+/// Returns the number of pilot samples of adaptive sampling: whole rounds, at least as many samples as a variance
+/// estimate requires, at most `most`.
 fn pilot_samples(integrator: Integrator, round: u32, most: u32) -> u32 {
     let least = integrator.pilot_samples();
     least.next_multiple_of(round).max(round).min(most)
@@ -117,7 +116,7 @@ fn pattern(samples: Samples) -> u32 {
     }
 }
 
-/// Returns the side of the grid for patterns with cells, else the number of samples.
+/// Returns the grid's side for patterns with cells, else the number of samples.
 fn side(samples: Samples) -> u32 {
     if samples.pattern.needs_square() {
         samples.count.isqrt()
@@ -148,7 +147,6 @@ fn exponent_bits(validated: &[scene::Material], packed: &[Material]) -> u32 {
     if whole { u32::BITS - largest.leading_zeros() } else { 0 }
 }
 
-/// Returns the bits of the kinds of materials whose BSDF may be a delta.
 fn delta_kinds(materials: &[Material], appearances: &Appearances) -> u32 {
     let may = |material: &&Material| {
         let textured = appearances.has_lookup(material, FOR_ROUGHNESS);
@@ -161,7 +159,7 @@ fn delta_kinds(materials: &[Material], appearances: &Appearances) -> u32 {
         .fold(0, |bits, material| bits | 1 << material.kind)
 }
 
-/// Returns the constants that only the integrator `path` reads.
+/// Sets the constants of the integrator `path`.
 fn of_paths(
     scene: &Scene,
     materials: &[Material],
@@ -197,7 +195,6 @@ fn of_paths(
     }
 }
 
-/// Returns the bits of the lobes that any principled material has.
 fn lobes(materials: &[Material], appearances: &Appearances) -> u32 {
     let mut principled = materials
         .iter()

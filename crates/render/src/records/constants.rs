@@ -15,25 +15,25 @@ constants! {
     pub const PERSPECTIVE: u32 = 0;
     /// [`Camera::projection`]: orthographic.
     pub const ORTHOGRAPHIC: u32 = 1;
-    /// [`Camera::projection`]: equirectangular panorama of all directions.
+    /// [`Camera::projection`]: equirectangular panorama.
     pub const PANORAMA: u32 = 2;
 
     /// [`BvhItem::kind`]: an instance of a mesh.
     pub const INSTANCE: u32 = KINDS;
     /// Flag in [`BvhItem::kind`]: casts shadows.
     pub const CASTS_SHADOW: u32 = 0x100;
-    /// Flag in a mesh group's word: casts no shadow. The other bits are the material index.
+    /// Flag in a mesh group's word, besides the material index: casts no shadow.
     pub const NO_SHADOW: u32 = 0x8000_0000;
     /// [`Instance::shadows`]: some groups cast no shadow.
     pub const SOME_SHADOWS: u32 = 1;
-    /// Maximum number of levels of a BVH.
+    /// Maximum levels of a BVH.
     pub const BVH_MAX_DEPTH: u32 = 32;
-    /// Padding of mesh boxes, relative to coordinates: 32 unit roundoffs, more than the error of a ray-triangle test.
+    /// Padding of mesh boxes, relative to coordinates: 32 unit roundoffs, more than the error of a triangle test.
     pub const BOX_PAD: f32 = 32.0 / 16_777_216.0;
 
     /// [`Material::kind`]: Phong's reflection model.
     pub const PHONG: u32 = 0;
-    /// [`Material::kind`]: the surface of an area light, with a single color.
+    /// [`Material::kind`]: an area light, with a single color.
     pub const EMITTER: u32 = 1;
     /// [`Material::kind`]: a perfect mirror.
     pub const MIRROR: u32 = 2;
@@ -47,81 +47,82 @@ constants! {
     pub const ROUGH_GLASS: u32 = 6;
     /// [`Material::kind`]: a thin sheet of glass, smooth or rough.
     pub const THIN: u32 = 7;
-    /// Bits of the kinds of materials with microfacets.
+    /// Bits of microfacet kinds.
     pub const MICROFACET_KINDS: u32 = 1 << METAL | 1 << ROUGH_GLASS | 1 << THIN;
-    /// Bits of the microfacet kinds that transmit light.
+    /// Bits of transmissive microfacet kinds.
     pub const TRANSMISSIVE_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
-    /// Rows and columns, for each side, of the table at [`Material::energy`].
+    /// Rows and columns, per side, of the table at [`Material::energy`].
     pub const ENERGY_SIZE: u32 = 32;
     /// Rows of the table at [`Material::aniso_table`], by azimuth.
     pub const ANISO_LINES: u32 = 49;
     /// Columns of the table at [`Material::aniso_table`], by cosine.
     pub const ANISO_COLUMNS: u32 = 48;
-    /// Minimum alpha of a microfacet lobe. A lobe whose alphas are all smaller is a delta.
+    /// Minimum alpha of a microfacet lobe; below it in both axes it is a delta.
     pub const SMALLEST_ALPHA: f32 = 1e-3;
     /// [`Material::kind`]: glTF's metallic-roughness material.
     pub const PRINCIPLED: u32 = 8;
-    /// Reflectance of a clear coat at normal incidence, for an index of refraction of 1.5.
+    /// Clear coat reflectance at normal incidence, for index 1.5.
     pub const COAT_F0: f32 = 0.04;
-    /// Minimum sheen roughness; smaller values are clamped.
+    /// Minimum sheen roughness.
     pub const MIN_SHEEN_ROUGHNESS: f32 = 0.15;
     /// [`Material::alpha_mode`]: the surface is opaque.
     pub const OPAQUE: u32 = 0;
-    /// [`Material::alpha_mode`]: the surface exists where its opacity is at least the cutoff.
+    /// [`Material::alpha_mode`]: exists where the opacity is at least the cutoff.
     pub const MASK: u32 = 1;
-    /// [`Material::alpha_mode`]: the opacity is the probability that a ray hits the surface.
+    /// [`Material::alpha_mode`]: the opacity is the probability of a hit.
     pub const BLEND: u32 = 2;
-    /// Maximum number of surfaces that a ray skips by their alpha.
+    /// Maximum number of surfaces skipped by alpha.
     pub const MAX_ALPHA_SKIPS: u32 = 64;
-    /// Bits of the kinds of materials whose BSDF is a pure delta.
+    /// Bits of pure-delta kinds.
     pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
 
     /// [`Light::kind`](super::Light::kind), after the kinds of primitives and instances: a point light.
     pub const POINT: u32 = KINDS + 1;
-    /// [`Light::kind`](super::Light::kind): a directional light.
+    /// [`Light::kind`](super::Light::kind): directional.
     pub const DIRECTIONAL: u32 = KINDS + 2;
     /// [`Light::kind`](super::Light::kind): the environment map.
     pub const ENVIRONMENT: u32 = KINDS + 3;
 
-    /// [`Specialization::environment_flags`](super::Specialization::environment_flags): the scene has an environment map.
+    /// Flag in [`Specialization::environment_flags`](super::Specialization::environment_flags), like the next two: the
+    /// scene has an environment map.
     pub const ENVIRONMENT_MAP: u32 = 1;
-    /// [`Specialization::environment_flags`](super::Specialization::environment_flags): invisible to the camera.
+    /// The environment is invisible to the camera.
     pub const ENVIRONMENT_INVISIBLE: u32 = 2;
-    /// [`Specialization::environment_flags`](super::Specialization::environment_flags): the camera sees a single color.
+    /// The camera sees a single color.
     pub const BACKGROUND: u32 = 4;
-    /// Maximum number of blocks of an environment map's cells along a row or a column, a power of two.
+    /// Maximum number of blocks of the environment map per row or column, a power of two.
     pub const ENVIRONMENT_BLOCKS: u32 = 32;
-    /// Bins of normals per side of the octahedral map, each with a distribution of blocks; odd, to center the axes.
+    /// Bins of normals per side of the octahedral map; odd, to center the axes.
     pub const NORMAL_BINS: u32 = 17;
     /// [`Light::kind`](super::Light::kind): a spot light.
     pub const SPOT: u32 = KINDS + 4;
     /// [`Material::camera_visibility`]: camera rays skip its back faces.
     pub const CULL_BACKFACE: u32 = 2;
-    /// [`Material::vertex_colors`]: vertex colors are ignored.
+    /// [`Material::vertex_colors`]: ignored.
     pub const NO_COLORS: u32 = 0;
-    /// [`Material::vertex_colors`]: they multiply the base color and the opacity.
+    /// [`Material::vertex_colors`]: multiply base color and opacity.
     pub const COLORS_OF_BASE: u32 = 1;
-    /// [`Material::vertex_colors`]: they multiply the emission and the opacity.
+    /// [`Material::vertex_colors`]: multiply emission and opacity.
     pub const COLORS_OF_EMISSION: u32 = 2;
-    /// Maximum number of camera-invisible surfaces that a camera ray skips; the next one is visible.
+    /// Maximum number of camera-invisible surfaces skipped; the next one is visible.
     pub const MAX_CAMERA_SKIPS: u32 = 64;
 
-    /// Number of bounces, from the camera on, at which glass splits a path into reflection and refraction.
+    /// Number of first bounces at which glass splits a path.
     pub const MAX_SPLIT_DEPTH: u32 = 2;
-    /// Maximum number of leaves of a split path.
+    /// Maximum leaves of a split path.
     pub const MAX_PATH_LEAVES: u32 = 4;
 
     /// [`Texture::kind`]: a checkerboard.
     pub const CHECKER: u32 = 0;
     /// [`Texture::kind`]: grid lines.
     pub const LINES: u32 = 1;
-    /// [`Texture::kind`]: an image with nearest-texel lookup.
+    /// [`Texture::kind`]: nearest texel.
     pub const NEAREST: u32 = 2;
-    /// [`Texture::kind`]: an image with bilinear filtering.
+    /// [`Texture::kind`]: bilinear.
     pub const BILINEAR: u32 = 3;
-    /// [`Texture::kind`]: an image with trilinear filtering.
+    /// [`Texture::kind`]: trilinear.
     pub const TRILINEAR: u32 = 4;
-    /// [`Texture::kind`]: an image with the elliptical weighted average (EWA) filter.
+    /// [`Texture::kind`]: elliptical weighted average (EWA).
     pub const EWA: u32 = 5;
 
     /// [`Texture::format`]: 8 bits, sRGB-encoded.
@@ -138,59 +139,59 @@ constants! {
     /// [`Texture::wrap`]: repeat, mirroring every other copy.
     pub const MIRRORED: u32 = 2;
 
-    /// [`Lookup::purposes`], flags of the parameters that a texture sets: [`Material::ambient`].
+    /// [`Lookup::purposes`], flags of parameters: [`Material::ambient`].
     pub const FOR_AMBIENT: u32 = 0x1;
-    /// [`Lookup::purposes`]: [`Material::diffuse`].
+    /// [`Material::diffuse`].
     pub const FOR_DIFFUSE: u32 = 0x2;
-    /// [`Lookup::purposes`]: [`Material::specular`].
+    /// [`Material::specular`].
     pub const FOR_SPECULAR: u32 = 0x4;
-    /// [`Lookup::purposes`]: [`Material::tint`].
+    /// [`Material::tint`].
     pub const FOR_TINT: u32 = 0x8;
-    /// [`Lookup::purposes`]: the normal.
+    /// The normal.
     pub const FOR_NORMAL: u32 = 0x10;
-    /// [`Lookup::purposes`]: [`Material::emission`].
+    /// [`Material::emission`].
     pub const FOR_EMISSION: u32 = 0x20;
-    /// [`Lookup::purposes`]: [`Material::roughness`].
+    /// [`Material::roughness`].
     pub const FOR_ROUGHNESS: u32 = 0x40;
-    /// [`Lookup::purposes`]: [`Material::sheen`].
+    /// [`Material::sheen`].
     pub const FOR_SHEEN: u32 = 0x80;
-    /// [`Lookup::purposes`]: the normal of the clear coat.
+    /// The clear coat's normal.
     pub const FOR_COAT_NORMAL: u32 = 0x100;
-    /// [`Lookup::purposes`]: [`Material::metallic`].
+    /// [`Material::metallic`].
     pub const FOR_METALLIC: u32 = 0x200;
-    /// [`Lookup::purposes`]: [`Material::anisotropy`].
+    /// [`Material::anisotropy`].
     pub const FOR_ANISOTROPY: u32 = 0x400;
-    /// [`Lookup::purposes`]: [`Material::specular_weight`].
+    /// [`Material::specular_weight`].
     pub const FOR_WEIGHT: u32 = 0x800;
-    /// [`Lookup::purposes`]: [`Material::transmission`].
+    /// [`Material::transmission`].
     pub const FOR_TRANSMISSION: u32 = 0x1000;
-    /// [`Lookup::purposes`]: [`Material::clearcoat`].
+    /// [`Material::clearcoat`].
     pub const FOR_COAT: u32 = 0x2000;
-    /// [`Lookup::purposes`]: [`Material::clearcoat_roughness`].
+    /// [`Material::clearcoat_roughness`].
     pub const FOR_COAT_ROUGHNESS: u32 = 0x4000;
-    /// [`Lookup::purposes`]: [`Material::sheen_roughness`].
+    /// [`Material::sheen_roughness`].
     pub const FOR_SHEEN_ROUGHNESS: u32 = 0x8000;
-    /// [`Lookup::purposes`]: [`Material::opacity`].
+    /// [`Material::opacity`].
     pub const FOR_OPACITY: u32 = 0x10000;
-    /// [`Lookup::purposes`]: added to [`Material::rotation`].
+    /// Added to [`Material::rotation`].
     pub const FOR_DIRECTION: u32 = 0x20000;
-    /// [`Lookup::channels`], index of the two bits that select the channel: [`Material::roughness`].
+    /// [`Lookup::channels`], index of the channel's two bits: [`Material::roughness`].
     pub const ROUGHNESS_CHANNEL: u32 = 0;
-    /// [`Lookup::channels`]: [`Material::metallic`].
+    /// That of [`Material::metallic`].
     pub const METALLIC_CHANNEL: u32 = 1;
-    /// [`Lookup::channels`]: [`Material::anisotropy`].
+    /// That of [`Material::anisotropy`].
     pub const ANISOTROPY_CHANNEL: u32 = 2;
-    /// [`Lookup::channels`]: [`Material::specular_weight`].
+    /// That of [`Material::specular_weight`].
     pub const WEIGHT_CHANNEL: u32 = 3;
-    /// [`Lookup::channels`]: [`Material::transmission`].
+    /// That of [`Material::transmission`].
     pub const TRANSMISSION_CHANNEL: u32 = 4;
-    /// [`Lookup::channels`]: [`Material::clearcoat`].
+    /// That of [`Material::clearcoat`].
     pub const COAT_CHANNEL: u32 = 5;
-    /// [`Lookup::channels`]: [`Material::clearcoat_roughness`].
+    /// That of [`Material::clearcoat_roughness`].
     pub const COAT_ROUGHNESS_CHANNEL: u32 = 6;
-    /// [`Lookup::channels`]: [`Material::sheen_roughness`].
+    /// That of [`Material::sheen_roughness`].
     pub const SHEEN_ROUGHNESS_CHANNEL: u32 = 7;
-    /// [`Lookup::channels`]: [`Material::opacity`].
+    /// That of [`Material::opacity`].
     pub const OPACITY_CHANNEL: u32 = 8;
 
     /// [`Pattern::Grid`].
@@ -206,18 +207,18 @@ constants! {
     /// [`Pattern::Sobol`].
     pub const SOBOL: u32 = 5;
 
-    /// Number of bins between the center and the radius of a reconstruction filter.
+    /// Bins between center and radius of a pixel filter.
     pub const FILTER_BINS_MAX: u32 = 128;
 
-    /// Maximum distance of a hit, also that of a miss.
+    /// Distance of a miss, and maximum.
     pub const INFINITE_T: f32 = f32::MAX;
-    /// Index that refers to nothing.
+    /// Refers to nothing.
     pub const NO_INDEX: u32 = u32::MAX;
-    /// The instance and primitive of a ray that does not start on a surface.
+    /// The primitive of a ray that does not start on a surface.
     pub const NO_PRIMITIVE: UVec2 = UVec2::new(0, NO_INDEX);
-    /// Number of shadow rays per block; a 32-bit mask has one bit per ray.
+    /// Shadow rays per block, a bit each of a mask.
     pub const SAMPLE_BLOCK: u32 = 32;
 
-    /// Effective samples of the variance estimate that adaptive sampling requires to repeat the pilot samples once.
+    /// Effective samples of the variance estimate required to repeat the pilot samples once.
     pub const EFFECTIVE_SAMPLES_PER_DOUBLING: f32 = 2.0;
 }

@@ -1,4 +1,4 @@
-//! The lobes of `principled` materials besides the diffuse one, as a table.
+//! The lobes of `principled` materials besides diffuse, as a table.
 
 #[cfg(doc)]
 use super::PRINCIPLED;
@@ -10,24 +10,24 @@ use glam::Vec3;
 pub struct Lobe {
     /// Its bit in [`Specialization::lobes`](super::Specialization::lobes).
     pub bit: u32,
-    /// Its name in `wgray info`.
+    /// Name in `wgray info`.
     pub name: &'static str,
-    /// Purposes of the texture lookups that may give a material this lobe.
+    /// Purposes of lookups that may give a material this lobe.
     pub purposes: u32,
-    /// Returns true if a material has it without textures.
+    /// True if a material has it without textures.
     pub is_in: fn(&Material) -> bool,
 }
 
 constants! {
-    /// A lobe of [`PRINCIPLED`] materials: the reflection of dielectrics and metals.
+    /// Lobe of [`PRINCIPLED`]: reflection of dielectrics and metals.
     pub const LOBE_SPECULAR: u32 = 1;
-    /// A lobe of [`PRINCIPLED`] materials: transmission.
+    /// Lobe of [`PRINCIPLED`]: transmission.
     pub const LOBE_TRANSMISSION: u32 = 2;
-    /// A lobe of [`PRINCIPLED`] materials: the clear coat.
+    /// Lobe of [`PRINCIPLED`]: clear coat.
     pub const LOBE_COAT: u32 = 4;
-    /// A lobe of [`PRINCIPLED`] materials: sheen.
+    /// Lobe of [`PRINCIPLED`]: sheen.
     pub const LOBE_SHEEN: u32 = 8;
-    /// A flag beside the lobes of [`PRINCIPLED`] materials: any is anisotropic.
+    /// Flag beside the lobes of [`PRINCIPLED`]: anisotropy.
     pub const LOBE_ANISOTROPY: u32 = 16;
 }
 

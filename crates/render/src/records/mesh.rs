@@ -1,4 +1,4 @@
-//! Packed meshes: triangles in the order of the leaves of a BVH, and vertex attributes in rows.
+//! Packed meshes: triangles in leaf order, and vertex attributes in rows.
 
 use bytemuck::cast_slice;
 use glam::{UVec4, Vec3, Vec4};
@@ -8,25 +8,25 @@ use super::Node;
 /// A packed mesh, in object space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackedMesh {
-    /// The BVH over its triangles.
+    /// BVH over its triangles.
     pub nodes: Vec<Node>,
-    /// The triangles in the order of the leaves: the indices of three vertices, and the index of the triangle.
+    /// Vertex indices and triangle index, in leaf order.
     pub triangles: Vec<UVec4>,
     /// Position and u of each vertex.
     pub vertices: Vec<Vec4>,
-    /// Normal, or 0, and v of each vertex; empty without normals and texture coordinates.
+    /// Normal, or 0, and v of each vertex; empty without either.
     pub attributes: Vec<Vec4>,
-    /// Tangents along u and v of each vertex, for normal maps; or empty.
+    /// Tangents along u and v of each vertex; or empty.
     pub tangents: Vec<[Vec4; 2]>,
-    /// Color of each vertex, linear RGB and opacity; or empty.
+    /// Linear RGB and opacity of each vertex; or empty.
     pub colors: Vec<Vec4>,
-    /// Further texture coordinates of each vertex, two sets per row, the rows of a vertex together; or empty.
+    /// Further texture coordinates, two sets per row, a vertex's rows together; or empty.
     pub more_uvs: Vec<Vec4>,
-    /// Group of each triangle, in the order of the triangles; empty if there is a single group.
+    /// Group of each triangle, in triangle order; empty for a single group.
     pub groups: Vec<u32>,
-    /// The lower corner of its bounding box.
+    /// Lower corner of its box.
     pub low: Vec3,
-    /// The upper corner of its bounding box.
+    /// Upper corner of its box.
     pub high: Vec3,
 }
 
@@ -36,7 +36,7 @@ impl PackedMesh {
         self.lists().map(|bytes| bytes.len() as u64).sum()
     }
 
-    /// Returns all lists. Every field is named, so that a new one cannot be forgotten.
+    /// Returns all lists. Naming every field prevents forgetting one.
     pub fn lists(&self) -> impl Iterator<Item = &[u8]> {
         let PackedMesh {
             nodes,

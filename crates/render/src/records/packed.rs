@@ -13,61 +13,61 @@ use crate::film::FilmLayout;
 /// A packed scene: the records that both backends read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packed {
-    /// The origin of all coordinates: a point in the space of the scene file.
+    /// Origin of all coordinates, in scene file space.
     pub origin: DVec3,
     /// The camera.
     pub camera: Camera,
     /// The integrator.
     pub integrator: Integrator,
-    /// Values of the scene as a whole.
+    /// Values of the whole scene.
     pub environment: Environment,
-    /// The primitives, including the rectangles of lights. Those outside of the BVH come first, sorted by kind and, for
-    /// each kind, by whether they can cast a shadow.
+    /// Primitives, including lights' rectangles. Those outside of the BVH come first, sorted by kind, then by whether
+    /// they can cast a shadow.
     pub primitives: Vec<Primitive>,
-    /// The bounding sphere of each primitive.
+    /// Bounding sphere of each primitive.
     pub bounds: Vec<Sphere>,
-    /// The BVH over instances of meshes and primitives.
+    /// BVH over mesh instances and primitives.
     pub bvh: PackedBvh,
-    /// The materials of the scene, then one for each area light.
+    /// Materials of the scene, then of each area light.
     pub materials: Vec<Material>,
-    /// The lights and emitters.
+    /// Lights and emitters.
     pub lighting: Lighting,
-    /// The numbers and positions of all records.
+    /// Numbers and positions of records.
     pub counts: Counts,
     /// The textures.
     pub textures: PackedTextures,
-    /// The samples of pixels.
+    /// Pixel samples.
     pub sampling: Sampling,
-    /// The constants of the kernel.
+    /// Constants of the kernel.
     pub specialization: Specialization,
 }
 
-/// The BVH over all instances of meshes, and over the bounded primitives if there are many of them.
+/// The BVH over all mesh instances, and over the bounded primitives if there are many.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedBvh {
     /// Its nodes.
     pub nodes: Vec<Node>,
-    /// The items of its leaves, in their order.
+    /// Items of its leaves, in order.
     pub items: Vec<BvhItem>,
     /// The instances of meshes.
     pub instances: Vec<Instance>,
     /// The meshes.
     pub meshes: Vec<Arc<PackedMesh>>,
-    /// The material of each group of each instance, with the flag [`NO_SHADOW`].
+    /// Material of each group of each instance, with the flag [`NO_SHADOW`].
     pub group_words: Vec<u32>,
 }
 
 /// The lights and emitters of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lighting {
-    /// The lights, rectangles first; each refers to its primitive. If the integrator needs emitters, every emissive
-    /// primitive has a light.
+    /// Lights, rectangles first, with their primitives. If the integrator needs emitters, every emissive primitive has
+    /// one.
     pub lights: Vec<Light>,
-    /// The alias table of emitters, if the integrator needs it.
+    /// Alias table of emitters, if the integrator needs it.
     pub emitters: Vec<Emitter>,
-    /// The light tree, which is a single entry of the alias table; empty if there are few emitters.
+    /// Light tree, a single entry of the alias table; empty if there are few emitters.
     pub nodes: Vec<LightNode>,
-    /// The leaf of each primitive and of each triangle of emissive instances in the light tree, encoded as
+    /// Leaf of each primitive and each triangle of emissive instances in the light tree, encoded as
     /// [`LightNode::parent`], else [`NO_INDEX`].
     pub leaves: Vec<u32>,
 }
@@ -75,9 +75,9 @@ pub struct Lighting {
 /// The textures of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedTextures {
-    /// The lookups of materials.
+    /// Lookups of materials.
     pub lookups: Vec<Lookup>,
-    /// The textures of these lookups.
+    /// Textures of these lookups.
     pub records: Vec<Texture>,
     /// Their images: tables of offsets, and texels.
     pub texels: Vec<u32>,
@@ -86,17 +86,17 @@ pub struct PackedTextures {
 /// The samples of pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sampling {
-    /// The bins of the pixel filter; empty if it is the box of the pixel.
+    /// Bins of the pixel filter; empty for the box of the pixel.
     pub filter_table: Vec<Vec4>,
-    /// The number of samples per pixel; under adaptive sampling the maximum.
+    /// Samples per pixel; under adaptive sampling the maximum.
     pub pixel_samples: u32,
     /// True if sampling is adaptive.
     pub adaptive: bool,
 }
 
 impl Packed {
-    /// Returns the number of light samples per hit over all lights; a point or directional light counts as one. Under
-    /// the integrator `path` it is one for all lights.
+    /// Returns the light samples per hit: those of all lights, one for a point or directional light; under `path` one
+    /// in all.
     pub fn light_samples(&self) -> u64 {
         if self.integrator.needs_emitters() {
             return u64::from(!self.lighting.emitters.is_empty());
@@ -105,21 +105,21 @@ impl Packed {
         u64::from(area_lights) * u64::from(self.specialization.light_samples) + u64::from(lights - area_lights)
     }
 
-    /// Returns the number of emitters that the path tracer samples: lights, emissive surfaces, the environment.
+    /// Returns the number of emitters sampled by the path tracer, including the environment.
     pub fn emitter_count(&self) -> u64 {
         // A light tree is a single entry of the table.
         let in_tree = self.lighting.leaves.iter().filter(|leaf| **leaf != NO_INDEX).count();
         self.lighting.emitters.len().saturating_sub(usize::from(in_tree > 0)) as u64 + in_tree as u64
     }
 
-    /// Returns the scene with layers in its film. Integrators without layers ignore it.
+    /// Adds layers to the film. Integrators without layers ignore it.
     #[must_use]
     pub fn with_layers(mut self) -> Packed {
         self.specialization.layers = self.integrator.has_layers().into();
         self
     }
 
-    /// Returns the scene without layers in its film. The colors are the same.
+    /// Removes layers from the film. The colors are the same.
     #[must_use]
     pub fn without_layers(mut self) -> Packed {
         self.specialization.layers = 0;
@@ -133,7 +133,7 @@ impl Packed {
         (own + of_meshes.sum::<usize>()) as u64
     }
 
-    /// Returns the size of texels and of the sampling tables of environment maps in bytes.
+    /// Returns the size of texels and environment sampling tables in bytes.
     pub fn texel_bytes(&self) -> u64 {
         size_of_val(self.textures.texels.as_slice()) as u64
     }
@@ -144,8 +144,7 @@ impl Packed {
         of_meshes.sum::<u64>() + self.lists().map(|bytes| bytes.len() as u64).sum::<u64>()
     }
 
-    /// Returns the bytes of all lists except those of meshes. Every field is named, so that a new one cannot be
-    /// forgotten.
+    /// Returns the bytes of all lists except those of meshes. Naming every field prevents forgetting one.
     pub fn lists(&self) -> impl Iterator<Item = &[u8]> {
         let Packed {
             origin: _,
@@ -200,7 +199,7 @@ impl Packed {
         lists.into_iter()
     }
 
-    /// Returns true if the image has alpha, that is, a transparent background.
+    /// Returns true for images with a transparent background.
     pub fn has_alpha(&self) -> bool {
         self.specialization.alpha != 0
     }
@@ -234,14 +233,14 @@ impl Packed {
             && pairs.all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
     }
 
-    /// Returns the kinds of primitives in the scene, each with the range of its primitives.
+    /// Returns the kinds of primitives with their ranges.
     pub fn kinds(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
         let kinds = (0..).zip(self.counts.primitives);
         let ranges = kinds.map(|(kind, range)| (kind, range.x as usize..range.z as usize));
         ranges.filter(|(_, range)| !range.is_empty())
     }
 
-    /// Returns the kinds of primitives that can cast shadows, each with their range.
+    /// Returns the kinds of shadow-casting primitives with their ranges.
     pub fn shadow_casters(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
         let kinds = (0..).zip(self.counts.primitives);
         let ranges = kinds.map(|(kind, range)| (kind, range.x as usize..range.y as usize));

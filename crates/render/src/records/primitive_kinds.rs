@@ -1,4 +1,4 @@
-//! The kinds of primitives, as a table for both backends, packing and the dispatch by kind in kernels.
+//! The kinds of primitives, a table for backends, packing and the dispatch by kind in kernels.
 
 #[cfg(doc)]
 use super::Primitive;
@@ -6,20 +6,20 @@ use super::record::constants;
 
 /// A kind of primitive.
 pub struct PrimitiveKind {
-    /// The name of its constant, in Rust and in WGSL.
+    /// Name of its constant, in Rust and WGSL.
     pub name: &'static str,
-    /// Its form: flat, a convex solid or infinite.
+    /// Its form.
     pub form: PrimitiveForm,
 }
 
-/// The form of a kind of primitive.
+/// Form of a kind.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum PrimitiveForm {
     /// Flat and bounded.
     Flat,
     /// The surface of a convex solid: a ray that leaves it through the inside hits it again.
     Solid,
-    /// A plane, which is never in a BVH.
+    /// A plane, never in a BVH.
     Infinite,
 }
 
@@ -27,18 +27,18 @@ macro_rules! primitive_kinds {
     (($d:tt) $($(#[$doc:meta])* $name:ident = $number:literal, $form:ident;)*) => {
         constants! {
             $($(#[$doc])* pub const $name: u32 = $number;)*
-            /// The number of kinds of primitives.
+            /// Number of kinds.
             pub const KINDS: u32 = [$($number),*].len() as u32;
-            /// The bits of the kinds whose primitives have an inside.
+            /// Bits of the kinds with an inside.
             pub const SOLID_KINDS: u32 = solid(PRIMITIVE_KINDS);
         }
 
-        /// All kinds, in the order of their numbers.
+        /// All kinds, by number.
         pub const PRIMITIVE_KINDS: &[PrimitiveKind] = &[
             $(PrimitiveKind { name: stringify!($name), form: PrimitiveForm::$form }),*
         ];
 
-        /// Evaluates an expression with a kind as a constant, so that it is compiled for each kind.
+        /// Compiles an expression for each kind, as a constant.
         macro_rules! with_primitive_kind {
             ($d kind:expr, |$d constant:ident| $d body:expr) => {
                 match $d kind {
@@ -58,17 +58,17 @@ macro_rules! primitive_kinds {
 }
 
 primitive_kinds! { ($)
-    /// [`Primitive::kind`]: |x| <= 1, |y| <= 1, z = 0 in local space.
+    /// [`Primitive::kind`], in local space: |x| <= 1, |y| <= 1, z = 0.
     RECTANGLE = 0, Flat;
-    /// [`Primitive::kind`]: x >= 0, y >= 0, x + y <= 1, z = 0 in local space.
+    /// [`Primitive::kind`]: x >= 0, y >= 0, x + y <= 1, z = 0.
     TRIANGLE = 1, Flat;
-    /// [`Primitive::kind`]: the unit sphere of local space.
+    /// [`Primitive::kind`]: the unit sphere.
     ELLIPSOID = 2, Solid;
-    /// [`Primitive::kind`]: z = 0 in local space.
+    /// [`Primitive::kind`]: z = 0.
     PLANE = 3, Infinite;
-    /// [`Primitive::kind`]: x² + y² <= 1, z = 0 in local space.
+    /// [`Primitive::kind`]: x² + y² <= 1, z = 0.
     DISK = 4, Flat;
-    /// [`Primitive::kind`]: the surface of x² + y² <= 1, |z| <= 1 in local space.
+    /// [`Primitive::kind`]: the surface of x² + y² <= 1, |z| <= 1.
     CYLINDER = 5, Solid;
 }
 

@@ -1,10 +1,10 @@
-//! Records that the host and the shaders share. Each is declared once, as a list of fields that expands to a Rust
-//! struct and to its WGSL declaration. `layout.rs` has the records, `constants.rs` and `specialization.rs` the numbers.
+//! Records that the host and the shaders share, each declared once, as a list of fields that expands to a Rust struct
+//! and its WGSL declaration. `layout.rs` has the records, `constants.rs` and `specialization.rs` the numbers.
 
 use super::KINDS;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
-/// A type that a record's field may have.
+/// A type of a record's field.
 pub trait Field: Copy {
     /// Its name in WGSL.
     const WGSL: &'static str;
@@ -50,11 +50,11 @@ pub trait Record: bytemuck::Pod {
     fn declaration() -> String;
     /// Returns the WGSL expression of its value.
     fn constant(&self) -> String;
-    /// Returns the WGSL expression that reads it from the rows of 16 bytes `r0`, `r1` and so on.
+    /// Returns the WGSL expression that reads it from the 16-byte rows `r0`, `r1` and so on.
     fn from_rows() -> String;
 }
 
-/// Returns the WGSL expression of a field's words in the rows of its record; `offset` and `size` are in bytes.
+/// Returns the WGSL expression of a field's words in its record's rows; `offset` and `size` are in bytes.
 pub fn words_of_row(offset: usize, size: usize) -> String {
     let (row, first, count) = (offset / 16, offset % 16 / 4, size / 4);
     match count {
@@ -63,7 +63,7 @@ pub fn words_of_row(offset: usize, size: usize) -> String {
     }
 }
 
-/// Declares records as Rust structs and implements [`Record`] for each; `WGSL` is the list of their declarations.
+/// Declares records as Rust structs that implement [`Record`]; `WGSL` lists their declarations.
 macro_rules! records {
     ($($(#[$doc:meta])* pub struct $name:ident { $($(#[$field_doc:meta])* pub $field:ident: $ty:ty,)* })*) => {
         $(
@@ -102,7 +102,7 @@ macro_rules! records {
     };
 }
 
-/// Declares constants in Rust; `constant_declarations` returns their WGSL declarations.
+/// Declares constants, and `constant_declarations` for WGSL.
 macro_rules! constants {
     ($($(#[$doc:meta])* pub const $name:ident: $ty:ty = $value:expr;)*) => {
         $($(#[$doc])* pub const $name: $ty = $value;)*

@@ -1,6 +1,6 @@
-//! The constants for which a kernel is compiled: features of its scene, and its settings.
+//! The constants of a kernel: features of its scene, and its settings.
 
-/// Declares [`Specialization`] and the overrides of the shaders from one list of fields.
+/// Declares [`Specialization`] and the shaders' overrides.
 macro_rules! specialization {
     ($($(#[$doc:meta])* $field:ident = $name:literal),* $(,)?) => {
         /// The override constants of a kernel. Each distinct value needs its own compilation.
@@ -8,7 +8,7 @@ macro_rules! specialization {
         pub struct Specialization { $($(#[$doc])* pub $field: u32,)* }
 
         impl Specialization {
-            /// Returns the values with the names of the overrides.
+            /// Returns the overrides' names and values.
             pub fn constants(&self) -> Vec<(&'static str, u32)> {
                 vec![$(($name, self.$field)),*]
             }
@@ -18,7 +18,7 @@ macro_rules! specialization {
                 self.environment_flags & super::ENVIRONMENT_MAP != 0
             }
 
-            /// Returns the declarations of the overrides in WGSL.
+            /// Returns the overrides' declarations in WGSL.
             pub fn declarations() -> String {
                 concat!($("override ", $name, ": u32;\n"),*).to_string()
             }
@@ -27,91 +27,91 @@ macro_rules! specialization {
 }
 
 specialization! {
-    /// Bit i is set if primitives of kind i exist outside of the BVH.
+    /// Bit i: primitives of kind i exist outside of the BVH.
     primitives = "PRIMITIVES",
-    /// Bit i is set if any of these can cast a shadow.
+    /// Bit i: any of these can cast a shadow.
     shadow_casters = "SHADOW_CASTERS",
-    /// Bit i is set if the scene's BVH has primitives of kind i; [`INSTANCE`](super::INSTANCE) for meshes.
+    /// Bit i: the scene's BVH has primitives of kind i; [`INSTANCE`](super::INSTANCE) for meshes.
     tlas_kinds = "TLAS_KINDS",
-    /// Bit 0 is set if area lights exist, bit 1 if other lights do, bit 2 if these include spot lights.
+    /// Bit 0: area lights exist; bit 1: other lights do; bit 2: these include spot lights.
     lights = "LIGHTS",
-    /// 1 if the camera has a lens, else 0.
+    /// 1 with a lens, else 0.
     lens = "LENS",
-    /// 1 if the camera is a panorama, else 0.
+    /// 1 for a panorama, else 0.
     panoramic = "PANORAMIC",
-    /// 1 if any surface is invisible to the camera, else 0.
+    /// 1 with camera-invisible surfaces, else 0.
     camera_invisible = "CAMERA_INVISIBLE",
-    /// Pattern of the samples of a pixel.
+    /// Pattern of pixel samples.
     pixel_pattern = "PIXEL_PATTERN",
-    /// Side of its grid of cells; number of samples for patterns without cells.
+    /// Side of its grid of cells; else number of samples.
     pixel_side = "PIXEL_SIDE",
-    /// Number of samples per pixel; per round under adaptive sampling.
+    /// Samples per pixel; per round under adaptive sampling.
     pixel_samples = "PIXEL_SAMPLES",
-    /// Pattern of the samples of an area light.
+    /// Pattern of area light samples.
     light_pattern = "LIGHT_PATTERN",
-    /// Side of its grid of cells; number of samples for patterns without cells.
+    /// Side of its grid of cells; else number of samples.
     light_side = "LIGHT_SIDE",
-    /// Number of samples per area light.
+    /// Samples per area light.
     light_samples = "LIGHT_SAMPLES",
-    /// Number of bins of the filter table; 0 for a box filter of one pixel.
+    /// Bins of the filter table; 0 for a box filter of one pixel.
     filter_bins = "FILTER_BINS",
-    /// Number of pilot samples per pixel; all samples without adaptive sampling.
+    /// Pilot samples per pixel; all without adaptive sampling.
     pilot_samples = "PILOT_SAMPLES",
-    /// Bits of the `f32` that is the square of adaptive sampling's target error.
+    /// Bits of the `f32` squared target error of adaptive sampling.
     squared_error = "SQUARED_ERROR",
     /// Bit length of the largest shininess if all are integers up to 4096, else 0.
     exponent_bits = "EXPONENT_BITS",
-    /// Maximum number of bounces of a path; under the integrator `phong` 0 without specular materials.
+    /// Maximum bounces; under `phong` 0 without specular materials.
     bounces = "BOUNCES",
-    /// 1 if rays carry differentials, else 0.
+    /// 1 with ray differentials, else 0.
     differentials = "DIFFERENTIALS",
-    /// Maximum number of texture lookups of a material that is neither a mirror nor glass.
+    /// Maximum texture lookups of a material except mirrors and glass.
     lookups = "LOOKUPS",
-    /// Maximum number of texture lookups of a mirror or glass.
+    /// Maximum texture lookups of a mirror or glass.
     specular_lookups = "SPECULAR_LOOKUPS",
-    /// 1 if any texture is a normal map, else 0.
+    /// 1 with normal maps, else 0.
     normal_maps = "NORMAL_MAPS",
-    /// Bit i is set if textures of kind i exist.
+    /// Bit i: textures of kind i exist.
     texture_kinds = "TEXTURE_KINDS",
-    /// Bit i is set if texels of format i exist.
+    /// Bit i: texels of format i exist.
     texel_formats = "TEXEL_FORMATS",
-    /// 1 if any texture uses a set of texture coordinates other than the first, else 0.
+    /// 1 if textures use further texture coordinates, else 0.
     uv_sets = "UV_SETS",
-    /// 1 if any material uses vertex colors and any mesh has them, else 0.
+    /// 1 if vertex colors exist and are used, else 0.
     vertex_colors = "VERTEX_COLORS",
-    /// Under the integrator `path`, like all fields below: bit i is set if materials of kind i exist.
+    /// Under `path`, like all fields below. Bit i: materials of kind i exist.
     materials = "MATERIALS",
-    /// 1 if any diffuse material is rough, else 0.
+    /// 1 with rough diffuse materials, else 0.
     rough = "ROUGH",
-    /// Bit i is set if the BSDF of a material of kind i may be a pure delta.
+    /// Bit i: BSDFs of kind i may be pure deltas.
     delta_kinds = "DELTA_KINDS",
-    /// 1 if any microfacet material is anisotropic, else 0.
+    /// 1 with anisotropic microfacets, else 0.
     anisotropic = "ANISOTROPIC",
     /// Bits of the lobes of [`PRINCIPLED`](super::PRINCIPLED) materials, such as [`LOBE_COAT`](super::LOBE_COAT).
     lobes = "LOBES",
-    /// 1 if rays may skip any surface by its alpha, else 0.
+    /// 1 if rays may skip surfaces by alpha, else 0.
     alpha_surfaces = "ALPHA_SURFACES",
-    /// 1 if any medium absorbs light, else 0.
+    /// 1 with absorbing media, else 0.
     absorption = "ABSORPTION",
-    /// 1 if any surface is emissive, else 0.
+    /// 1 with emissive surfaces, else 0.
     emissive = "EMISSIVE",
-    /// 0 if no light can be sampled, 1 for a single emitter, else 2.
+    /// 0 without sampled lights, 1 for a single emitter, else 2.
     emitters = "EMITTERS",
-    /// 1 if a light tree selects emitters, else 0.
+    /// 1 with a light tree, else 0.
     light_tree = "LIGHT_TREE",
-    /// Bit i is set if lights of kind i exist, that of [`INSTANCE`](super::INSTANCE) if meshes are emissive.
+    /// Bit i: lights of kind i exist; [`INSTANCE`](super::INSTANCE) for emissive meshes.
     emitter_kinds = "EMITTER_KINDS",
-    /// 1 if any emission is textured, else 0.
+    /// 1 with textured emission, else 0.
     emission_textures = "EMISSION_TEXTURES",
     /// Flags [`ENVIRONMENT_MAP`](super::ENVIRONMENT_MAP), [`ENVIRONMENT_INVISIBLE`](super::ENVIRONMENT_INVISIBLE) and
     /// [`BACKGROUND`](super::BACKGROUND).
     environment_flags = "ENVIRONMENT_FLAGS",
-    /// First bounce at which Russian roulette may end a path.
+    /// First bounce of Russian roulette.
     rr_depth = "RR_DEPTH",
-    /// Bits of the `f32` that limits the largest component of an indirect sample; 0 for no limit.
+    /// Bits of the `f32` limit of the largest component of an indirect sample; 0 for none.
     max_indirect = "MAX_INDIRECT",
-    /// 1 if the background is transparent, else 0.
+    /// 1 for a transparent background, else 0.
     alpha = "ALPHA",
-    /// 1 if the film has layers, else 0.
+    /// 1 for a film with layers, else 0.
     layers = "LAYERS",
 }

@@ -1,4 +1,4 @@
-//! Traversal of a BVH by a single ray: leaves in the order of distance, closest hit and any hit.
+//! Traversal of a BVH by a ray: leaves by distance, closest hit and any hit.
 
 use std::ops::Range;
 
@@ -11,11 +11,10 @@ use super::line::greater;
 use super::{Line, Mesh, Nearest, remaining_t_max};
 use crate::bvh::{BUILD_MAX_DEPTH, Node};
 
-/// Maximum number of nodes on the stack: each level pops one and pushes up to 8.
+/// Maximum nodes on the stack: each level pops one and pushes up to 8.
 pub const STACK: usize = BUILD_MAX_DEPTH as usize * 7 + 1;
 
-/// Decodes one side of all child boxes along an axis, `side` being `Node::low` or `Node::high`, like the accessors of a
-/// single child.
+/// Decodes one side of all child boxes along an axis, with `side` `Node::low` or `Node::high`.
 #[inline(always)]
 pub fn side<S: Simd>(simd: S, node: &Node, side: &[[u8; 8]; 3], axis: usize, scale: f32) -> f32x8<S> {
     let mut steps = [0.0; 8];
@@ -89,7 +88,7 @@ pub fn leaves<S: Simd>(
     mut limit: f32,
     mut visit: impl FnMut(Range<usize>, f32) -> f32,
 ) {
-    // By axis: 1 if the direction is negative, the origins relative to near and far sides, and the reciprocals.
+    // By axis: 1 for a negative direction, origins relative to near and far sides, reciprocals.
     let mut down = [0; 3];
     let mut from = [[0.0; 3]; 2];
     let mut inverse = [0.0; 3];
@@ -101,7 +100,7 @@ pub fn leaves<S: Simd>(
         from[1 - down[k]][k] = line.o_high[i];
         inverse[k] = line.inverse[i];
     }
-    // Sorted within each node, nearest on top.
+    // Sorted per node, nearest on top.
     let mut stack: ArrayVec<(f32, u32), STACK> = ArrayVec::new();
     stack.push((f32::NEG_INFINITY, 0));
     while let Some((entry, number)) = stack.pop() {

@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 
 use super::{Line, Mesh};
 
-/// Up to four triangles of a leaf. The last one is repeated in unused lanes.
+/// Up to four triangles of a leaf. Unused lanes repeat the last one.
 pub struct Four<S: Simd> {
     corners: [[f32x4<S>; 3]; 3],
     /// Mask of the lanes in use.
@@ -13,7 +13,7 @@ pub struct Four<S: Simd> {
 }
 
 impl<S: Simd> Four<S> {
-    /// Loads triangles, at least one and at most four.
+    /// Loads one to four triangles.
     #[inline(always)]
     pub fn new(simd: S, mesh: &Mesh, triangles: &[[u32; 4]]) -> Four<S> {
         let last = triangles.len().min(4) - 1;
@@ -38,8 +38,8 @@ impl<S: Simd> Four<S> {
         }
     }
 
-    /// Returns the mask of hit triangles and the distances, as [`Line::triangle`] for each. Distances may be negative
-    /// by up to the padding of boxes.
+    /// Returns hits and distances, as [`Line::triangle`] for each. Distances may be negative by up to the boxes'
+    /// padding.
     #[inline(always)]
     pub fn intersect(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
         let zero = f32x4::splat(simd, 0.0);

@@ -2,21 +2,21 @@
 
 use glam::Vec3;
 
-/// Minimum magnitude of a direction's component in box tests, 2^-100, so that its reciprocal is finite.
+/// Minimum magnitude of direction components in box tests, so that reciprocals are finite.
 pub const LEAST: f32 = f32::from_bits((127 - 100) << 23);
 
-/// A ray with the values that all its box and triangle tests share.
+/// A ray with shared values of box and triangle tests.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    /// Permutation of the axes of all other fields; the last one is that of the direction's largest component.
+    /// Permutation of the axes of all other fields; the last one is the direction's largest component.
     pub axes: [usize; 3],
     pub o: [f32; 3],
-    /// The origin relative to which lower sides of boxes are taken, which pads the boxes.
+    /// Origin relative to which lower sides are taken, which pads boxes.
     pub o_low: [f32; 3],
-    /// The origin relative to which upper sides of boxes are taken.
+    /// The same for upper sides.
     pub o_high: [f32; 3],
     pub inverse: [f32; 3],
-    /// The shear and scale that map the direction to the last axis.
+    /// Shear and scale that map the direction to the last axis.
     pub shear: [f32; 3],
 }
 
@@ -47,7 +47,7 @@ pub fn axes_from(third: usize) -> [usize; 3] {
 }
 
 impl Line {
-    /// Creates a ray from `o` along `d`, of any length. Boxes count as enlarged by `pad` on all sides.
+    /// Creates a ray from `o` along `d`, of any length. Boxes count as enlarged by `pad`.
     #[inline(always)]
     pub fn new(o: Vec3, d: Vec3, pad: f32) -> Line {
         let axes = axes(d);
@@ -67,7 +67,7 @@ impl Line {
         }
     }
 
-    /// Returns the interval of the ray inside a box, with axes permuted by `self.axes`.
+    /// Returns the interval inside a box, with axes permuted by `self.axes`.
     #[inline(always)]
     pub fn slab(&self, low: [f32; 3], high: [f32; 3]) -> [f32; 2] {
         let mut within = [f32::NEG_INFINITY, f32::INFINITY];
@@ -87,7 +87,7 @@ impl Line {
     }
 
     /// Returns the distance of the hit with a triangle, if any: Woop, Benthin and Wald, "Watertight Ray/Triangle
-    /// Intersection", JCGT 2(1), 2013. The ray must also hit the triangle's bounding box.
+    /// Intersection", JCGT 2(1), 2013. The ray must also hit its box.
     #[inline(always)]
     pub fn triangle(&self, vertices: [&[f32; 4]; 3]) -> Option<f32> {
         let corners = [

@@ -1,15 +1,15 @@
 //! Closest-hit and occlusion queries over a BVH of triangles or other items.
 //!
 //! The results equal those of testing every triangle ([`Line::triangle`]), independently of the BVH: a triangle is hit
-//! only where its bounding box is; every step of the box test is monotone, so that a box is hit wherever a box inside
-//! it is; on equal distance the smallest index wins.
+//! only where its box is; every step of the box test is monotone, so that a box is hit wherever a box inside it is; on
+//! equal distance the smallest index wins.
 //!
-//! Each function is compiled for several instruction sets, among which `fearless_simd` selects. All give the same bits,
-//! since nothing is contracted to fused multiply-adds.
+//! Each function is compiled for several instruction sets (`fearless_simd`). All give the same bits, since nothing is
+//! contracted to fused multiply-adds.
 //!
 //! Measured on an AMD EPYC with AVX-512 under other load, in CPU time of one thread (a bumpy sphere of 70,000 triangles
-//! on a floor, `benches/trees.rs`): 157 ns per camera ray, 665 ns per 16 shadow segments. Plain loops over eight
-//! numbers instead of `fearless_simd` made rays 8 % slower with AVX-512 and 30 % with AVX2.
+//! on a floor, `benches/trees.rs`): 157 ns per camera ray, 665 ns per 16 shadow segments. Plain loops instead of
+//! `fearless_simd` made rays 8 % slower with AVX-512 and 30 % with AVX2.
 
 mod closest;
 mod four;
@@ -31,7 +31,7 @@ pub struct Mesh<'a> {
     pub nodes: &'a [Node],
     /// Positions, each followed by an unused word.
     pub vertices: &'a [[f32; 4]],
-    /// Three vertex indices and the triangle's index, in the order of the leaves.
+    /// Vertex indices and the triangle's index, in leaf order.
     pub triangles: &'a [[u32; 4]],
 }
 
@@ -41,38 +41,37 @@ pub struct Nearest {
     /// Distance in lengths of the ray's direction.
     pub t: f32,
     pub number: u32,
-    /// The triangle's position in the order of the leaves.
+    /// Position in leaf order.
     pub slot: u32,
 }
 
-/// Returns an upper bound on the distance beyond `start` of anything nearer than `t`, with a margin for the rounding of
-/// their sum.
+/// Returns an upper bound on the distance beyond `start` of anything nearer than `t`, with a margin for rounding.
 pub fn remaining_t_max(start: f32, t: f32) -> f32 {
     (t - start) + t * 4.7683716e-7
 }
 
-/// Returns the closest triangle that is nearer than `best`, except the one with index `skip`, else `best`. A distance
-/// is `start` plus the nonnegative distance from the ray's origin, and positive. On equal distance the smallest index
+/// Returns the closest triangle nearer than `best`, except the one with index `skip`, else `best`. A distance is
+/// `start` plus the nonnegative distance from the ray's origin, and positive. On equal distance the smallest index
 /// wins.
 pub fn closest(level: Level, mesh: &Mesh, line: &Line, start: f32, skip: u32, best: Nearest) -> Nearest {
     dispatch!(level, simd => closest::closest(simd, mesh, line, start, skip, best))
 }
 
-/// Returns true if the ray hits a triangle at a distance less than `t_max`, except the one with index `skip`.
+/// Returns true if the ray hits a triangle nearer than `t_max`, except the one with index `skip`.
 pub fn any(level: Level, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) -> bool {
     dispatch!(level, simd => closest::any(simd, mesh, line, skip, t_max))
 }
 
-/// Visits the leaves that the ray hits before `limit`, approximately front to back. `visit` gets the range of a leaf's
-/// items and the limit, and returns the new limit, which must not be larger.
+/// Visits the leaves hit before `limit`, approximately front to back. `visit` gets a leaf's items and the limit, and
+/// returns the new limit, which must not be larger.
 pub fn leaves(level: Level, nodes: &[Node], line: &Line, limit: f32, visit: impl FnMut(Range<usize>, f32) -> f32) {
     dispatch!(level, simd => closest::leaves(simd, nodes, line, limit, visit))
 }
 
-/// Maximum number of segments per query.
+/// Maximum segments per query.
 pub const MOST: usize = 32;
 
-/// Up to [`MOST`] vectors as a structure of arrays. Unused lanes repeat the first vector.
+/// Up to [`MOST`] vectors as a structure of arrays. Unused lanes repeat the first.
 #[derive(Clone, Debug)]
 pub struct Directions {
     pub count: usize,
@@ -80,7 +79,7 @@ pub struct Directions {
 }
 
 impl Directions {
-    /// Creates the lanes of at most [`MOST`] vectors.
+    /// Creates lanes of at most [`MOST`] vectors.
     pub fn new(vectors: &[Vec3]) -> Directions {
         let first = vectors.first().copied().unwrap_or(Vec3::Z);
         let mut directions = Directions {
@@ -109,10 +108,10 @@ impl Directions {
 #[derive(Clone, Copy, Debug)]
 pub struct Segments<'a> {
     pub o: Vec3,
-    /// Padding of boxes on all sides.
+    /// Padding of boxes.
     pub pad: f32,
     pub directions: &'a Directions,
-    /// Distances of occluders are less than this, in lengths of a segment's direction.
+    /// Occluders are nearer than this, in lengths of a segment's direction.
     pub t_max: f32,
     /// Index of a triangle that occludes nothing.
     pub skip: u32,
@@ -123,9 +122,9 @@ pub fn occluded(level: Level, mesh: &Mesh, segments: &Segments, asked: u32) -> u
     dispatch!(level, simd => occluded::occluded(simd, mesh, segments, asked))
 }
 
-/// Returns the mask of the segments in `asked` that an item occludes. `boxes` returns the bounds of an item, or `None`
-/// if it occludes nothing. `visit` gets an item and the mask of segments that hit its bounds, and returns the mask of
-/// those that it occludes.
+/// Returns the mask of the segments in `asked` that an item occludes. `boxes` returns an item's bounds, or `None` if it
+/// occludes nothing. `visit` gets an item and the mask of segments that hit its bounds, and returns those that it
+/// occludes.
 pub fn occluded_items(
     level: Level,
     nodes: &[Node],
@@ -137,7 +136,7 @@ pub fn occluded_items(
     dispatch!(level, simd => occluded::items(simd, nodes, segments, asked, boxes, visit))
 }
 
-/// Returns all instruction sets that this machine supports.
+/// Returns all instruction sets of this machine.
 #[cfg(test)]
 pub(crate) fn levels() -> Vec<Level> {
     let best = Level::new();

@@ -12,35 +12,34 @@ use super::line::{LEAST, axes_from, greater, in_order, less};
 use super::{Directions, Line, MOST, Mesh, Segments};
 use crate::bvh::{Aabb, Node};
 
-/// Maximum number of segments that are tested one by one, against all boxes of a node or triangles of a leaf at once.
+/// Maximum number of segments tested one by one, against all boxes of a node or triangles of a leaf at once.
 const FEW: u32 = 6;
 
-/// Maximum number of SIMD vectors for all segments: the narrowest have four lanes.
+/// Maximum number of SIMD vectors: the narrowest have four lanes.
 const MAX_LANES: usize = MOST / 4;
 
-/// One SIMD vector of segments, in the order of their indices.
 #[derive(Clone, Copy)]
 struct Lanes<S: Simd> {
-    /// The permutation of axes as in [`Line`](super::Line), if all segments share it.
+    /// Permutation of axes as in [`Line`](super::Line), if all segments share it.
     axes: Option<[usize; 3]>,
-    /// Masks of the segments whose largest component is x, and y.
+    /// Segments whose largest component is x, and y.
     largest: [S::mask32s; 2],
-    /// The shear as in [`Line`](super::Line).
+    /// Shear as in [`Line`](super::Line).
     shear: [S::f32s; 3],
     inverse: [S::f32s; 3],
 }
 
-/// Bounds on all directions along an axis, for a conservative box test: it passes if any segment hits the box.
+/// Bounds on all directions along an axis, for a conservative box test.
 #[derive(Clone, Copy, Default)]
 struct Slope {
-    /// True if all directions have the same sign.
+    /// All directions have the same sign.
     same: bool,
-    /// The near and far side of a box (0: lower, 1: upper) if the signs agree, else lower and upper.
+    /// Near and far side of a box (0: lower, 1: upper) if the signs agree, else lower and upper.
     sides: [usize; 2],
-    /// The origins relative to which these sides are taken.
+    /// Origins relative to these sides.
     from: [f32; 2],
-    /// The reciprocals that minimize the near and maximize the far distance if the signs agree, else those that
-    /// minimize the distance at which a segment enters by either side.
+    /// Reciprocals that minimize the near and maximize the far distance if the signs agree, else those that minimize
+    /// the distance of entry by either side.
     inverse: [f32; 2],
 }
 
@@ -138,7 +137,7 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = usize> {
     )
 }
 
-/// Concatenates the masks that a test returns for each vector of segments.
+/// Concatenates the masks of all vectors of segments.
 #[inline(always)]
 fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64) -> u32 {
     let mut bits = 0;
@@ -148,8 +147,8 @@ fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64)
     bits
 }
 
-/// Visits leaves with the mask of segments that hit them. `visit` returns the mask of those that are occluded. Returns
-/// the mask of all occluded segments.
+/// Visits leaves with the segments that hit them. `visit` returns those that are occluded. Returns all occluded
+/// segments.
 #[inline(always)]
 fn walk<S: Simd>(
     simd: S,
@@ -183,7 +182,7 @@ fn walk<S: Simd>(
                 seen[i][k] = side(simd, node, planes[slopes[k].sides[i]], k, scale[k]) - slopes[k].from[i];
             }
         }
-        // The segments that hit each child's box, and the mask of children that any segment hits.
+        // Segments that hit each child's box, and children that any segment hits.
         let mut children = [0u32; 8];
         let mut any = 0;
         if mask.count_ones() <= FEW {
@@ -203,7 +202,7 @@ fn walk<S: Simd>(
                 }
                 let passed = (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() as u32;
                 any |= passed;
-                // Branchless, since branches would be mispredicted.
+                // Branchless, to avoid mispredictions.
                 for (c, child) in children.iter_mut().enumerate() {
                     *child |= (passed >> c & 1) << i;
                 }
@@ -369,7 +368,7 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// Returns the mask of segments that hit an item's box, as `interval_hits` of `slab.rs`.
+/// Returns the segments that hit an item's box, as `interval_hits` of `slab.rs`.
 #[inline(always)]
 fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segments, bounds: &Aabb) -> u64 {
     let [near, far] = line_intervals(
@@ -385,7 +384,7 @@ fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segm
     (near.simd_le(far) & far.simd_ge(zero) & near.simd_le(t_max)).to_bitmask()
 }
 
-/// Returns the intervals of the segments' lines inside a box, as [`Line::slab`](super::Line::slab).
+/// Returns the segments' intervals inside a box, as [`Line::slab`](super::Line::slab).
 #[inline(always)]
 fn line_intervals<S: Simd>(
     simd: S,
@@ -406,7 +405,6 @@ fn line_intervals<S: Simd>(
     [near, far]
 }
 
-/// Returns the mask of segments that hit a child's box.
 #[inline(always)]
 fn segments_hitting_child<S: Simd>(
     simd: S,
@@ -433,7 +431,7 @@ fn segments_hitting_child<S: Simd>(
     (near.simd_le(far) & far.simd_gt(zero)).to_bitmask()
 }
 
-/// Returns the mask of segments that a triangle occludes, as [`Line::triangle`](super::Line::triangle).
+/// Returns the segments that a triangle occludes, as [`Line::triangle`](super::Line::triangle).
 #[inline(always)]
 fn occluded_by_triangle<S: Simd>(
     simd: S,

@@ -1,4 +1,4 @@
-//! Tests of the BVH traversals against brute force, for single rays and groups of segments, at every SIMD level.
+//! Tests of BVH traversals against brute force, for rays and groups of segments, at every SIMD level.
 
 use std::ops::Range;
 
@@ -81,7 +81,7 @@ impl Scene {
         line.triangle(vertices)
     }
 
-    /// Brute-force [`closest`], for distances measured from the line's origin.
+    /// Brute-force [`closest`], from the line's origin.
     fn closest(&self, line: &Line, skip: u32, best: Nearest) -> Nearest {
         let triangles = (0..).zip(&self.triangles).filter(|(_, t)| t[3] != skip);
         triangles.fold(best, |best, (slot, triangle)| match self.t(triangle, line) {
@@ -108,7 +108,7 @@ impl Scene {
     }
 }
 
-/// Counts of outcomes, which show that a test covers all cases.
+/// Counts of outcomes, to show that a test covers all cases.
 #[derive(Debug, Default)]
 struct Visits {
     hits: u32,
@@ -117,7 +117,7 @@ struct Visits {
     free: u32,
 }
 
-/// Compares queries by rays and by groups of segments with brute force. `line` returns an origin and a direction.
+/// Compares queries by rays and segments with brute force. `line` returns an origin and a direction.
 fn compare(
     scene: &Scene,
     random: &mut Random,
@@ -187,7 +187,7 @@ fn compare(
     seen
 }
 
-/// Returns triangles of a size at random points from -1 to 1.
+/// Returns triangles of a size at random points, -1 to 1.
 fn soup(random: &mut Random, count: usize, size: f32) -> Scene {
     let mut corners = Vec::new();
     for _ in 0..count {
@@ -229,7 +229,7 @@ fn an_empty_scene() {
     assert_eq!(occluded(Level::new(), &scene.mesh(), &segments, 0), 0);
 }
 
-/// Returns a grid of squares, two triangles each, in the plane z = 0 or rising by `slope` per square along x.
+/// Returns a grid of squares, two triangles each, in z = 0 or rising by `slope` per square along x.
 fn grid(side: u32, slope: f32) -> Scene {
     let at =
         |x: u32, y: u32| Vec3::new(x as f32, y as f32, slope * x as f32) / side as f32 * 2.0 - Vec3::new(1.0, 1.0, 0.0);
@@ -250,7 +250,7 @@ fn edges_and_corners_of_a_grid() {
     let random = &mut Random(3);
     for slope in [0.0, 0.25, -1.0] {
         let scene = grid(16, slope);
-        // From above, from the plane itself and along it, through vertices and edges, and parallel to the axes.
+        // From above, from and along the plane, through vertices and edges, and parallel to the axes.
         let place = |random: &mut Random| {
             Vec3::new(random.below(33) as f32, random.below(33) as f32, 0.0) / 16.0 - Vec3::new(1.0, 1.0, 0.0)
         };
@@ -277,7 +277,7 @@ fn no_ray_passes_between_adjacent_triangles() {
     let random = &mut Random(4);
     let scene = grid(16, 0.3);
     for _ in 0..2000 {
-        // Rays from above to points on edges.
+        // From above to points on edges.
         let along = (random.number() + 1.0) * 0.5;
         let edge = random.below(scene.triangles.len());
         let [a, b] = [0, 1].map(|i| Vec3::from_slice(&scene.vertices[scene.triangles[edge][i] as usize][..3]));
@@ -425,7 +425,7 @@ fn leaves_are_visited_until_the_limit() {
     }
 }
 
-/// Möller and Trumbore's test in f64. Returns the distance and the smallest barycentric coordinate.
+/// Returns the distance and the smallest barycentric coordinate, in f64.
 fn moller_trumbore_f64(o: DVec3, d: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, f64)> {
     let (e1, e2) = (b - a, c - a);
     let p = d.cross(e2);

@@ -1,4 +1,4 @@
-//! Tests of the light tree against integrals and exhaustive searches with independent formulas, in f64.
+//! Tests of the light tree against integrals and exhaustive searches, in f64.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3, Vec4};
 use super::*;
 use crate::cpu::light_tree::{light_child, light_importances, light_shares};
 
-/// A linear congruential generator of numbers from 0 to 1.
+/// A linear congruential generator, 0 to 1.
 struct Random(u64);
 
 impl Random {
@@ -51,7 +51,6 @@ impl Random {
         }
     }
 
-    /// A square emitter, or a point.
     fn lamp(&mut self, i: u32, two_sided: bool) -> TreeEmitter {
         let (center, normal) = (self.point() * 5.0, self.direction());
         let half = if self.unit() < 0.2 { 0.0 } else { 0.3 * self.unit() };
@@ -71,7 +70,7 @@ impl Random {
     }
 }
 
-/// Returns true if a cone contains a normal, or its opposite if the cone is two-sided.
+/// Returns true if a cone contains a normal, or its opposite if two-sided.
 fn has(cone: &Cone, normal: DVec3) -> bool {
     let away = cone.axis.angle_between(normal);
     let away = if cone.two_sided { away.min(PI - away) } else { away };
@@ -90,7 +89,7 @@ fn the_union_of_two_cones_contains_both() {
         narrower += u32::from(both.spread < PI);
         for cone in [a, b] {
             for _ in 0..8 {
-                // A normal in the cone, half of them on its rim.
+                // Half of the normals are on the rim.
                 let side = cone.axis.any_orthonormal_vector();
                 let around = DQuat::from_axis_angle(cone.axis, random.unit() * 2.0 * PI) * side;
                 let angle = cone.spread * if random.unit() < 0.5 { 1.0 } else { random.unit() };
@@ -148,7 +147,6 @@ fn children(node: &LightNode) -> impl Iterator<Item = (usize, u32)> {
         .map(|i| (i, node.children[i]))
 }
 
-/// Returns the probability of selecting each emitter at p, by traversal of the tree.
 fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64> {
     let mut found = vec![0.0; count];
     let mut pending = vec![(0_usize, 1.0)];
@@ -210,7 +208,7 @@ fn probabilities_sum_to_one_and_visible_emitters_have_one() {
             let sum: f64 = found.iter().sum();
             assert!((sum - 1.0).abs() < 1e-5, "{sum}");
             for emitter in &lamps {
-                // A point of the emitter that faces the surface, on both sides.
+                // Facing the surface, on both sides.
                 let (center, half) = (0.5 * (emitter.low + emitter.high), 0.5 * (emitter.high - emitter.low).x);
                 let u = emitter.cone.axis.any_orthonormal_vector();
                 let v = emitter.cone.axis.cross(u);
@@ -262,7 +260,7 @@ fn nodes_link_to_parents_and_bound_children() {
     assert_eq!((seen, leaves), (nodes.len(), lamps.len()));
 }
 
-/// Returns the mean of the positive part of evenly spread heights, by quadrature.
+/// Averages the positive part of evenly spread heights.
 fn mean_above(middle: f64, radius: f64) -> f64 {
     let steps = 2000;
     let heights = (0..steps).map(|i| middle + radius * (2.0 * (f64::from(i) + 0.5) / f64::from(steps) - 1.0));
@@ -340,7 +338,7 @@ fn children_are_selected_in_proportion_to_importance() {
         }
         for i in 0..WIDTH {
             let share = f64::from(importances[i]) / sum;
-            // At most three other shares are raised to the minimum of 2^-12.
+            // At most three shares are raised to the minimum of 2^-12.
             assert!(
                 (f64::from(shares[i]) - share).abs() < 4.0 / 4096.0,
                 "{importances}: {shares}"
@@ -392,7 +390,7 @@ fn coincident_and_exponential_emitters_give_shallow_trees() {
     assert!(depth(&one_place) <= 8, "{}", depth(&one_place));
     let row: Vec<TreeEmitter> = (0..count).map(|i| at(i, DVec3::X * f64::from(i), 1.0)).collect();
     assert!(depth(&row) <= 12, "{}", depth(&row));
-    // Each has a thousandth of the next: without the bound they would be split off one by one.
+    // Each has a thousandth of the next: unbounded, they would be split off one by one.
     let falling: Vec<TreeEmitter> = (0..300)
         .map(|i| at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))
         .collect();
