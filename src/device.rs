@@ -3,17 +3,15 @@
 /// The requested device. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
-    /// A hardware GPU if there is one. Otherwise the CPU for scenes with a BVH (meshes, or more than 64 bounded
-    /// primitives), which it traverses faster than software Vulkan, and software Vulkan for all others. The CPU if no
-    /// adapter exists.
+    /// A hardware GPU if there is one. Otherwise software Vulkan, but the CPU for scenes with a BVH (meshes, or more
+    /// than 64 bounded primitives), which it traverses faster, or if no adapter exists.
     #[default]
     Auto,
     /// The CPU, without any driver.
     Cpu,
     /// Any adapter: a hardware GPU, else software Vulkan.
     Gpu,
-    /// The adapter with this text as part of its name, driver or type, or with this number in the list of all adapters,
-    /// counted from 1.
+    /// The adapter with this text in its name, driver or type, or with this number in the list of adapters, from 1.
     Named(String),
 }
 

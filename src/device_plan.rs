@@ -12,20 +12,18 @@ use crate::open::faster_on_cpu;
 #[cfg(not(feature = "gpu"))]
 use crate::{error::Error, open::adapter};
 
-/// The device that a render would use, and the reason.
+/// The device of a render, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DevicePlan {
-    /// The device.
     pub info: DeviceInfo,
-    /// The reason.
     pub why: String,
-    /// The adapter and its plan, unless it is the CPU.
+    /// `None` for the CPU.
     #[cfg(feature = "gpu")]
     pub adapter: Option<(gpu::GpuInfo, gpu::KernelPlan)>,
 }
 
-/// Returns the device that a render would use, without opening it. A render uses the next device, or the CPU, if that one cannot be opened
-/// or is too small for the scene.
+/// Returns the device that a render would use. If it cannot be opened or is too small for the scene, a render uses the
+/// next device, or the CPU.
 ///
 /// # Errors
 ///

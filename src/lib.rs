@@ -43,16 +43,16 @@
 //!
 //! # Features
 //!
-//! All are enabled by default; for the library, `default-features = false` may be preferable.
+//! All are enabled by default; libraries may prefer `default-features = false`.
 //!
 //! - `gpu`: rendering on GPUs and software Vulkan. Without it, [`Device::Auto`] is the CPU, and wgpu is not linked.
 //! - `cli`: the program `wgray`.
-//! - `dev`: the development mode of the program, a page that updates when a shader or scene is saved. It enables `gpu`.
+//! - `dev`: the program's development mode, a page that updates when a shader or scene is saved. Enables `gpu`.
 //!
 //! # Stability
 //!
 //! The public API consists of the items at the root of the crate and the modules listed on this page. Other public
-//! modules are internal: the project's tests and program use them, and they may change at any time.
+//! modules are internal, and may change at any time.
 // These macros panic if the stream is closed or full.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 

@@ -11,14 +11,13 @@ use wgray_scene::Problem;
 use crate::device::{Device, DeviceInfo};
 use crate::error::{Error, RenderError};
 
-/// A backend and the device behind it.
 pub(crate) type Ready<'a> = (Box<dyn Backend + 'a>, DeviceInfo);
 
 pub(crate) fn cpu(scene: &Packed) -> Ready<'_> {
     (Box::new(Cpu::new(scene)), DeviceInfo::cpu())
 }
 
-/// Returns the reason why the CPU is faster for a scene than any adapter, if it is: measured in `docs/performance.md`.
+/// Returns why the CPU is faster than any adapter, if it is: measured in `docs/performance.md`.
 #[cfg(feature = "gpu")]
 pub(crate) fn faster_on_cpu(scene: &Packed) -> Option<String> {
     if scene.specialization.tlas_kinds == 0 {
@@ -45,7 +44,7 @@ pub(crate) fn choice_of(device: &Device) -> gpu::AdapterChoice {
     }
 }
 
-/// Opens the first adapter that matches the request and that `wanted` accepts by its name and whether it is software.
+/// Opens the first matching adapter that `wanted` accepts, by name and whether it is software.
 #[cfg(feature = "gpu")]
 pub(crate) fn adapter<'a>(
     scene: &'a Packed,

@@ -17,8 +17,8 @@ pub struct Options {
     pub crop: Option<Region>,
     /// The layers besides the radiance. Repetitions are ignored.
     pub aovs: Vec<Aov>,
-    /// True to round quotients and square roots correctly in software, for the bits of the CPU on GPUs that may be off
-    /// by one unit in the last place. Vulkan only; the CPU ignores it.
+    /// Round quotients and square roots correctly in software, as GPUs may be off by one unit in the last place. Vulkan
+    /// only; the CPU ignores it.
     pub exact_rounding: bool,
 }
 
@@ -50,7 +50,6 @@ impl Options {
         Err(Problem::of("crop", format!("{x0},{y0},{x1},{y1} {rule}")))
     }
 
-    /// Packs a scene with the layers that these options request.
     pub(crate) fn pack(&self, scene: &Scene) -> Packed {
         let plain = pack(scene);
         let of_samples = |aov: &Aov| aov.source(plain.integrator) == AovSource::Samples;

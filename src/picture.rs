@@ -65,8 +65,8 @@ impl Picture {
         self.layout.alpha.then(|| pixels.map(|i| self.film.alpha(i)).collect())
     }
 
-    /// Returns the pixels as 8-bit RGB by rows, from the top, with the scene's view transform and exposure, as in a PNG
-    /// without alpha. If the image has alpha, it is composited over black.
+    /// Returns the pixels as 8-bit RGB by rows, from the top, with the scene's view transform and exposure, as in a
+    /// PNG. Alpha is composited over black.
     pub fn rgb8(&self) -> Vec<u8> {
         self.film.means().flat_map(|mean| self.layout.view.rgb8(mean)).collect()
     }
@@ -81,8 +81,8 @@ impl Picture {
         self.film.means().enumerate().flat_map(pixel).collect()
     }
 
-    /// Returns a channel by its OpenEXR name: `R`, `G`, `B`, `A` if the image has alpha, and the channels of requested
-    /// layers, such as `depth.Z` or `normal.X`. `None` if the channel does not exist.
+    /// Returns a channel by its OpenEXR name, if it exists: `R`, `G`, `B`, `A`, and the channels of requested layers,
+    /// such as `depth.Z` or `normal.X`.
     pub fn channel(&self, name: &str) -> Option<Channel> {
         if let Some(color) = ["R", "G", "B"].iter().position(|known| *known == name) {
             return Some(Channel::Floats(self.film.means().map(|mean| mean[color]).collect()));
@@ -109,7 +109,7 @@ impl Picture {
     ///
     /// Layers become channels of an EXR, and separate files such as `NAME.normal.png` for a PNG; JPEG and WebP have no
     /// layers. Alpha becomes a channel, except in a JPEG, which is composited over black. Existing files are replaced
-    /// when the new ones are complete.
+    /// by complete ones.
     ///
     /// # Errors
     ///

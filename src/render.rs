@@ -22,12 +22,12 @@ use wgray_scene::Scene;
 ///
 /// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, or if the scene or image does not
 /// fit into its memory. With any device, the CPU renders if the driver truncates long loops and a single sample exceeds
-/// the limit. A lost device is re-opened a few times, and the render resumes from the last finished part; if that
-/// fails, [`Device::Auto`](crate::Device::Auto) resumes on the CPU. `tracing` warnings give the reason, and
+/// the limit. A lost device is re-opened a few times, to resume from the last finished part; if that fails,
+/// [`Device::Auto`](crate::Device::Auto) resumes on the CPU. `tracing` warnings give the reason, and
 /// [`Picture::device`] returns the device that rendered last.
 ///
-/// wgpu panics at some device losses. The panic is caught, but panic hooks observe it, and a program built with `panic
-/// = "abort"` aborts. Mesa's drivers print a line on standard error if the environment has no `XDG_RUNTIME_DIR`.
+/// wgpu panics at some device losses. Such a panic is caught, but panic hooks observe it, and `panic = "abort"` aborts
+/// the program. Mesa's drivers print a line on standard error if the environment has no `XDG_RUNTIME_DIR`.
 ///
 /// # Errors
 ///
@@ -59,10 +59,10 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     Ok(prepared.picture(film))
 }
 
-/// Renders a scene progressively. `watch` is called about ten times per second or more. It can access the current
-/// image, and returns whether to continue. All pixels get a few samples before any pixel gets more, except that an
-/// image too large for one film of the device is rendered part by part, from the top. The result is bit-identical to
-/// that of [`render`].
+/// Renders a scene progressively. `watch` is called at least about ten times per second with the current image, and
+/// returns whether to continue. All pixels get a few samples before any pixel gets more, except that an image too large
+/// for one film of the device is rendered part by part, from the top. The result is bit-identical to that of
+/// [`render`].
 ///
 /// # Errors
 ///
@@ -103,7 +103,7 @@ pub fn render_progressive(
                 };
                 match watch(&mut progress) {
                     Ok(flow) => Ok(flow.is_continue().into()),
-                    // Device failures while the image is copied are handled like all others.
+                    // A failure while the image is copied is handled like others.
                     Err(Error::Render(error @ (RenderError::Lost { .. } | RenderError::OutOfMemory { .. }))) => {
                         Err(error)
                     }

@@ -17,39 +17,32 @@ use crate::options::Options;
 /// Prefix of the message why the CPU was chosen.
 const ON_CPU: &str = "rendering on the CPU: ";
 
-/// The recovery from a device fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recovery {
-    /// The device is opened again.
     Reopen,
-    /// The CPU renders from now on.
     Cpu,
 }
 
 /// The callback that reports a fault from which the renderer recovers.
 pub type Tell<'a> = Box<dyn FnMut(&RenderError, Recovery) + 'a>;
 
-/// Callbacks of a renderer about device faults.
 pub struct FaultHandler<'a> {
-    /// Reports a fault and the recovery from it.
     pub tell: Tell<'a>,
     /// Returns true to give up waiting for a lost device.
     pub stopped: Box<dyn Fn() -> bool + 'a>,
 }
 
-/// Pauses before the attempts to open a lost device again, without progress between them.
+/// Pauses before successive attempts to open a lost device, without progress between them.
 const PAUSES: [Duration; 3] = [Duration::ZERO, Duration::from_millis(500), Duration::from_secs(2)];
 
 /// Interval at which the stop callback is polled during a pause.
 const STOP_INTERVAL: Duration = Duration::from_millis(20);
 
-/// A counter of results that a loss of the device does not undo. The renderer counts losses since the last progress, so
-/// that work that advances between losses continues however often the device is lost.
+/// A counter of results that a loss of the device does not undo. Losses with progress between them do not end the work.
 #[derive(Clone, Debug, Default)]
 pub struct Progress(Arc<AtomicU64>);
 
 impl Progress {
-    /// Counts a finished result.
     pub fn made(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
@@ -59,7 +52,6 @@ impl Progress {
     }
 }
 
-/// A scene on a device that is opened again if it is lost, with the CPU as a fallback.
 pub struct Renderer<'a> {
     scene: &'a Packed,
     device: Device,
@@ -68,11 +60,10 @@ pub struct Renderer<'a> {
     info: DeviceInfo,
     why: Option<String>,
     on_fault: FaultHandler<'a>,
-    /// The size of the film for which the work was divided, once known. A replacement device must support it.
+    /// The size of film by which the work was divided: a replacement device must support it.
     needed_film: Option<u64>,
     /// The lost device and the reason, while no device is open.
     gone: Option<(String, String)>,
-    /// Number of losses since the last progress.
     losses: usize,
     progress: Progress,
     /// Value of `progress` at the last loss.
@@ -129,24 +120,21 @@ impl<'a> Renderer<'a> {
         self.why.as_deref()
     }
 
-    /// Returns the current device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
     }
 
-    /// Returns the maximum size of a film in pixels. It is kept when another device replaces this one.
+    /// Returns the maximum size of a film in pixels, kept when another device replaces this one.
     pub fn largest_film(&self) -> u64 {
         self.needed_film.unwrap_or_else(|| self.backend.largest_film())
     }
 
-    /// Returns the counter that work reports its progress to.
     pub fn progress(&self) -> Progress {
         self.progress.clone()
     }
 
-    /// Runs `work` on the device. If the device is lost, it is opened again and the work is repeated. With [`Device::Auto`] the CPU takes
-    /// over for good if the device cannot be opened again or has too little memory. With any choice it takes over if the driver ends loops
-    /// early, because the CPU has no such limit.
+    /// Runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`] the CPU takes over for good if
+    /// that fails or memory is too small; with any choice if the driver ends loops early.
     ///
     /// # Errors
     ///
@@ -238,7 +226,6 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Releases the resources of a lost device.
     fn release(&mut self, lost: &str, message: &str) {
         let (cpu, _) = cpu(self.scene);
         let backend = std::mem::replace(&mut self.backend, cpu);

@@ -11,7 +11,7 @@ use wgray_fuzz::{Choices, container, file, small_model};
 
 const STREAMS: &str = include_str!("../../crates/scene/src/gltf/meshopt/streams.txt");
 
-/// Returns mode, filter, stride, count and bytes of each stream.
+/// Mode, filter, stride, count and bytes.
 fn streams() -> &'static [(&'static str, &'static str, u64, u64, Vec<u8>)] {
     static ALL: OnceLock<Vec<(&str, &str, u64, u64, Vec<u8>)>> = OnceLock::new();
     ALL.get_or_init(|| {

@@ -30,7 +30,7 @@ fuzz_target!(|bytes: &[u8]| {
     while choices.are_left() {
         changed(&mut file, &mut |count| choices.below(count));
     }
-    // Skips values that TOML cannot represent.
+    // TOML cannot represent all values.
     let Ok(text) = toml::to_string(&file) else { return };
     let Ok(description) = Description::parse(&text, "a.toml") else {
         return;

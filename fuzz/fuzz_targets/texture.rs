@@ -29,7 +29,7 @@ fuzz_target!(|bytes: &[u8]| {
     let mut assets = Assets::default();
     assets.encoded.insert("a".to_owned(), bytes.into());
     if let Ok(scene) = description.validate_with(&assets) {
-        // The importance tables of a large environment map take long and are not part of the readers.
+        // Importance tables of large environment maps take long.
         if bytes.len() < 1 << 16 {
             render(&scene);
         }

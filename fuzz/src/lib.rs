@@ -39,7 +39,7 @@ impl Choices<'_> {
         usize::from(number) % count.max(1)
     }
 
-    /// Returns whether unused bytes are left.
+    /// Returns whether bytes are left.
     pub fn are_left(&self) -> bool {
         !self.0.is_empty()
     }
@@ -64,7 +64,7 @@ pub fn small() -> Overrides {
     }
 }
 
-/// Like [`small`] for models, with a constant environment, because the tables of the studio would dominate the time.
+/// Like [`small`] for models. The environment is constant: tables of the studio would dominate the time.
 pub fn small_model() -> Overrides {
     Overrides {
         environment: Some(EnvironmentDescription::new([0.5, 0.5, 0.5])),
@@ -72,7 +72,7 @@ pub fn small_model() -> Overrides {
     }
 }
 
-/// Renders a scene on the CPU. A scene that passed validation must render without an error.
+/// Renders a scene on the CPU: valid scenes must render without an error.
 pub fn render(scene: &Scene) {
     let options = Options {
         device: Device::Cpu,

@@ -8,8 +8,6 @@ use std::time::Duration;
 
 use super::log;
 
-/// The global allocator of the program: the system allocator, except that an allocation failure ends the program with
-/// exit code 7.
 #[derive(Debug)]
 pub struct Allocator;
 
@@ -70,11 +68,11 @@ pub fn end(size: usize) -> ! {
     std::process::exit(7)
 }
 
-/// Size of the signal stack that the standard library maps for each thread, in bytes.
+/// Bytes of the signal stack that the standard library maps for each thread.
 const SIGNAL_STACK: usize = 8192;
 
-/// Ends the program as an allocation failure does if a new thread has no memory for its signal stack: the standard
-/// library maps it without the allocator, and panics.
+/// Ends the program likewise if a thread's signal stack has no memory: the standard library maps it directly, and
+/// panics.
 pub fn catch_signal_stacks() {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -104,7 +102,7 @@ impl Default for Line {
 }
 
 impl Line {
-    /// Writes the line to standard error without the lock of `std::io::stderr`, which this thread may hold.
+    /// Writes to standard error without the lock of `std::io::stderr`, which this thread may hold.
     fn print(&self) {
         let bytes = &self.bytes[..self.len];
         #[cfg(unix)]

@@ -70,7 +70,6 @@ fn list_adapters(out: &mut impl Write, adapters: &[GpuInfo]) -> io::Result<()> {
 }
 
 #[cfg(feature = "gpu")]
-/// Names the float controls that a device supports.
 fn names(controls: FloatControls) -> String {
     let FloatControls {
         rounding,

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use crate::cli::Usage;
 
-/// Largest frame number, and maximum number of frames: all file names are checked before the first frame is rendered.
+/// Largest frame number, and maximum number of frames, as all file names are checked first.
 pub const MAX_NUMBER: u32 = 999_999_999;
 const MAX_COUNT: usize = 100_000;
 
@@ -71,17 +71,16 @@ fn number(text: &str) -> Result<u32, String> {
     })
 }
 
-/// One of the images of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// The frame number; `None` without `--frames`.
     pub number: Option<u32>,
-    /// Position in the run, counted from 1, and the number of frames in the run.
+    /// Position in the run, from 1, and number of frames.
     pub place: (usize, usize),
 }
 
 impl Frame {
-    /// Returns the images of a run: one without a number if `frames` is `None`.
+    /// Returns the images of a run: without `frames`, one.
     pub fn all(frames: Option<&Frames>) -> Vec<Frame> {
         let numbers = match frames {
             Some(frames) => frames.0.iter().copied().map(Some).collect(),
@@ -94,13 +93,12 @@ impl Frame {
         numbers.iter().enumerate().map(frame).collect()
     }
 
-    /// Returns a single image.
     pub fn one(number: Option<u32>) -> Frame {
         Frame { number, place: (1, 1) }
     }
 
-    /// Returns a file name with `#` replaced by the number of the frame, zero-padded to the number of `#`. Folder
-    /// names are unchanged. The names of several frames must differ. Error messages name `option`.
+    /// Replaces `#` by the number, zero-padded to the number of `#`, except in folder names. Names of frames must
+    /// differ. Errors name `option`.
     pub fn name(&self, option: &str, pattern: &Path) -> Result<PathBuf, Usage> {
         let Some(number) = self.number else {
             return Ok(pattern.to_owned());
@@ -129,7 +127,7 @@ impl Frame {
         Ok(pattern.with_file_name(name))
     }
 
-    /// Returns a label for messages if this is one of several frames.
+    /// Returns a label if this is one of several frames.
     pub fn label(&self) -> Option<String> {
         let (place, count) = self.place;
         let number = self.number.filter(|_| count > 1)?;

@@ -34,13 +34,13 @@ const OPTIONS: [(&str, &str); 21] = [
     ("--noise", "--adaptive ERROR"),
 ];
 
-/// Extensions of scene and model files, which suggest that the subcommand `render` was omitted.
+/// Extensions that suggest an omitted subcommand `render`.
 const SCENES: [&str; 7] = ["toml", "json", "gltf", "glb", "obj", "ply", "stl"];
 
-/// Maximum length, in characters, at which messages quote an argument.
+/// Maximum characters of a quoted argument.
 const MAX_WORD_LEN: usize = 200;
 
-/// Adds a hint to an error, and escapes and shortens the arguments that it quotes.
+/// Adds a hint, and escapes and shortens quoted arguments.
 pub fn improve(mut error: clap::Error) -> clap::Error {
     if let Some(hint) = hint(&error) {
         error.remove(ContextKind::SuggestedArg);

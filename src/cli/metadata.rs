@@ -9,16 +9,15 @@ use crate::scene::Scene;
 use wgray_render::job::hash_of_scene;
 use wgray_render::records::Packed;
 
-/// Name of the mark of an image that was written before it was complete: `32 of 64 samples`.
+/// Marks an incomplete image: `32 of 64 samples`.
 const PARTIAL: &str = "partial";
 
-/// Returns true if a file is a whole image with all of its samples.
+/// Returns true if an image file is whole, with all samples.
 pub fn is_finished(path: &Path) -> bool {
     is_complete(path) && read_metadata(path).is_none_or(|metadata| metadata.get(PARTIAL).is_none())
 }
 
-/// Returns the samples per pixel of an image file, the maximum under adaptive sampling; `None` if wgray did not write
-/// it.
+/// Returns the (maximum) samples per pixel of an image file; `None` if wgray did not write it.
 pub fn samples_of(path: &Path) -> Option<u32> {
     let metadata = read_metadata(path)?;
     let text = match (metadata.get(PARTIAL), metadata.get("adaptive")) {
@@ -29,13 +28,11 @@ pub fn samples_of(path: &Path) -> Option<u32> {
     text.split(' ').next()?.parse().ok()
 }
 
-/// Metadata that is known before rendering.
 pub struct RenderMetadata {
     metadata: Metadata,
 }
 
 impl RenderMetadata {
-    /// Returns the metadata of a scene and the program version.
     pub fn of(scene: &Scene, packed: &Packed, time_limit: Option<Duration>) -> RenderMetadata {
         let mut pairs = vec![(
             Metadata::SOFTWARE.to_owned(),
@@ -68,7 +65,7 @@ impl RenderMetadata {
         self.metadata.clone()
     }
 
-    /// Returns the metadata of an image with fewer samples than requested, see [`RenderMetadata::on`].
+    /// For fewer samples than requested; see [`RenderMetadata::on`].
     pub fn partial(&self, device: &DeviceInfo, reproducible: bool, (samples, of): (u32, u32)) -> Metadata {
         let mut metadata = self.on(device, reproducible);
         metadata
@@ -77,7 +74,7 @@ impl RenderMetadata {
         metadata
     }
 
-    /// Returns the metadata, including the device except under `--reproducible`.
+    /// Includes the device, except under `--reproducible`.
     pub fn on(&self, device: &DeviceInfo, reproducible: bool) -> Metadata {
         let mut metadata = self.metadata.clone();
         if !reproducible {

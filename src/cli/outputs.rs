@@ -12,7 +12,6 @@ use super::Usage;
 use super::metadata::is_finished;
 use super::picture_options::PictureOptions;
 
-/// The destinations of a render.
 pub struct Outputs {
     pictures: Vec<Picture>,
     /// A part of an image, instead of images.
@@ -20,10 +19,9 @@ pub struct Outputs {
     stats: Option<Output>,
 }
 
-/// The files of an image.
 struct Picture {
     format: Format,
-    /// The image, then its AOVs that are separate files, each with the option that requests it.
+    /// The image, then its separate AOVs, each with the option that requests it.
     files: Vec<(String, Output)>,
 }
 
@@ -33,16 +31,13 @@ impl Picture {
     }
 }
 
-/// Opened destinations.
 pub struct OpenOutputs {
     pub files: Files,
     pub stats: Option<Pending>,
 }
 
-/// The files to write.
 pub enum Files {
     Pictures(Vec<Target>),
-    /// A part of an image.
     Part(Pending),
 }
 
@@ -60,16 +55,15 @@ impl Files {
     }
 }
 
-/// Determines whether every layer must be written.
+/// Decides whether every layer must be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayerPolicy {
-    /// Layers were requested: an output must support them.
+    /// An output must support them.
     Requested,
-    /// Layers are available and are written by the outputs that support them.
+    /// Outputs that support them write them.
     Available,
 }
 
-/// Extension of parts.
 const PART: &str = "part";
 
 impl Outputs {
@@ -126,7 +120,6 @@ impl Outputs {
         Ok(outputs)
     }
 
-    /// Rejects default output files that exist, unless wgray wrote them.
     fn keep_files_of_others(&self) -> Result<(), Usage> {
         let mut files = self.pictures.iter().flat_map(|picture| &picture.files);
         let of_others = |(_, output): &&(String, Output)| {
@@ -142,7 +135,6 @@ impl Outputs {
         }
     }
 
-    /// Checks the destination of a part of an image.
     pub fn find_part(options: &PictureOptions, stats: Option<&Path>) -> anyhow::Result<Outputs> {
         let ends = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(PART));
         let path = match options.output.as_slice() {
@@ -163,7 +155,7 @@ impl Outputs {
         })
     }
 
-    /// Rejects images that exceed the maximum size of their format.
+    /// Rejects images too large for their format.
     pub fn check_size(&self, region: Region) -> Result<(), Usage> {
         let mut named = self
             .pictures
@@ -177,7 +169,7 @@ impl Outputs {
 
     /// Rejects destinations that would replace an input or another output.
     pub fn check(&self, inputs: &[PathBuf], checkpoint: Option<&Path>) -> anyhow::Result<()> {
-        // A folder gives each checkpoint a unique name.
+        // Names of checkpoints in a folder are unique.
         let checkpoint = checkpoint.filter(|path| !path.is_dir());
         let checkpoint = checkpoint.map(find_checkpoint).transpose()?;
         let checkpoint = checkpoint
@@ -206,8 +198,8 @@ impl Outputs {
         Ok(())
     }
 
-    /// Returns true if all files exist and all images are whole and have all of their samples. Image streams never
-    /// exist; a statistics stream is ignored.
+    /// Returns true if all files exist and all images are complete. Image streams never exist; a statistics stream is
+    /// ignored.
     pub fn exist(&self) -> bool {
         let exists = |output: &Output| output.path().is_some_and(Path::is_file);
         let mut pictures = self.pictures.iter().flat_map(|picture| &picture.files);
@@ -216,7 +208,7 @@ impl Outputs {
             && pictures.all(|(_, output)| exists(output) && output.path().is_some_and(is_finished))
     }
 
-    /// Returns the images that are files, which can be written more than once: the format, the image and its layers.
+    /// Returns the images that can be rewritten because they are files: the format, the image and its layers.
     pub fn rewritable(&self) -> io::Result<Vec<(Format, Vec<Output>)>> {
         let pictures = self.pictures.iter().filter(|picture| picture.is_rewritable());
         let again = |Picture { format, files }: &Picture| {
@@ -236,7 +228,6 @@ impl Outputs {
         }
     }
 
-    /// Returns the path of the part if the destination is a part in a file.
     pub fn part(&self) -> Option<&Path> {
         self.part.as_ref()?.path()
     }
@@ -251,7 +242,6 @@ impl Outputs {
         all.filter_map(|(option, output)| Some((option, output.name(), output.path()?)))
     }
 
-    /// Returns the name of the first image whose format has no alpha.
     pub fn without_alpha(&self) -> Option<&str> {
         let is_opaque = |picture: &&Picture| picture.format == Format::Jpeg;
         let (_, output) = self.pictures.iter().find(is_opaque)?.files.first()?;
@@ -265,8 +255,7 @@ impl Outputs {
         outputs.map(|output| output.name().to_owned()).collect()
     }
 
-    /// Opens all destinations. Opening a pipe blocks until it has a reader, so signals must still end the program at
-    /// once.
+    /// Opens all destinations. A pipe blocks until it has a reader: signals must still end the program at once.
     pub fn begin(mut self) -> io::Result<OpenOutputs> {
         let pictures = self.pictures.iter_mut().flat_map(|picture| &mut picture.files);
         for output in pictures
@@ -317,7 +306,6 @@ fn forbid_pictures(option: &str, path: &Path, output: &Output) -> Result<(), Usa
     pictures.try_for_each(|ending| forbid_ending(option, path, output, ending, "names an image"))
 }
 
-/// Rejects an output that is one of the inputs.
 pub fn keep_inputs(option: &str, output: &Output, inputs: &[PathBuf], remedy: &str) -> Result<(), Usage> {
     let Some(input) = inputs.iter().find(|input| output.is_input(input)) else {
         return Ok(());

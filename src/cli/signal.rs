@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// The signals received so far.
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
     /// The last signal, or 0.
@@ -16,7 +15,6 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// Returns the signal that was received, if any.
     pub fn signal(&self) -> Option<i32> {
         match self.signal.load(Ordering::Relaxed) {
             0 => None,
@@ -25,7 +23,6 @@ impl Stop {
     }
 }
 
-/// Returns the name of a signal.
 pub fn name(signal: i32) -> &'static str {
     match signal {
         SIGINT => "Ctrl+C (SIGINT)",
@@ -35,13 +32,13 @@ pub fn name(signal: i32) -> &'static str {
     }
 }
 
-/// Returns the exit code after a signal by the convention of shells: 130 after SIGINT, 143 after SIGTERM.
+/// Returns the exit code after a signal, as in shells: 130 after SIGINT, 143 after SIGTERM.
 pub fn exit_code(signal: i32) -> u8 {
     128_u8.saturating_add(u8::try_from(signal).unwrap_or(0))
 }
 
-/// Records the first signal; the second one ends the program at once. A signal that was ignored when the program
-/// started stays ignored: `nohup` and shells rely on it for background jobs.
+/// Records the first signal; the second one ends the program at once. Signals ignored at the start stay ignored, for
+/// `nohup` and background jobs.
 pub fn stop() -> io::Result<Stop> {
     stop_with(None)
 }
@@ -60,7 +57,7 @@ fn stop_with(terminated: Option<u8>) -> io::Result<Stop> {
     Ok(stop)
 }
 
-/// Signals that end the program at once until [`Signals::defer`], and are recorded from then on.
+/// Signals that end the program at once, but are recorded from [`Signals::defer`] on.
 pub struct Signals {
     /// The exit code after SIGTERM, if it differs from 143.
     terminated: Option<u8>,
@@ -83,12 +80,10 @@ impl Signals {
         })
     }
 
-    /// Returns the recorded signals, if they are deferred.
     pub fn deferred(&self) -> Option<&Stop> {
         self.stop.as_ref()
     }
 
-    /// Records signals from now on.
     pub fn defer(&mut self) -> io::Result<&Stop> {
         let stop = match self.stop.take() {
             Some(stop) => stop,
@@ -104,8 +99,7 @@ const HANG_UP: i32 = signal_hook::consts::SIGHUP;
 #[cfg(not(unix))]
 const HANG_UP: i32 = SIGTERM; // SIGHUP does not exist
 
-/// Makes writing beyond the file size limit (`ulimit -f`) an error, like a full disk, instead of a signal that ends the
-/// program.
+/// Makes writing beyond the file size limit (`ulimit -f`) an error instead of a signal.
 pub fn file_size_limit_is_an_error() {
     #[cfg(unix)]
     // SAFETY: no handler runs for the signal, and no other thread exists yet.

@@ -5,7 +5,6 @@ use std::io::{self, Write};
 use crate::image::Pending;
 use serde::Serialize;
 
-/// The fields of the file.
 #[derive(Debug, Serialize)]
 pub struct Stats {
     /// The number of the frame, under `--frames`.
@@ -28,36 +27,34 @@ pub struct Stats {
     /// The former name of `min_samples`, until 0.3.
     #[serde(rename = "least_samples")]
     pub former_min_samples: u32,
-    /// True if a signal ended the render under `--preview`, before the image was complete.
+    /// True if a signal ended the render under `--preview`.
     pub partial: bool,
     /// Light samples at every hit, over all lights.
     pub light_samples: u64,
-    /// Seconds until the device is ready, from the start of the process, or of the frame for later frames.
+    /// Seconds from the start of the process, or of later frames, until the device is ready.
     pub setup_s: f64,
-    /// Seconds of rendering.
     pub render_s: f64,
     /// Seconds from the same start until the image is written.
     pub total_s: f64,
     /// Camera rays of the image.
     pub camera_rays: u64,
-    /// Fraction of the samples that were rendered, rather than read from a checkpoint.
+    /// Fraction of the samples not read from a checkpoint.
     pub fraction_rendered: f64,
     /// The former name of `fraction_rendered`, until 0.3.
     #[serde(rename = "share_rendered")]
     pub former_fraction_rendered: f64,
-    /// Number of shadow rays; `None` because kernels do not count them.
+    /// `None`: kernels do not count them.
     pub shadow_rays: Option<u64>,
     /// camera_rays * fraction_rendered * (1 + light_samples) / render_s / 1e6
     pub nominal_mrays_per_s: f64,
 }
 
 impl Stats {
-    /// Returns millions of rays per second, as if every camera ray hit a surface and every light sample traced a ray.
+    /// Returns millions of rays per second, as if every camera ray hit and every light sample traced a ray.
     pub fn nominal(camera_rays: f64, light_samples: u64, render_s: f64) -> f64 {
         camera_rays * (1.0 + light_samples as f64) / render_s / 1e6
     }
 
-    /// Writes the file.
     pub fn write(&self, mut file: Pending) -> io::Result<()> {
         let text = serde_json::to_string_pretty(self)?;
         writeln!(file, "{text}")?;

@@ -4,19 +4,15 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// The kind of an invalid pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BadPixel {
-    /// A value is NaN.
     Nan,
-    /// A value is infinite.
     Infinite,
-    /// A value is negative.
     Negative,
 }
 
 impl BadPixel {
-    /// Returns the worst kind of invalid value among `values`; `None` if all are valid.
+    /// Returns the worst kind among `values`; `None` if all are valid.
     pub fn of(values: &[f32]) -> Option<BadPixel> {
         let faults = [
             (BadPixel::Nan, values.iter().any(|v| v.is_nan())),
@@ -26,7 +22,6 @@ impl BadPixel {
         faults.into_iter().find(|(_, found)| *found).map(|(fault, _)| fault)
     }
 
-    /// Returns the color that marks such a pixel.
     pub fn color(self) -> [u8; 3] {
         match self {
             BadPixel::Nan => [255, 0, 255],
@@ -36,7 +31,7 @@ impl BadPixel {
     }
 }
 
-/// Number of tiles along each side of an image; one location is listed per tile.
+/// Tiles along each side of an image; one location is listed per tile.
 const PARTS: usize = 8;
 
 /// The number of invalid pixels of an image.
@@ -53,7 +48,7 @@ pub struct BadPixels {
 }
 
 impl BadPixels {
-    /// Counts the invalid pixels of an image, given row by row from the top, of this width in pixels.
+    /// Counts the invalid pixels, given by rows of this width, from the top.
     pub fn count(faults: &[Option<BadPixel>], width: u32) -> BadPixels {
         let width = width as usize;
         let height = faults.len().div_ceil(width.max(1));
@@ -76,7 +71,7 @@ impl BadPixels {
     }
 }
 
-/// Returns the kind of each invalid pixel. `negative` accepts negative values, which filters with negative lobes cause.
+/// Returns the kind of each invalid pixel. `negative` values are valid under filters with negative lobes.
 pub fn faults<T: Sync, const N: usize>(
     pixels: &[T],
     negative: bool,

@@ -15,38 +15,29 @@ use wgray_render::gpu::sliders::sliders;
 use wgray_render::gpu::{AdapterChoice, Device, Forms, Gpu, Options, check_kernels, choose};
 use wgray_render::records::Packed;
 
-/// A request to compile a kernel.
 pub struct Request {
-    /// Number of the request, repeated in the result to recognize outdated results.
+    /// Repeated in the result, to recognize outdated ones.
     pub id: u64,
     /// The device; `None` opens a new one.
     pub device: Option<Device>,
-    /// The scene.
     pub packed: Packed,
-    /// The shaders.
     pub shaders: Arc<Shaders>,
     /// The last good shaders, used if `shaders` have errors.
     pub fallback: Option<Arc<Shaders>>,
-    /// The constants that the kernel is compiled for.
     pub constants: Constants,
-    /// Time at which the change that caused the request was noticed.
+    /// When the change was noticed.
     pub noticed: Instant,
 }
 
 /// A scene on a device, and its shaders.
 pub type Ready = (Box<Gpu>, Arc<Shaders>);
 
-/// The result of a request.
 pub struct BuildResult {
-    /// The id of the request.
     pub id: u64,
-    /// The constants of the request.
     pub constants: Constants,
-    /// The time of the request.
     pub noticed: Instant,
-    /// The scene on a device; `None` if the request's shaders have errors and no fallback exists.
+    /// `None` if the shaders have errors and no fallback exists.
     pub result: Option<Result<Ready, RenderError>>,
-    /// The errors in the request's shaders.
     pub refused: Option<ShaderErrors>,
     /// Time spent on checking and compiling.
     pub took: Duration,
@@ -59,8 +50,7 @@ pub struct Builder {
 }
 
 impl Builder {
-    /// Starts the thread. It passes its results to `done`. Requests that were overtaken by a newer one before they
-    /// began are dropped.
+    /// Starts the thread, which passes its results to `done`. Requests overtaken before they began are dropped.
     pub fn start(
         choice: AdapterChoice,
         times: Times,
@@ -76,7 +66,6 @@ impl Builder {
         })
     }
 
-    /// Sends a request. Earlier requests that have not begun are dropped.
     pub fn request(&self, request: Request) {
         if let Some(requests) = &self.requests {
             let _ = requests.send(request); // the thread lives as long as this
@@ -121,7 +110,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
     let result = usable.map(|shaders| {
         guarded(|| {
             let device = device.map_or_else(|| choose(choice), Ok)?;
-            // The scene is in buffers, not baked, so that a changed scene needs no compilation.
+            // Not baked: a changed scene needs no compilation.
             let options = Options {
                 baked: false,
                 ..Options::best(&device)
@@ -145,7 +134,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
     }
 }
 
-/// Runs code that calls a driver. wgpu panics if a device is lost while it waits, which becomes an error.
+/// Runs code that calls a driver. wgpu's panic at a lost device becomes an error.
 pub fn guarded<T>(work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<String>().map(String::as_str);

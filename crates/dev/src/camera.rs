@@ -33,7 +33,7 @@ pub struct Viewpoint {
     pub look_at: DVec3,
     /// The up direction.
     pub up: DVec3,
-    /// The vertical angle of view in degrees, or the height of an orthographic camera; none for a panorama.
+    /// The vertical angle of view in degrees, or the height if orthographic; none for a panorama.
     pub extent: Option<f64>,
 }
 
@@ -85,7 +85,7 @@ pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<Camera
     }
 }
 
-/// Returns a camera that sees a whole sphere from the current direction, and orbits around its center.
+/// Returns a camera that sees a whole sphere from the same direction, and orbits around its center.
 pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraDescription {
     let View { position, look_at, .. } = view(camera);
     let back = (position - look_at).normalize_or_zero();
@@ -106,8 +106,7 @@ pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraD
 
 /// Minimum angle between the view and the vertical, in radians.
 const STEEPEST: f64 = 0.02;
-/// Number of significant digits of a camera, relative to its distance: more are invisible, and hard to read in a
-/// file.
+/// Significant digits of a camera, relative to its distance: more are invisible, and hard to read.
 const DIGITS: i32 = 5;
 
 /// The position, the point looked at, and the height of the image at that point.
@@ -141,7 +140,7 @@ fn view(camera: &CameraDescription) -> View {
     }
 }
 
-/// Returns a camera after a move, or the same camera if the move would make it invalid.
+/// Returns the moved camera, or the same if that is invalid.
 pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
     let mut new = camera.clone();
     let View {
@@ -205,8 +204,8 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
 /// Nearest and farthest distance to the look-at point that a dolly reaches, relative to that of the file's camera.
 const DOLLY_RANGE: [f64; 2] = [0.01, 1000.0];
 
-/// Dollies like [`moved`], but within bounds. At the near bound the look-at point moves along, so that the camera never
-/// gets stuck in front of it; at the far bound the camera stops.
+/// Dollies like [`moved`], but within bounds. At the near bound the look-at point moves along; at the far bound the
+/// camera stops.
 pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) -> CameraDescription {
     let size = |camera: &CameraDescription| match camera {
         CameraDescription::Orthographic(c) => c.height,
@@ -226,8 +225,7 @@ pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) ->
     near_end
 }
 
-/// Returns a moved camera after an edit of the file's camera: edited values come from the file, the others stay.
-/// `None` if the result is the file's camera.
+/// Returns a moved camera with the edited values of the file's camera; `None` if it equals the file's.
 pub fn merged(
     moved: &CameraDescription,
     old: &CameraDescription,
@@ -288,7 +286,7 @@ fn round(x: f64, scale: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x } // no -0
 }
 
-/// Returns the keys and values of a camera that a move can change, as in a scene file.
+/// Returns the keys and values that a move can change, as in a scene file.
 pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
     match camera {
         CameraDescription::Perspective(c) => vec![
@@ -311,7 +309,7 @@ pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
     }
 }
 
-/// Returns the settings of a camera that no move changes, such as those of its lens.
+/// Returns the settings that no move changes, such as the lens.
 fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
     let CameraDescription::Perspective(c) = camera else {
         return Vec::new();
@@ -330,12 +328,9 @@ fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
         .collect()
 }
 
-/// The value of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Entry {
-    /// One number.
     Number(f64),
-    /// A list of three.
     Point(DVec3),
 }
 

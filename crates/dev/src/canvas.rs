@@ -24,22 +24,20 @@ const DISPATCH_DURATION: Duration = Duration::from_millis(30);
 const COARSE: Duration = Duration::from_millis(30);
 /// Pixels of a coarse image while the speed is unknown.
 const COARSE_PIXELS: f64 = 10_000.0;
-/// The scale of the coarsest image.
 const COARSEST: u32 = 32;
-/// Maximum number of displayed pixels, and maximum length of a side: browsers show no larger images.
+/// Maximum number of displayed pixels, and maximum side: browsers show no larger images.
 const MAX_PIXELS: u64 = 1 << 24;
 const MAX_SIDE: u32 = 1 << 14;
 /// Number of first hits per dispatch.
 const HITS_PER_CALL: u32 = 1 << 17;
 
-/// A progressively rendered scene on a device.
 pub struct Canvas {
     gpu: Gpu,
     /// The scene, with the camera of the current stage.
     scene: Packed,
     /// The camera of the full-size image.
     camera: Camera,
-    /// The scale of the finished film: more than 1 if the image is too large.
+    /// The scale of the finished film; above 1 if the image is too large.
     finest: u32,
     /// True if the CPU also renders the image, for [`View::Compare`].
     compare: bool,
@@ -55,13 +53,11 @@ pub struct Canvas {
     limits: Limits,
 }
 
-/// Limits on what is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Maximum number of samples per pixel, at least 1.
     pub samples: u32,
-    /// The scale of the preview, at least 1: each displayed pixel covers this many pixels of the image along each
-    /// side.
+    /// The scale of the preview, at least 1: pixels of the image along each side of a displayed one.
     pub scale: u32,
 }
 
@@ -74,10 +70,9 @@ impl Default for Limits {
     }
 }
 
-/// The resolution of the current film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stage {
-    /// The scale of the film: each of its pixels covers this many pixels of the image along each side.
+    /// Pixels of the image along each side of a pixel of the film.
     scale: u32,
     width: u32,
     height: u32,
@@ -86,7 +81,6 @@ struct Stage {
 }
 
 impl Canvas {
-    /// Starts to render a scene that is on the device.
     pub fn new(gpu: Gpu, scene: Packed, view: View, limits: Limits) -> Result<Canvas, RenderError> {
         let camera = scene.camera;
         let stage = Stage {
@@ -118,7 +112,7 @@ impl Canvas {
         scene.camera == self.camera && scene.same_but_camera(&self.scene)
     }
 
-    /// Starts to render a changed scene. Returns false, and does nothing, if the scene needs another kernel.
+    /// Starts to render a changed scene. Does nothing and returns false if it needs another kernel.
     pub fn update(&mut self, scene: &Packed, view: View) -> Result<bool, RenderError> {
         let same_kernel = self.gpu.update(scene)?;
         if same_kernel {
@@ -128,7 +122,7 @@ impl Canvas {
         Ok(same_kernel)
     }
 
-    /// Sets the values of the kernel's sliders, as bits. The image must be started again.
+    /// Sets the sliders' values, as bits. The image must be restarted.
     pub fn set_sliders(&mut self, values: &[u32]) -> Result<(), RenderError> {
         self.gpu.set_sliders(values)
     }
@@ -138,7 +132,6 @@ impl Canvas {
         self.gpu.dispatches()
     }
 
-    /// Starts the image again, with a camera.
     pub fn restart(&mut self, camera: Camera, view: View) -> Result<(), RenderError> {
         self.camera = camera;
         if self.compare != view.is_by_both() {
@@ -158,7 +151,6 @@ impl Canvas {
         self.begin(scale)
     }
 
-    /// Switches to another view of the same image.
     pub fn change_view(&mut self, view: View) -> Result<(), RenderError> {
         let film = self.hits_of(view).is_none();
         let nothing_there = self.stage.scale == self.finest && self.steps.samples() == 0;
@@ -219,7 +211,6 @@ impl Canvas {
         Ok(())
     }
 
-    /// Changes the limits.
     pub fn set_limits(&mut self, limits: Limits, view: View) -> Result<(), RenderError> {
         let (old, fewer) = (self.limits, limits.samples < self.steps.samples());
         self.limits = limits;
@@ -235,12 +226,11 @@ impl Canvas {
         [self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale)]
     }
 
-    /// Returns true until a part of the image that is worth showing is rendered.
+    /// Returns true until there is something worth showing.
     pub fn is_new(&self) -> bool {
         !self.shown
     }
 
-    /// Returns whether a view is finished.
     pub fn is_done(&self, view: View) -> bool {
         match self.hits_of(view) {
             Some(_) => {
@@ -319,7 +309,7 @@ impl Canvas {
         }
         let film;
         let under = self.under.as_ref();
-        // Until the current stage has a result, the previous, coarser film is sent.
+        // Until the stage has a result, the coarser film is sent.
         let (gpu, cpu, under) = match under.filter(|_| !self.stage.begun) {
             Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
             None => {
@@ -390,7 +380,7 @@ fn finest(width: u32, height: u32, largest_film: u64, least: u32) -> u32 {
     (least..).find(fits).unwrap_or(1) // an image of one pixel fits
 }
 
-/// A backend that submits each dispatch to the GPU and the CPU, to compare their films.
+/// Submits each dispatch to the GPU and the CPU, to compare films.
 struct Both<'a> {
     gpu: &'a mut Gpu,
     cpu: Cpu<'a>,

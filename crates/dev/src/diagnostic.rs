@@ -89,7 +89,7 @@ impl Diagnostic {
         }
     }
 
-    /// Returns the diagnostic of an error in a shader file of a folder, or in a built-in one.
+    /// Returns the diagnostic of a shader's error, in a folder or built-in.
     pub fn shader(error: &ShaderError, shaders: &Shaders, folder: Option<&Path>) -> Diagnostic {
         let mut found = Diagnostic {
             place: Some(error.place.clone()),
@@ -116,7 +116,7 @@ impl Diagnostic {
         found
     }
 
-    /// Returns the line of the excerpt with the location, and the mark below it: a terminal has little room.
+    /// Returns the excerpt's line with the location and its mark, for a terminal.
     pub fn marked_line(&self) -> Option<String> {
         let lines: Vec<&str> = self.excerpt.as_ref()?.lines().collect();
         let mark = lines.iter().position(|line| line.starts_with(excerpt::NO_NUMBER))?;
@@ -128,7 +128,7 @@ fn whole_path(path: &Path) -> Option<String> {
     absolute(path).ok()?.to_str().map(str::to_string)
 }
 
-/// Returns the excerpt of a line, counted from 1, with the lines before and after it.
+/// Returns the excerpt of a line, from 1, between its neighbors.
 fn around(text: &str, line: usize, excerpt: &str) -> String {
     let numbered = |line: usize| Some((line, text.lines().nth(line.checked_sub(1)?)?));
     let shown = |(line, content)| excerpt::numbered(line, content);
@@ -141,7 +141,7 @@ fn around(text: &str, line: usize, excerpt: &str) -> String {
 /// Texts above this size are not searched for the column of a value.
 const MAX_SEARCHED_BYTES: usize = 1 << 20;
 
-/// Returns column and length of the value that breaks a rule, or of the unknown key, if it is on this line.
+/// Returns column and length of the invalid value or unknown key, if on this line.
 fn mark_of(layout: &Layout, text: &str, line: usize, problem: &Problem) -> Option<(usize, usize)> {
     let range = match (problem.is_unknown_key, problem.key.0.last()) {
         (true, Some(Segment::Key(key))) => layout.extent(&problem.key).map(|all| all.start..all.start + key.len()),
@@ -153,8 +153,7 @@ fn mark_of(layout: &Layout, text: &str, line: usize, problem: &Problem) -> Optio
     (before.matches('\n').count() + 1 == line).then_some((before[start..].chars().count() + 1, marked))
 }
 
-/// Returns a line of a text, counted from 1, with its number and a mark at a column and of a length, or under the whole
-/// line.
+/// Returns a line, from 1, with its number and a mark (column and length), or wholly marked.
 fn excerpt_of(text: &str, line: usize, mark: Option<(usize, usize)>) -> Option<String> {
     let content = text.lines().nth(line.checked_sub(1)?)?;
     let indent = content.chars().take_while(|c| c.is_whitespace()).count();

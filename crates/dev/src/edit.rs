@@ -30,11 +30,11 @@ pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Resu
     let edits = edits(&piece.text, &piece.path, value).map_err(|why| format!("{path}: {why}"))?;
     let mut whole: Vec<Edit> = Vec::with_capacity(edits.len());
     for (range, new) in edits {
-        // Only the start is mapped: the range lies in one piece, but its end may belong to the next piece.
+        // Only the start is mapped: the end may belong to the next piece.
         let start = piece.place(range.start);
         whole.push((start..start + range.len(), new));
     }
-    // Applied from the end, so that the offsets of earlier edits stay valid.
+    // From the end: offsets of earlier edits stay valid.
     whole.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
     let mut text = pieces.whole().to_owned();
     for (range, new) in whole {
@@ -52,7 +52,7 @@ impl<'a> Layout<'a> {
         Document::parse(text).ok().map(Layout)
     }
 
-    /// Returns the range of everything at a path, from the first to the last byte of its keys and values.
+    /// Returns the range from the first to the last byte of all keys and values at a path.
     pub fn extent(&self, path: &KeyPath) -> Option<Range<usize>> {
         let way = NodePath::along(self.0.as_table(), &path.0);
         way.rest.is_empty().then_some(())?;
@@ -68,7 +68,6 @@ impl<'a> Layout<'a> {
         found
     }
 
-    /// Returns the range of the value at a path.
     pub fn value(&self, path: &KeyPath) -> Option<Range<usize>> {
         let way = NodePath::along(self.0.as_table(), &path.0);
         match way.nodes.last()? {
@@ -78,7 +77,6 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// A node of a document.
 #[derive(Clone, Copy)]
 enum Node<'a> {
     Table(&'a Table),
@@ -123,9 +121,8 @@ impl<'a> Node<'a> {
     }
 }
 
-/// The nodes from the root of a document along a path, as far as they exist.
+/// The existing nodes along a path.
 struct NodePath<'a, 'p> {
-    /// The nodes, starting with the root table.
     nodes: Vec<Node<'a>>,
     /// The segments of the path that do not exist.
     rest: &'p [Segment],
@@ -200,7 +197,7 @@ fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> 
     Some(())
 }
 
-/// Returns the edits that add an absent key to the table at the end of a path, after its last key.
+/// Returns the edits that add a key to the table at the end of a path, after its last key.
 fn addition(text: &str, way: &NodePath, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
     let here = *way.nodes.last().ok_or("has no place")?;
     // A table of dotted keys repeats the same prefix before each key.
@@ -272,7 +269,6 @@ fn behind_line(text: &str, at: usize, line: &str) -> Edit {
     (end..end, format!("{}{line}", line_break(text, at)))
 }
 
-/// Returns the start of the line that contains a byte.
 pub fn line_start(text: &str, at: usize) -> usize {
     let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
     let mark = '\u{feff}'.len_utf8();
@@ -347,7 +343,7 @@ fn removal(text: &str, way: &NodePath, path: &[Segment]) -> Result<Edit, String>
     }
 }
 
-/// Returns the range of the keys in a table's own body, if it has any, without those under headers of their own.
+/// Returns the range of the keys in a table's own body, without those under other headers.
 fn own(table: &Table) -> Option<Range<usize>> {
     let mut found = None;
     for (key, item) in table.iter() {

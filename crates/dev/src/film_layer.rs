@@ -21,7 +21,7 @@ pub struct FilmLayer {
 }
 
 impl FilmLayer {
-    /// Returns a layer of a film. Rows without samples show `under`, a smaller film of the same image.
+    /// Returns a layer of a film. Rows without samples show `under`, a smaller film.
     pub fn of(aov: Aov, film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> FilmLayer {
         let covered = match aov {
             Aov::ShadingNormal => of_film(film, under, has_samples, &Film::alpha),
@@ -48,8 +48,8 @@ impl FilmLayer {
         self.aov == Aov::ShadingNormal
     }
 
-    /// Returns the displayed bytes: radiance like the image, albedo by the display's curve alone, and variance as its
-    /// standard error in false colors.
+    /// Returns the displayed bytes: radiance like the image, albedo by the display's curve, variance as standard error
+    /// in false colors.
     pub fn bytes(&self, look: &DisplaySettings) -> Vec<u8> {
         let values = &self.values.colors;
         match self.aov {
@@ -150,7 +150,6 @@ mod tests {
         let values = variance.pixel(0, &DisplaySettings::default()).unwrap();
         assert_eq!(values[2], ("standard error", "0.5  1  0".to_string()));
         assert_eq!(variance.pixel(2, &DisplaySettings::default()), None);
-        // A film without these layers yields zeros.
         let plain = Film::new(Region::whole(1, 2));
         for aov in [Aov::Variance, Aov::Direct] {
             assert_eq!(

@@ -1,12 +1,11 @@
-//! The check of requests. Another page must not reach the session through the user's browser: not by a name that
-//! points to this address (DNS rebinding, with a foreign Host), and not by a WebSocket (with a foreign Origin).
+//! The check of requests. Another page must not reach the session through the user's browser: neither by DNS rebinding
+//! (foreign Host) nor by a WebSocket (foreign Origin).
 
 use std::net::IpAddr;
 
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, Uri, header};
 
-/// The host names of a server.
 #[derive(Clone, Debug)]
 pub struct Guard {
     /// The host name that it listens on, unless that is an address.
@@ -46,8 +45,7 @@ impl Guard {
         }
     }
 
-    /// An address cannot be redirected, unlike a name: only known names are allowed. Any port is allowed, for
-    /// tunnels.
+    /// Only known names, as names can be redirected, unlike addresses. Any port, for tunnels.
     fn knows(&self, host: &Authority) -> bool {
         if host.as_str().contains('@') {
             return false;

@@ -25,7 +25,6 @@ pub struct Histogram {
     pub above_white: [u32; 3],
 }
 
-/// The counts per channel, and the number above white.
 type Counts = [(Vec<u32>, u32); 3];
 
 impl Histogram {
@@ -60,7 +59,7 @@ impl Histogram {
     }
 }
 
-/// Returns the bin of a value from the bits of the float: from the exponent, and the mantissa among the bounds.
+/// Returns the bin of a float's bits: by exponent, and mantissa among the bounds.
 fn bin(value: f32) -> Option<usize> {
     if value.is_nan() || value <= 0.0 {
         return None;

@@ -5,7 +5,6 @@ use wgray_scene::KeyPath;
 /// Maximum number of steps.
 const MOST: usize = 1000;
 
-/// A change of the file.
 #[derive(Debug)]
 pub struct Step {
     /// The changed key, for display.
@@ -62,7 +61,6 @@ pub struct History {
 }
 
 impl History {
-    /// Adds a change of a text.
     pub fn add(&mut self, step: Step, before: &str, after: &str) {
         self.undone.clear();
         let is_same = |last: &Step| last.gesture.is_some() && last.gesture == step.gesture && last.what == step.what;
@@ -77,7 +75,7 @@ impl History {
         }
     }
 
-    /// Drops all steps because another program has changed the file. Returns whether there were any.
+    /// Drops all steps after another program's change. Returns whether there were any.
     pub fn forget(&mut self) -> bool {
         let History { done, undone } = std::mem::take(self);
         !(done.is_empty() && undone.is_empty())
@@ -104,7 +102,7 @@ impl History {
             true => (&mut self.undone, &mut self.done),
         };
         to.extend(from.pop());
-        // A later change of the same gesture must not be merged with a step that was redone.
+        // Later changes of the gesture must not be merged with a redone step.
         self.done
             .iter_mut()
             .last()
@@ -140,7 +138,7 @@ mod tests {
             history.turn(true);
             assert_eq!(text, *wanted);
         }
-        // Another change drops the changes that were undone.
+        // Another change drops the undone ones.
         history.add(step("x", None), texts[2], "x");
         assert!(history.last(true).is_none());
         assert_eq!(history.turned("x", false).as_deref(), Some(texts[2]));

@@ -25,7 +25,7 @@ pub enum Report {
     Mended,
     /// The first image after a save was shown.
     Reloaded {
-        /// Seconds from the change to the image; the time to compile is part of it.
+        /// Seconds from the change to the image, including compilation.
         seconds: f64,
         /// Seconds spent on compiling.
         compiled: Option<f64>,
@@ -118,7 +118,7 @@ pub enum Command {
     Keep,
 }
 
-/// The scale of the preview: each pixel that is shown covers this many pixels of the image along each side.
+/// The scale of the preview: pixels of the image along each side of a displayed pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(try_from = "u32", into = "u32")]
 pub struct Preview(u32);
@@ -172,7 +172,7 @@ pub struct State {
     pub scenes: u64,
     /// The last change of the scene file, which can be undone: `camera`, `materials.red.color`.
     pub undo: Option<String>,
-    /// Why nothing can be undone, if another program's change of the file dropped the history.
+    /// Why nothing can be undone: another program's change of the file dropped the history.
     pub undo_blocked: Option<String>,
     /// Why the scene file cannot be edited here, if that is so: it is glTF or JSON.
     pub read_only: Option<String>,
@@ -190,8 +190,7 @@ pub struct State {
     pub samples: (Option<NonZeroU32>, u32),
     /// The scale of the preview.
     pub preview: Preview,
-    /// The images to compare with, beside the CPU: the image before the last change, and the reference by
-    /// its name.
+    /// The images to compare with, beside the CPU's: before the last change, and the reference by name.
     pub comparable: (bool, Option<String>),
     /// Why the selected comparison cannot be shown.
     pub no_comparison: Option<String>,
@@ -234,26 +233,19 @@ pub struct Notice {
     pub bad: bool,
 }
 
-/// An event for the painter.
 pub enum Event {
-    /// The files changed: the new state, the time at which that was noticed, and the number of writes of this session
-    /// before.
+    /// The files changed: the new state, when that was noticed, and the number of this session's writes before.
     Files(Box<Snapshot>, Instant, u64),
     /// Changed files of the scene are being read, or turned out to be unchanged.
     Reading(bool),
-    /// A kernel has been compiled.
     BuildResult(Box<BuildResult>),
-    /// A command of a viewer.
     Command(Command),
     /// A viewer gave an image to compare with.
     Reference(Reference),
-    /// The difference of two images was measured.
     Measured(Apart),
-    /// A viewer arrived.
     Viewers,
     /// Destroys the device, as if the driver had lost it.
     #[cfg(test)]
     Lose,
-    /// The session ends.
     Stop,
 }

@@ -14,19 +14,15 @@ use wgray_scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDesc
 
 /// Maximum number of lines that are shown of a table.
 const MAX_LINES: usize = 40;
-/// Maximum number of listed objects.
 const MAX_LISTED: usize = 50;
-/// Maximum number of tables that are shown with an object: materials, textures, a mesh.
+/// Maximum number of tables with an object: materials, textures, a mesh.
 const MAX_GROUPS: usize = 12;
 
 /// The scene and the camera, which answer questions about objects.
 #[derive(Clone, Debug)]
 pub struct SceneView {
-    /// The scene.
     pub(super) loaded: Arc<Loaded>,
-    /// The current camera.
     pub(super) camera: Camera,
-    /// The files.
     pub(super) sources: Sources,
 }
 
@@ -145,7 +141,6 @@ impl SceneView {
         }
     }
 
-    /// Returns the names that values may refer to.
     pub(super) fn names(&self) -> Names {
         let all = &self.loaded.description;
         Names {
@@ -212,7 +207,6 @@ impl SceneView {
         self.gone(name, reason)
     }
 
-    /// Returns the table of the scene file at a path.
     fn group(&self, pieces: &Pieces, path: &KeyPath, names: &Names) -> Option<Group> {
         let piece = pieces.find(path);
         let whole: Table = toml::from_str(piece.text.trim_start_matches('\u{feff}')).ok()?;
@@ -312,13 +306,12 @@ impl SceneView {
     }
 }
 
-/// Returns the number of a field's path segments that belong to its object.
+/// Returns the number of path segments of a field's object.
 fn path_len(whole: usize, field: &Field) -> usize {
     let below = field.name.parse::<KeyPath>().map_or(0, |name| name.0.len());
     whole.saturating_sub(below)
 }
 
-/// Returns the path of a named object.
 fn named(section: &str, name: &str) -> KeyPath {
     KeyPath([section, name].map(Segment::from).to_vec())
 }
@@ -332,7 +325,6 @@ pub(super) fn object_of(path: &KeyPath) -> Option<KeyPath> {
     path.0.get(..length).map(|object| KeyPath(object.to_vec()))
 }
 
-/// Returns whether a scene has an object.
 fn is_there(all: &Description, path: &KeyPath) -> bool {
     match path.0.as_slice() {
         [Segment::Key(section)] => match section.as_str() {
@@ -375,8 +367,8 @@ fn named_by(group: &Group) -> Vec<KeyPath> {
     found
 }
 
-/// Returns the lines of a range and the comments directly above it: the number of the first line, the text, and the
-/// number of omitted lines.
+/// Returns the lines of a range and the comments directly above it: first line number, text, and number of omitted
+/// lines.
 fn lines(text: &str, start: usize, end: usize) -> (usize, String, usize) {
     let mut start = line_start(text, start);
     while let Some(above) = text[..start].strip_suffix('\n') {

@@ -131,8 +131,7 @@ pub enum Content {
 }
 
 impl Content {
-    /// Returns the displayed bytes of first hits and sample counts for an image of this size; empty for other
-    /// content.
+    /// Returns the displayed bytes of first hits and sample counts; empty for other content.
     pub(super) fn plain_bytes(&self, [width, height]: [u32; 2]) -> Vec<u8> {
         match self {
             Content::Samples(counts, total) => bytes(counts, |n| Vec3::splat(*n as f32 / (*total).max(1) as f32)),
@@ -151,7 +150,7 @@ impl Content {
 pub struct Header {
     /// The number of the frame.
     pub number: u64,
-    /// The number of changes of scene, shaders and camera that the frame shows.
+    /// The number of changes of scene, shaders and camera shown.
     pub revision: u64,
     /// The view.
     pub view: View,
@@ -161,7 +160,7 @@ pub struct Header {
     pub height: u32,
     /// Width and height of the images that are sent.
     pub sent: [u32; 2],
-    /// Width and height of the finished image: less than the full size if that is too large to display.
+    /// Width and height of the finished image: less than in full if that is too large to display.
     pub finest: [u32; 2],
     /// Samples per pixel so far.
     pub samples: u32,
@@ -175,7 +174,7 @@ pub struct Header {
     pub speed: Option<f64>,
     /// Seconds from the last change to its first frame.
     pub latency: Option<f64>,
-    /// The result of [`View::Compare`]: the number of pixels that differ in any bit, and the largest difference.
+    /// Under [`View::Compare`], the number of pixels that differ in any bit, and the largest difference.
     pub differing: Option<(usize, f32)>,
     /// The names of the two images of [`View::Compare`].
     pub sides: Option<[String; 2]>,
@@ -211,7 +210,6 @@ pub struct Names {
     pub shapes: u32,
     /// Number of instances; lights follow them.
     pub instances: u32,
-    /// The names of the materials.
     pub materials: Vec<String>,
 }
 
@@ -358,7 +356,7 @@ fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static
     vec![(name, numbers(values)), ("bits", bits(values))]
 }
 
-/// Returns an image of the differences: `gain` times as large, with a minimum that stays visible.
+/// Returns the differences, `gain` times as large, with a visible minimum.
 fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
     const LEAST: f32 = 0.2;
     let pairs: Vec<_> = gpu.colors.iter().copied().zip(cpu.colors.iter().copied()).collect();
@@ -384,8 +382,7 @@ pub(super) fn png_of(pixels: &Pixels, look: DisplaySettings) -> Vec<u8> {
 
 /// Encodes 8-bit RGB as PNG with fast compression.
 pub(super) fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
-    // Encoding to memory fails only if the sizes do not match; the page then shows no image, which the tests would
-    // notice.
+    // Encoding to memory fails only if the sizes do not match; the page then shows no image.
     image::in_memory(width, height, rgb).unwrap_or_else(|error| {
         tracing::error!("cannot encode an image of {width} x {height} pixels: {error}");
         Vec::new()

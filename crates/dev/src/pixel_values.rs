@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use wgray_image::Pixels;
 use wgray_render::film::{Film, mean};
 
-/// Returns the means of a film's sums. Rows without samples show `under`, a smaller film of the same image.
+/// Returns the means of a film's sums. Rows without samples show `under`, a smaller film.
 pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
     Pixels {
         width: film.region.width(),
@@ -14,7 +14,7 @@ pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bo
     }
 }
 
-/// Returns a value of each pixel of a film, or, in rows without samples, of a smaller film of the same image.
+/// Returns a value of each pixel of a film, or, in rows without samples, of a smaller one.
 pub(super) fn of_film<T: Default + Send>(
     film: &Film,
     under: Option<&Film>,
@@ -35,7 +35,7 @@ pub(super) fn of_film<T: Default + Send>(
     pixels.map(of_pixel).collect()
 }
 
-/// A mapping from an image to the same image in another size.
+/// Maps an image to another size of it.
 pub(super) struct ScaledImage {
     pub from: [u32; 2],
     pub to: [u32; 2],
@@ -51,7 +51,6 @@ impl ScaledImage {
     }
 }
 
-/// Formats numbers.
 pub(super) fn numbers<const N: usize>(values: [f32; N]) -> String {
     values.map(|v| format!("{v}")).join("  ")
 }
@@ -61,7 +60,7 @@ pub(super) fn bits<const N: usize>(values: [f32; N]) -> String {
     values.map(|v| format!("{:08x}", v.to_bits())).join("  ")
 }
 
-/// Returns the bytes of values that are displayed without a transform.
+/// Bytes without a view transform.
 pub(super) fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
     let byte = |v: f32| (v * 255.0 + 0.5) as u8; // saturates
     pixels

@@ -10,7 +10,7 @@ use wgray_image::color::srgb_to_linear;
 use wgray_image::compare::{self, Channel, Kind, PIXELS_PER_DEGREE, Picture, Plane};
 use wgray_scene::{ViewSettings, ViewTransform};
 
-/// Maximum number of pixels of a viewer's file, a little more than 7680 x 4320: a small file may have many pixels.
+/// Maximum number of pixels of a viewer's file, a little more than 7680 x 4320.
 const MAX_PIXELS: u64 = 1 << 25;
 
 /// An image to compare with.
@@ -56,7 +56,7 @@ impl Reference {
         })
     }
 
-    /// Returns the pixels in another size, each in its place; `None` if the image does not have this full size.
+    /// Returns the pixels in another size; `None` if the image does not have this full size.
     pub fn at(&self, whole: [u32; 2], sent: [u32; 2]) -> Option<Pixels> {
         let Pixels { width, height, .. } = *self.pixels;
         if [width, height] != whole {

@@ -12,9 +12,9 @@ use super::camera::{Entry, entries};
 use super::edit::edited;
 use wgray_scene::{CameraDescription, Description, KeyPath, Segment};
 
-/// Maximum time that a program needs from the first byte of a file to the last.
+/// Maximum time that a program needs to write a file.
 const SAVING: Duration = Duration::from_millis(100);
-/// Maximum time to wait for a save of another program.
+/// Maximum wait for another program's save.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Replaces a file atomically: a reader sees the old or the new content.
@@ -23,7 +23,7 @@ pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Like [`replace`], for a file that another program may change: fails unless the file has the known content.
+/// Like [`replace`], but fails unless the file has the known content.
 pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Result<()> {
     let file = written(path, content)?;
     if fs::read(path)? != known {
@@ -35,8 +35,7 @@ pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Resu
     Ok(())
 }
 
-/// Waits until a file has not changed for a short time. A program that is still writing it would write the rest to the
-/// replaced file, where it would be lost.
+/// Waits until a file has not changed for a short time: another program would write the rest to the replaced file.
 ///
 /// # Errors
 ///
@@ -59,7 +58,7 @@ pub fn wait_settled(path: &Path) -> Result<(), String> {
     }
 }
 
-/// Writes a temporary file next to `path`, with the permissions of the file that it will replace.
+/// Writes a temporary file next to `path`, with its permissions.
 fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = path
         .parent()
@@ -193,7 +192,7 @@ mod tests {
         replace_known(&file, b"theirs", b"ours").unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), "ours");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        // A file that changed just now may not be complete; the wait for one that keeps changing ends.
+        // A file that keeps changing ends the wait.
         let changed = |ago: Duration| {
             let file = fs::File::options().write(true).open(&file).unwrap();
             file.set_modified(SystemTime::now() - ago).unwrap();
@@ -213,7 +212,7 @@ mod tests {
                     sleep(Duration::from_millis(1));
                 }
             });
-            // On a busy machine a single wait may find the file unchanged for long enough.
+            // On a busy machine a single wait may succeed.
             let error = (0..10).find_map(|_| wait_settled(&file).err());
             is_done.store(true, Relaxed);
             error.unwrap()

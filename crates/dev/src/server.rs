@@ -35,13 +35,11 @@ use super::viewer;
 const VIEWERS: usize = 16;
 /// Maximum number of requests that are received or answered at once.
 const MAX_REQUESTS: usize = 64;
-/// Timeout for receiving and answering a request.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
 /// Maximum size of a viewer's message in bytes; a command is far smaller.
 const MAX_MESSAGE_BYTES: usize = 4096;
 /// Maximum size of a reference file in bytes.
 const MAX_FILE_BYTES: usize = 256 << 20;
-/// Maximum length of its name in characters.
 const MAX_NAME_LEN: usize = 80;
 
 /// An open listening address.
@@ -105,8 +103,8 @@ struct Unread {
     has_head: Arc<AtomicBool>,
 }
 
-/// Answers requests, each on its own connection and in bounded time. The WebSocket of a viewer is served by another
-/// task. If all connections are in use, a new one takes the place of the one that has waited longest for a request.
+/// Answers requests, each on its own connection and in bounded time. A new connection may replace the one that has
+/// waited longest for a request.
 async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::Result<()> {
     let requests = Arc::new(Semaphore::new(MAX_REQUESTS));
     let mut unread: VecDeque<Unread> = VecDeque::new();
@@ -134,7 +132,7 @@ async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::R
         let task = tokio::spawn(async move {
             let mut http = http1::Builder::new();
             let connection = http.keep_alive(false).serve_connection(TokioIo::new(stream), service);
-            // The client learns of a failure by the end of the connection.
+            // A failure ends the connection.
             let _answered = tokio::time::timeout(REQUEST_TIMEOUT, connection.with_upgrades()).await;
             drop(place);
         });
@@ -143,7 +141,6 @@ async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::R
     }
 }
 
-/// The modules of the page.
 const MODULES: [(&str, &str); 22] = [
     ("/camera.js", include_str!("page/camera.js")),
     ("/color.js", include_str!("page/color.js")),
@@ -192,7 +189,6 @@ fn routes(shared: Shared) -> Router {
         .with_state(shared)
 }
 
-/// Responds with the displayed image as a file.
 async fn picture(shared: Shared, kind: &'static str, make: fn(&Frame) -> io::Result<Vec<u8>>) -> Response {
     let frame = shared.frames.borrow().clone();
     let Some(frame) = frame.filter(|frame| frame.header.sent == frame.header.finest) else {
@@ -213,7 +209,7 @@ async fn picture_exr(State(shared): State<Shared>) -> Response {
     picture(shared, "image/x-exr", exr_file).await
 }
 
-/// Receives a reference file. It comes from the viewer's machine: no file of this machine is read.
+/// Receives a reference file of the viewer's machine.
 async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>, body: Bytes) -> Response {
     let frame = shared.frames.borrow().clone();
     let view = frame.map(|frame| frame.look.view).unwrap_or_default();
@@ -229,7 +225,7 @@ async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>,
     }
 }
 
-/// Refuses requests of other pages, and forbids the browser to load anything from elsewhere.
+/// Refuses requests of other pages, and forbids loading anything from elsewhere.
 async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     // Requests that change anything must come from the page itself.
     let acts = request.uri().path() == "/socket" || request.method() != Method::GET;

@@ -43,7 +43,6 @@ const WAITING: usize = 256;
 /// A running session; it ends when this is dropped.
 pub struct Session {
     events: SyncSender<Event>,
-    /// Number of accepted commands.
     asked: Arc<Mutex<u64>>,
     /// The newest state.
     pub state: watch::Receiver<Arc<State>>,
@@ -101,8 +100,7 @@ pub enum StartError {
 }
 
 impl Session {
-    /// Opens the device, reads the files and starts to render. Errors in the files are reported, and the session
-    /// waits for them to be fixed.
+    /// Opens the device, reads the files and starts to render. Errors in the files are reported until they are fixed.
     ///
     /// # Errors
     ///
@@ -176,7 +174,7 @@ impl Session {
         let _ = self.events.send(Event::Command(command)); // the thread lives as long as the session
     }
 
-    /// Returns a function that gives reference images from other threads without blocking; it returns false if the
+    /// Returns a function that gives reference images from other threads without blocking, or returns false if the
     /// session is busy.
     pub fn references(&self) -> impl Fn(Reference) -> bool + Send + Sync + 'static {
         let events = self.events.clone();
@@ -188,8 +186,8 @@ impl Session {
         self.viewers.clone()
     }
 
-    /// Returns a function that sends commands from other threads without blocking. It returns the number that
-    /// [`State::executed`] reaches once the command is executed, or `None` if the session is busy.
+    /// Returns a function that sends commands from other threads without blocking, and returns the number that
+    /// [`State::executed`] then reaches, or `None` if the session is busy.
     pub fn commands(&self) -> impl Fn(Command) -> Option<u64> + Send + Sync + 'static {
         let (events, asked) = (self.events.clone(), self.asked.clone());
         move |command| {
@@ -213,7 +211,7 @@ impl Drop for Session {
     }
 }
 
-/// Handles all pending events before any work, so that an event waits for one dispatch at most.
+/// Handles all pending events first: an event waits for one dispatch at most.
 fn run(mut painter: Painter, inbox: Receiver<Event>) {
     loop {
         let event = if painter.has_work() {

@@ -12,7 +12,6 @@ use super::reference::Reference;
 use super::session::Viewers;
 use super::times::Times;
 
-/// The resources of all requests.
 #[derive(Clone)]
 pub struct Shared {
     pub guard: Guard,

@@ -22,12 +22,12 @@ pub struct SliderState {
 /// The values of a session, by file and name.
 #[derive(Default)]
 pub struct Sliders {
-    /// Moved values, each with the value in the file at that time: a later edit of the file takes precedence.
+    /// Moved values, each with the file's at that time: a later edit of the file takes precedence.
     moved: BTreeMap<(String, String), (Value, Value)>,
 }
 
 impl Sliders {
-    /// Moves one of these sliders. Returns whether its value changed, or why it cannot be moved.
+    /// Returns whether the value changed, or why it cannot be moved.
     pub fn slide(&mut self, sliders: &[Slider], file: &str, name: &str, value: Value) -> Result<bool, String> {
         let slider = sliders.iter().find(|slider| slider.file == file && slider.name == name);
         let slider = slider.ok_or_else(|| format!("{file}: no slider `{name}` exists"))?;
@@ -60,7 +60,6 @@ impl Sliders {
         sliders.iter().map(|slider| slider.bits(self.value(slider))).collect()
     }
 
-    /// Returns the sliders for the page.
     pub fn states(&self, sliders: &[Slider], folder: Option<&Path>) -> Vec<SliderState> {
         let folder = folder.and_then(|folder| absolute(folder).ok());
         let state = |slider: &Slider| SliderState {

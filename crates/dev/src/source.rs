@@ -35,9 +35,7 @@ pub struct Loaded {
     pub text: String,
     /// The description, with the values of overriding options.
     pub description: Description,
-    /// The camera of the file.
     pub camera: CameraDescription,
-    /// The scene.
     pub scene: Scene,
     /// The packed scene, as the backends read it.
     pub packed: Packed,
@@ -46,7 +44,6 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Packs a scene that was read from a text.
     pub fn new(text: String, scene: Scene, description: Description) -> Loaded {
         let packed = pack(&scene).without_layers(); // views of layers have their own kernels
         Loaded {
@@ -59,14 +56,13 @@ impl Loaded {
         }
     }
 
-    /// Adds the known locations of the parts of the text.
     #[must_use]
     pub(crate) fn with_places(mut self, places: Option<Places>) -> Loaded {
         self.places = places.map_or_else(OnceLock::new, OnceLock::from);
         self
     }
 
-    /// Returns the pieces of the text. A large text is scanned only once.
+    /// Returns the pieces of the text, scanned only once.
     pub(crate) fn pieces(&self) -> Pieces<'_> {
         Pieces::known(&self.text, self.places.get_or_init(|| Places::of(&self.text)))
     }
@@ -75,7 +71,6 @@ impl Loaded {
 /// The constants of a kernel, the integrator, and whether sampling is adaptive.
 pub type Constants = (Specialization, Integrator, bool);
 
-/// Returns what a scene's kernel is compiled for, to show a view.
 pub fn constants(packed: &Packed, view: View) -> Constants {
     let integrator = packed.integrator;
     let of_samples = view
@@ -88,7 +83,7 @@ pub fn constants(packed: &Packed, view: View) -> Constants {
     (specialization, integrator, packed.sampling.adaptive)
 }
 
-/// Returns what a kernel shows when a view is selected: color, if the view needs another kernel.
+/// Returns what a kernel shows for a view: color, if the view needs another kernel.
 pub fn shown((specialization, integrator, adaptive): &Constants, view: View) -> View {
     match view.aov().map(|aov| aov.source(*integrator)) {
         Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
@@ -115,30 +110,24 @@ pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
 /// The state of all files at one moment.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// The scene or its errors.
     pub scene: Result<Arc<Loaded>, Vec<Diagnostic>>,
-    /// The shaders or their errors.
     pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
     /// Time spent on reading the files, and on packing the scene.
     pub took: [Duration; 2],
-    /// The scene file and all files that the scene uses, with their states, which decide whether to read again.
+    /// All files of the scene with their states, which decide whether to read again.
     pub files: Vec<(PathBuf, FileStamp)>,
 }
 
-/// The state of a file for comparison: the content of a scene file; length and modification time of files that may be
-/// large, such as models.
+/// The state of a file: a scene file's content; else length and modification time, as files may be large.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileStamp {
     /// The file cannot be read.
     Absent,
-    /// The content of a text file.
     Content(Vec<u8>),
-    /// Length and modification time.
     Changed(u64, Option<SystemTime>),
 }
 
 impl FileStamp {
-    /// Returns the size in bytes.
     pub fn size(&self) -> u64 {
         match self {
             FileStamp::Absent => 0,
@@ -170,12 +159,11 @@ impl Sources {
         ))
     }
 
-    /// Reads all files.
     pub fn read(&self) -> Snapshot {
         self.read_scene(self.read_shaders())
     }
 
-    /// Reads what has changed since a snapshot; `None` if nothing has. Calls `begin` before it reads a scene.
+    /// Reads what has changed since a snapshot, if anything. Calls `begin` before reading a scene.
     pub fn reread(&self, last: &Snapshot, begin: impl FnOnce()) -> Option<Snapshot> {
         let start = Instant::now();
         let shaders = match (self.read_shaders(), &last.shaders) {
@@ -199,7 +187,7 @@ impl Sources {
                 begin();
                 let mut new = self.read_scene(shaders);
                 if new.files.len() == 1 {
-                    // The scene may be half written: the files of the last complete one are still watched.
+                    // The scene may be half written: keeps watching the files of the last one.
                     new.files.extend(
                         last.files
                             .iter()
@@ -224,7 +212,7 @@ impl Sources {
 
     fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>) -> Snapshot {
         let start = Instant::now();
-        // States are taken first: a file that changes while it is read is read again.
+        // States first: a file that changes meanwhile is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
         let mut named = BTreeSet::new();
         let (mut text, origin) = (String::new(), self.scene.display().to_string());
@@ -238,7 +226,6 @@ impl Sources {
                 draft.check(&mut named)
             }),
         };
-        // The files that the files themselves name are known now.
         for path in named {
             if files.iter().all(|(known, _)| *known != path) {
                 let stamp = self.stamp(&path);
@@ -263,7 +250,6 @@ impl Sources {
         }
     }
 
-    /// Returns the files that a scene names.
     fn named_files(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
         described.files(self.scene.parent().unwrap_or(Path::new("")))
     }
@@ -277,7 +263,6 @@ impl Sources {
         })
     }
 
-    /// Returns the paths of the shader files.
     pub fn shader_files(&self) -> impl Iterator<Item = PathBuf> {
         let folder = self.shaders.iter();
         folder.flat_map(|folder| compose::built_in().map(move |(name, _)| folder.join(name)))

@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use wgray_render::gpu::Dispatch;
 
-/// Number of the last times of each kind that the median is taken over.
+/// Number of times that the median is taken over.
 const KEPT: usize = 33;
 /// The period that shares refer to.
 const WINDOW: Duration = Duration::from_secs(1);
-/// Maximum number of measurements for a share: as many as can end within that time.
+/// Maximum number of measurements within that time.
 const MOST: usize = 2048;
 
 /// The stages of a frame, in order.
@@ -49,7 +49,7 @@ pub struct Time {
     pub share: f64,
     /// Samples of a kernel's last dispatch.
     pub samples: u64,
-    /// True if the device measured the times; otherwise they include the notification of the host.
+    /// True if the device measured the times; else they include notifying the host.
     pub by_device: bool,
 }
 

@@ -19,24 +19,22 @@ use super::times::Time;
 use wgray_image::sanitize::escape_control;
 use wgray_scene::cut;
 
-/// Maximum number of frames that are sent but not acknowledged: the page draws one while the next one arrives. More
-/// would queue up on a slow connection, and delay everything behind them.
+/// Maximum number of unacknowledged frames: one is drawn while the next arrives. More would delay everything on a slow
+/// connection.
 const MAX_FRAMES_IN_FLIGHT: usize = 2;
-/// Minimum time between two states while that many frames are in flight: states must not fill a slow connection either.
+/// Minimum time between states while that many frames are in flight, for slow connections.
 const STATE_INTERVAL: Duration = Duration::from_millis(100);
 /// Maximum number of answers that wait to be sent.
 const MAX_ANSWERS: usize = 64;
-/// Timeout for sending one message.
 const SEND_TIMEOUT: Duration = Duration::from_secs(30);
 /// Interval between reports of timings, while they change.
 const TIMES_INTERVAL: Duration = Duration::from_millis(500);
 /// Interval between pings. A viewer that sends nothing for three intervals is gone.
 const PING_INTERVAL: Duration = Duration::from_secs(15);
 
-/// A message of a viewer.
 #[derive(Debug, PartialEq)]
 enum Request {
-    /// Acknowledges the frame of this number and all before it. There is no answer.
+    /// Acknowledges this frame and all before it. There is no answer.
     Acknowledge(u64),
     Question(Question),
     Command(Command),
@@ -46,26 +44,20 @@ enum Request {
 #[derive(Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Question {
-    /// Asks for the values of a pixel.
     Pixel([u32; 2]),
-    /// Asks for the object at a pixel.
     Object([u32; 2]),
-    /// Asks for an object by name.
     Inspect(Inspect),
     /// Asks for the objects whose names contain a text.
     Objects(String),
 }
 
-/// An acknowledgement of frames.
 #[derive(Deserialize)]
 struct Acknowledgement {
     shown: u64,
 }
 
-/// The names of questions in messages.
 const QUESTIONS: [&str; 4] = ["pixel", "object", "inspect", "objects"];
 
-/// An object by its name.
 #[derive(Debug, PartialEq, Deserialize)]
 struct Inspect {
     name: String,
@@ -85,7 +77,7 @@ impl Request {
         };
         let name =
             name.ok_or("a message must be the name of a command, or an object with that name as its only key")?;
-        // From the text again: a JSON value hides that a key occurs twice.
+        // From the text: a JSON value hides duplicate keys.
         let parsed = match name.as_str() {
             "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::Acknowledge(shown)),
             name if QUESTIONS.contains(&name) => serde_json::from_str(message).map(Request::Question),
@@ -113,16 +105,14 @@ enum Reply<'a> {
     },
     Object(Box<Object>),
     Objects(ObjectList),
-    /// The number of an accepted command; [`messages::State::executed`] reaches it once the command is executed.
+    /// The number of an accepted command, which [`messages::State::executed`] reaches.
     Asked(u64),
     #[serde(rename = "refused")]
     Refusal(String),
-    /// Timings of the stages.
     Times(&'a [Time]),
 }
 
-/// Serves a viewer until it leaves or fails. Sending never blocks receiving: a command takes effect while a frame is
-/// being sent.
+/// Serves a viewer until it leaves or fails. Sending never blocks receiving commands.
 pub(super) async fn serve(socket: WebSocket, shared: &Shared) -> Option<()> {
     let (sink, stream) = socket.split();
     let (answer, answers) = mpsc::channel(MAX_ANSWERS);
@@ -245,8 +235,7 @@ async fn answer(question: Question, shared: &Shared) -> Reply<'static> {
     }
 }
 
-/// Looks something up in the scene on another thread, because the scene may be large. Returns `nothing` without a
-/// scene.
+/// Looks something up in the scene, which may be large, on another thread. Returns `nothing` without a scene.
 async fn of_scene<T: Send + 'static>(
     shared: &Shared,
     nothing: impl Fn() -> T,
@@ -262,8 +251,7 @@ fn text(reply: &Reply) -> Option<Message> {
     Some(Message::Text(serde_json::to_string(reply).ok()?.into()))
 }
 
-/// Returns a frame as a message: the length of the header as four bytes, little-endian, the header as JSON, and the
-/// images.
+/// Returns a frame as a message: length of the header (four bytes, little-endian), header as JSON, images.
 fn bytes(frame: &Frame) -> Option<Vec<u8>> {
     let header = serde_json::to_vec(&frame.header).ok()?;
     let mut bytes = u32::try_from(header.len()).ok()?.to_le_bytes().to_vec();

@@ -1,5 +1,5 @@
-//! Watches the files of a session. An event only means "look again": the content of the files decides, whatever the
-//! order and kind of events. Folders are watched instead of files, because editors save by rename.
+//! Watches the files of a session. Events only mean "look again": the content of the files decides. Folders are
+//! watched, because editors save by rename.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,33 +19,29 @@ const QUIET: Duration = Duration::from_millis(20);
 /// Files are read after this time at the latest.
 const PATIENCE: Duration = Duration::from_millis(150);
 
-/// An error in a scene is reported once nothing has happened to the files for this time: the scene may be half
-/// written.
+/// A scene's error is reported after this time without a change: the scene may be half written.
 const DOUBT: Duration = Duration::from_millis(100);
 /// Maximum delay of an error while files keep changing.
 const DOUBTS: Duration = Duration::from_secs(1);
 
-/// Models, meshes and textures that are incomplete or large are read once they have not changed for this time: a
-/// program may be writing them, and reading them too early would delay reading the complete files.
+/// Incomplete or large models, meshes and textures are read after this time without a change: a program may be writing
+/// them.
 const GROWTH_QUIET: Duration = Duration::from_millis(300);
 /// They are read after this time at the latest.
 const GROWTH_PATIENCE: Duration = Duration::from_secs(10);
 /// Total size, in bytes, from which such files are large.
 const LARGE: u64 = 1 << 20;
 
-/// The changes of the scene file by this session, which the watcher need not read again.
+/// The scene file's changes by this session, which need not be read again.
 #[derive(Default)]
 pub struct Writes {
-    /// Number of changes.
     pub count: u64,
-    /// The scene after the last change, and the files that it is made of, until the watcher has taken them over.
+    /// The scene after the last change and its files, until the watcher has taken them over.
     pub known: Option<KnownScene>,
 }
 
-/// A scene, and the state of its files.
 pub type KnownScene = (Arc<Loaded>, Vec<(PathBuf, FileStamp)>);
 
-/// The reason to read the files again.
 enum Wake {
     /// The content of a file may have changed.
     Content,
@@ -74,8 +70,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Watches the files of `sources`, and reports [`Event::Reading`] and [`Event::Files`] until `report` returns
-    /// false. `first` is the known state.
+    /// Reports [`Event::Reading`] and [`Event::Files`] until `report` returns false. `first` is the known state.
     pub fn start(
         sources: Sources,
         first: Snapshot,
@@ -181,7 +176,7 @@ fn run(
                 again = Some((wake, noticed));
                 continue;
             }
-            // The scene may use other files now. Their states are known: a change since then is noticed.
+            // The scene may use other files; a change since their known states is noticed.
             folders.follow(sources, &new);
             last = new.clone();
             reads = false;
@@ -194,8 +189,7 @@ fn run(
     }
 }
 
-/// Waits until files have not changed for some time. Returns whether names may have changed, or `None` if the watch
-/// ends.
+/// Waits until files are unchanged for some time. Returns whether names may have changed; `None` if the watch ends.
 fn wait_settled(
     wakes: &Receiver<Wake>,
     mut known: Vec<FileStamp>,
@@ -222,14 +216,12 @@ fn wait_settled(
     }
 }
 
-/// The watched folders.
 struct Folders {
     watcher: RecommendedWatcher,
     watched: BTreeMap<PathBuf, RecursiveMode>,
 }
 
 impl Folders {
-    /// Updates the watched folders.
     fn follow(&mut self, sources: &Sources, snapshot: &Snapshot) {
         let wanted = wanted(sources, snapshot);
         self.watched.retain(|path, mode| {
@@ -258,8 +250,8 @@ impl Folders {
     }
 }
 
-/// Returns the folders to watch, by canonical path: the shaders' folder with everything below it, the folders of all
-/// files, and those of link targets. Nothing below the scene's folder is watched, because that may be a home folder.
+/// Returns the folders to watch, by canonical path: the shaders' with everything below it, and those of all files and
+/// link targets. The scene's folder may be a home folder: nothing below it is watched.
 fn wanted(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, RecursiveMode> {
     let files = snapshot
         .files

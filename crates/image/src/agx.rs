@@ -2,8 +2,8 @@
 //! Blender 4.0 and later, without a look.
 //!
 //! All constants and steps are from Z. Zhou, `AgX_LUT_Gen`: `AgXBaseRec2020.py`, whose matrices Blender's tables use,
-//! and `AgXBasesRGB.py`. The curve is by J. Smith (`sigmoid.py` there). Two simplifications: values are computed, not
-//! interpolated in a 57 x 57 x 57 table, and colors outside the display gamut are clipped, not moved into it.
+//! and `AgXBasesRGB.py`. The curve is by J. Smith (`sigmoid.py` there). Two simplifications: values are not
+//! interpolated in a 57 x 57 x 57 table, and colors outside the display gamut are clipped.
 
 use std::sync::LazyLock;
 
@@ -18,7 +18,7 @@ const TO_REC2020: [[f64; 3]; 3] = [
     [0.016_391_4, 0.088_013_3, 0.895_595_3],
 ];
 
-/// Moves the primaries inwards and rotates them, which avoids hue shifts of bright saturated colors.
+/// Moves the primaries inwards and rotates them, against hue shifts of bright saturated colors.
 const INSET: [[f64; 3]; 3] = [
     [0.856_627_153_315_983, 0.095_121_240_538_158_8, 0.048_251_606_145_858_3],
     [0.137_318_972_929_847, 0.761_241_990_602_591, 0.101_439_036_467_562],
@@ -44,7 +44,7 @@ const BEND: f64 = 1.5;
 /// Fraction of the hue shift of the curve that is kept.
 const HUE: f64 = 0.4;
 
-/// Returns linear display light for linear scene light >= 0. The result may be outside the display gamut.
+/// Returns linear display light, possibly out of gamut, for linear scene light >= 0.
 pub(super) fn agx(light: Rgb) -> Rgb {
     let light = *INWARDS * DVec3::from(light);
     let shown = light.map(|value| curve(place(value)).powf(POWER));
@@ -83,7 +83,6 @@ fn pivot() -> (f64, f64) {
 
 static GREY: LazyLock<f64> = LazyLock::new(|| MIDDLE.powf(1.0 / POWER));
 
-/// Asymptotic heights of the halves of the sigmoid, computed once.
 struct Halves {
     below: f64,
     above: f64,

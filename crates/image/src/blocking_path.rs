@@ -4,8 +4,8 @@ use std::fs::{self, FileType};
 use std::io;
 use std::path::Path;
 
-/// Rejects devices, and named pipes, which block until a writer opens them. Anonymous pipes are accepted: standard
-/// input and `<(...)` of a shell have a writer. A missing file is accepted; opening it reports the error.
+/// Rejects devices, and named pipes, which block until a writer opens them. Anonymous pipes (standard input, `<(...)`
+/// of a shell) have a writer, and missing files fail when opened: both are accepted.
 pub fn reject(path: &Path) -> io::Result<()> {
     let Ok(data) = fs::metadata(path) else { return Ok(()) };
     let refused = |rule| Err(io::Error::new(io::ErrorKind::InvalidInput, rule));

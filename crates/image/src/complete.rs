@@ -11,8 +11,7 @@ const PNG_END: &[u8] = b"\0\0\0\0IEND\xae\x42\x60\x82";
 /// The marker at the end of a JPEG file (ITU-T T.81, B.1.1.3).
 const JPEG_END: &[u8] = &[0xff, 0xd9];
 
-/// Returns true if a file is a PNG, JPEG, WebP or OpenEXR image that ends where its format says. Pixels are not
-/// decoded.
+/// Returns true if a file is a PNG, JPEG, WebP or OpenEXR image with the end of its format. Pixels are not decoded.
 pub fn is_complete(path: &Path) -> bool {
     let complete = || {
         let mut file = File::open(path).ok()?;
@@ -40,6 +39,5 @@ pub fn is_complete(path: &Path) -> bool {
             _ => None,
         }
     };
-    // The readers are made for valid files.
     catch_panic(complete).ok().flatten().unwrap_or(false)
 }

@@ -19,12 +19,11 @@ pub struct Pending {
     failure: Option<(io::ErrorKind, String)>,
 }
 
-/// Temporary storage of the bytes.
 #[derive(Debug)]
 enum Spool {
-    /// A temporary file in the folder of its target, the target, and the permissions of the file that it replaces.
+    /// A temporary file in the folder of its target, the target, and the replaced file's permissions.
     Beside(NamedTempFile, PathBuf, Option<Permissions>),
-    /// An anonymous file, which the operating system deletes with the process, and the pipe or device to copy it to.
+    /// An anonymous file, deleted with the process, and the pipe or device to copy it to.
     Nameless(File, File),
 }
 
@@ -179,7 +178,7 @@ impl Name {
         format!(".wgray-{process}@{}-", self.host)
     }
 
-    /// Returns true if this program created a file of this name on this machine for the same target.
+    /// Returns true for this program's files of this machine and target.
     fn fits(&self, file_name: &str) -> bool {
         let number = file_name.strip_prefix(".wgray-").and_then(|rest| rest.split_once('@'));
         let Some(Ok(process)) = number.map(|(number, _)| number.parse()) else {
@@ -194,8 +193,7 @@ impl Name {
 /// Length of the random part of a temporary name.
 const RANDOM: usize = 6;
 
-/// Creates a temporary file in the folder of its target. It is locked while it is open, so that other processes know
-/// that it is in use.
+/// Creates a temporary file in the folder of its target, locked while in use.
 ///
 /// # Errors
 ///
@@ -215,7 +213,7 @@ pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
     }
     loop {
         let file = builder.tempfile_in(folder)?;
-        // On a file system without locks, no other process can lock the file to delete it either.
+        // Without file locks, no other process can lock it to delete it either.
         let _ = file.as_file().lock();
         // Another process may have deleted it before it was locked.
         if file.path().exists() {

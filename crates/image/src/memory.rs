@@ -1,5 +1,5 @@
-//! Allocations that may fail. A program can end in an orderly way when memory runs out, as `wgray` does, if its global
-//! allocator knows which failures the caller handles: [`is_fallible`].
+//! Allocations that may fail. The global allocator can end the program in an orderly way, as in `wgray`, if it knows
+//! which failures the caller handles: [`is_fallible`].
 
 use std::cell::Cell;
 
@@ -7,7 +7,7 @@ thread_local! {
     static FALLIBLE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `allocate`, which returns an error if an allocation fails, as [`Vec::try_reserve`] does.
+/// Runs `allocate`, which returns allocation failures as errors, like [`Vec::try_reserve`].
 pub fn fallible<T>(allocate: impl FnOnce() -> T) -> T {
     struct Restore(bool);
     impl Drop for Restore {
@@ -19,7 +19,7 @@ pub fn fallible<T>(allocate: impl FnOnce() -> T) -> T {
     allocate()
 }
 
-/// Returns true if the caller of this thread's current allocation handles its failure.
+/// Returns true if failure of this thread's current allocation is handled.
 pub fn is_fallible() -> bool {
     FALLIBLE.try_with(Cell::get).unwrap_or(false)
 }
@@ -37,7 +37,7 @@ mod tests {
         assert!(!fallible(|| std::thread::spawn(is_fallible).join().unwrap()));
     }
 
-    /// A bare `try_reserve` ends the program where its error was meant to be returned.
+    /// A bare `try_reserve` would end the program.
     #[test]
     fn every_fallible_allocation_is_marked() {
         let workspace = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));

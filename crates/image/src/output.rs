@@ -28,7 +28,6 @@ pub(super) enum Destination {
         /// Handle, once it is open.
         file: Option<File>,
     },
-    /// A standard stream of the process.
     Standard(Stream),
 }
 
@@ -41,7 +40,7 @@ pub(super) enum Stream {
 /// Identity of a file, whatever its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Identity {
-    /// Device and inode, on Unix.
+    /// Device and inode.
     numbers: Option<(u64, u64)>,
     /// True for devices that several outputs can share, such as a terminal or `/dev/null`.
     is_character_device: bool,
@@ -97,8 +96,8 @@ impl Output {
         }
     }
 
-    /// Opens a pipe or a device now, not in [`Pending::start`](super::Pending::start). Opening a pipe blocks until it
-    /// has a reader.
+    /// Opens a pipe or a device now, not in [`Pending::start`](super::Pending::start). A pipe blocks until it has a
+    /// reader.
     ///
     /// # Errors
     ///
@@ -148,8 +147,8 @@ impl Output {
         }
     }
 
-    /// Returns true if both outputs are the same file, pipe or stream, under any names. Character devices can be shared
-    /// and are never the same.
+    /// Returns true if both outputs are the same file, pipe or stream, under any names; never for character devices,
+    /// which can be shared.
     pub fn is_same(&self, other: &Output) -> bool {
         let same_path = self.path().is_some() && self.path() == other.path();
         let same_stream = match (&self.place, &other.place) {
@@ -265,8 +264,8 @@ fn place(path: &Path) -> io::Result<Destination> {
     }
 }
 
-/// Returns the standard stream that a resolved path names, such as that of `/dev/stdout` and `/dev/fd/1`. Opening the
-/// path again would overwrite a file to which the shell appends.
+/// Returns the standard stream of a path such as `/dev/stdout` or `/dev/fd/1`. Opening it again would overwrite a file
+/// to which the shell appends.
 fn stream(path: &Path) -> Option<Stream> {
     let own = PathBuf::from(format!("/proc/{}/fd", std::process::id()));
     if path.parent() != Some(&own) {

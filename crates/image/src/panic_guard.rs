@@ -11,13 +11,13 @@ thread_local! {
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Returns true if a panic of this thread would be caught by [`catch_panic`]. Panic hooks can then stay silent, since
-/// the caller reports the error; [`install_quiet_hook`] installs such a hook.
+/// Returns true if [`catch_panic`] would catch a panic of this thread: hooks like [`install_quiet_hook`] can stay
+/// silent.
 pub fn is_contained() -> bool {
     DEPTH.try_with(Cell::get).is_ok_and(|depth| depth > 0)
 }
 
-/// Installs a panic hook that ignores caught panics and passes all others to the previous hook.
+/// Installs a panic hook that passes uncaught panics to the previous hook.
 pub fn install_quiet_hook() {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
@@ -31,7 +31,7 @@ pub fn install_quiet_hook() {
 ///
 /// # Errors
 ///
-/// The message of its panic. Values that the closure has modified may only be dropped after that.
+/// The message of its panic. Values that the closure modified may only be dropped then.
 pub fn catch_panic<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
     let _inside = Inside::enter();
     catch_unwind(AssertUnwindSafe(calls)).map_err(|panic| message(panic.as_ref()))
@@ -40,12 +40,12 @@ pub fn catch_panic<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-    // Joins the lines of the message: wgpu prints each cause on its own line.
+    // wgpu prints each cause on its own line.
     let lines = text.unwrap_or("it panicked").lines().map(str::trim);
     lines.filter(|line| !line.is_empty()).collect::<Vec<_>>().join(": ")
 }
 
-/// Marks the thread as inside of [`catch_panic`] while it exists.
+/// The thread is inside of [`catch_panic`].
 struct Inside;
 
 impl Inside {

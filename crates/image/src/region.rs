@@ -26,12 +26,12 @@ impl Region {
         }
     }
 
-    /// Returns the number of columns; 0 if the last is before the first.
+    /// Returns the number of columns, 0 if reversed.
     pub fn width(&self) -> u32 {
         self.x1.saturating_sub(self.x0)
     }
 
-    /// Returns the number of rows; 0 if the last is before the first.
+    /// Returns the number of rows, 0 if reversed.
     pub fn height(&self) -> u32 {
         self.y1.saturating_sub(self.y0)
     }

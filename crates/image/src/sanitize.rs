@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// Returns true for control characters and for direction marks (Unicode UAX 9).
+/// Returns true for controls and direction marks (Unicode UAX 9).
 fn acts(c: char) -> bool {
     let turns = ['\u{61c}', '\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'];
     c.is_control()
@@ -31,7 +31,6 @@ fn shown<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
     for c in text.chars() {
         match is_shown(c) {
             true => shown.push(c),
-            // Writing to a string cannot fail.
             false => drop(write!(shown, "{}", c.escape_default())),
         }
     }

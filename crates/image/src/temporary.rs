@@ -10,18 +10,16 @@ type Name = std::path::PathBuf;
 
 static NAMES: Mutex<Vec<Name>> = Mutex::new(Vec::new());
 
-/// Number of registered names from which names of deleted files are dropped.
+/// Number of names from which those of deleted files are dropped.
 const PRUNE_FROM: usize = 64;
 
-/// Adds the path of a temporary file.
 pub(super) fn register(path: &Path) {
     let Some(name) = name(path) else { return };
     let Ok(mut names) = NAMES.lock() else { return };
     if names.len() >= PRUNE_FROM {
         names.retain(exists);
     }
-    // `fallible`, because an allocation failure that ended the program here would hold the lock that
-    // `remove_temporary_files` needs.
+    // `fallible`: a failure that ended the program here would hold the lock of `remove_temporary_files`.
     if crate::memory::fallible(|| names.try_reserve(1)).is_ok() {
         names.push(name);
     }
@@ -90,7 +88,7 @@ mod tests {
         }
         let other = folder.path().join("other");
         std::fs::write(&other, "").unwrap();
-        // The files of other tests stay: only these names are removed.
+        // The files of other tests stay.
         let names = NAMES.lock().unwrap();
         names
             .iter()

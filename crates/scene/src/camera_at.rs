@@ -6,7 +6,7 @@ use crate::problem::{At as _, Problem};
 use crate::scene::{Camera, Scene};
 
 impl CameraPath {
-    /// Returns the validated camera at a frame. Keys of problems are relative to `camera`.
+    /// Keys of problems are relative to `camera`.
     pub(crate) fn at(&self, frame: f64) -> Result<Camera, Problem> {
         let camera = self.description(frame).validate_frame();
         camera.map_err(|problem| Problem::new(format!("at frame {frame}, {problem}")).at("path"))
@@ -19,8 +19,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// A camera without a valid view at this frame, for example because its path leads through its target point, and a
-    /// frame that is not finite.
+    /// A camera without a valid view, such as a path through its target point, and a frame that is not finite.
     pub fn camera_at(&self, frame: f64) -> Result<Camera, SceneError> {
         let Some(path) = &self.camera_path else {
             return Ok(self.camera);

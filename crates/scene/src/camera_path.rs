@@ -19,7 +19,6 @@ pub struct CameraPath {
     aperture: Vec<Key<f64>>,
     focus_distance: Vec<Key<f64>>,
     frames: (f64, f64),
-    /// Scene file and line.
     pub(crate) place: Option<(String, usize)>,
 }
 
@@ -47,7 +46,7 @@ impl CameraPath {
         })
     }
 
-    /// Returns the frames of the first and of the last key. The camera is constant before and after these.
+    /// Returns the frames of the first and last key. Outside, the camera is constant.
     pub fn frames(&self) -> (f64, f64) {
         self.frames
     }

@@ -88,8 +88,8 @@ fn one() -> f64 {
     1.0
 }
 
-/// Returns the default of the folder that must contain all files of a scene: the parent of the scene's folder, because
-/// the files are named `../assets/...`.
+/// Returns the default folder that must contain all files: the parent of the scene's, because they are named
+/// `../assets/...`.
 pub fn asset_root(folder: &Path) -> PathBuf {
     let folder = match folder.as_os_str().is_empty() {
         true => Path::new("."),
@@ -138,7 +138,6 @@ pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) 
     problems.into_error(|problem| begin(text, &problem.key), invalid)
 }
 
-/// Reason why a text cannot be read.
 enum ReadFault {
     Text(serde_json::Error, KeyPath),
     /// Invalid types or keys.
@@ -212,7 +211,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
     parse::read_for(table, Integrator::Path).map_err(|problems| ReadFault::Values(problems.map(in_json)))
 }
 
-/// Validates values whose errors must show the numbers of the file, which the conversion to +Z up changes.
+/// Validates values that the conversion to +Z up changes: errors show the file's numbers.
 fn check(course: &Course) -> Result<(), Problems> {
     let Course {
         cam_config,
@@ -221,8 +220,7 @@ fn check(course: &Course) -> Result<(), Problems> {
         objects,
         ..
     } = course;
-    // `validate_frame`, because a vertical view is only allowed for the default `up`, +Z, which is not the default of
-    // these files.
+    // `validate_frame`, because a vertical view is only allowed for the default `up`, +Z.
     let mut found = Collector::default();
     found.values(camera(cam_config).validate_frame().map_err(Problems::from).at("camera"));
     found.value(light(&self::rectangle(light_config).into()).at(0).at("lights"));
@@ -310,7 +308,7 @@ fn description(course: &Course) -> Description {
     scene
 }
 
-/// Returns the path in the file for a path in its description. Paths of the file are returned unchanged.
+/// Returns the path in the file for a path in its description.
 fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
     let renamed = |segment: &Segment| match segment {
         Segment::Key(key) => Segment::from(match key.as_str() {
@@ -388,7 +386,6 @@ fn find<'a>(text: &'a str, path: &KeyPath) -> Option<&'a str> {
     Some(value)
 }
 
-/// Returns the byte offset of a value.
 fn begin(text: &str, path: &KeyPath) -> usize {
     find(text, path).map_or(0, |value| value.as_ptr() as usize - text.as_ptr() as usize)
 }

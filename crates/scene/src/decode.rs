@@ -15,15 +15,14 @@ use super::texture::{Image, Texels};
 
 /// Maximum number of texels along a side.
 pub(super) const MAX_IMAGE_SIDE: u32 = 16_384;
-/// Memory limit of a decoder besides the image, in bytes: rows, tables and parts of a compressed file.
+/// Memory limit of a decoder besides the image, in bytes.
 const BESIDE: usize = 64 << 20;
 
-/// Limit of the decoded values in bytes, and its increase per byte of the file; decoders use as much again. A small
-/// file may be an image of 16,384 x 16,384 zeros.
+/// Limit of the decoded values in bytes, and its increase per byte of the file, which may be 16,384 x 16,384 zeros;
+/// decoders use as much again.
 const LARGEST: (u64, u64) = (256 << 20, 32);
 
-/// Limit in bytes of the texels that an EXR file displays but does not store; it increases with the file size like
-/// [`LARGEST`].
+/// Limit in bytes of the texels that an EXR file does not store; it increases with the file size like [`LARGEST`].
 const BLANK: u64 = 64 << 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +69,6 @@ impl Format {
     }
 }
 
-/// The values of a header that the limits depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub width: u32,
@@ -80,7 +78,6 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Returns the header of an image in memory.
     pub fn of(image: &Image) -> Header {
         Header {
             width: image.width,
@@ -90,7 +87,6 @@ impl Header {
     }
 }
 
-/// Reason for rejecting an image.
 pub(super) enum DecodeError {
     Image(ImageError),
     /// A violated rule of the caller.
@@ -148,7 +144,7 @@ pub(super) fn decode(
     if format == ImageFormat::Png {
         return decode_png(bytes, fits);
     }
-    // Texels stored by the layers of an EXR file. The display window may have fewer or more.
+    // Texels stored in an EXR file; the display window may differ.
     let stored = Cell::new(0);
     if format == ImageFormat::OpenExr
         && let Some(image) = gray_exr(
@@ -182,7 +178,7 @@ pub(super) fn decode(
     Ok(DynamicImage::from_decoder(decoder)?)
 }
 
-/// Rejects an image that is too large for the size of its file.
+/// Rejects an image too large for its file.
 fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Result<(), DecodeError> {
     let bytes = u64::from(width) * u64::from(height) * bytes_of_texel;
     let length = file.len() as u64;
@@ -195,7 +191,7 @@ fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Resul
     }
 }
 
-/// Rejects an EXR file with too many texels that are not stored and do not add to its size.
+/// Rejects an EXR file with too many texels that are not stored.
 fn weigh_blank(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), DecodeError> {
     let blank = (u64::from(width) * u64::from(height)).saturating_sub(stored);
     let (bytes, length) = (blank * 3 * size_of::<f32>() as u64, file.len() as u64);
@@ -229,8 +225,7 @@ fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Res
     file.decode().map_err(DecodeError::Damaged)
 }
 
-/// Uses the PNG crate directly: it can skip color profiles and texts, whose decompressed size is unknown before
-/// decoding.
+/// Uses the PNG crate directly, to skip color profiles and texts of unknown decompressed size.
 fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);

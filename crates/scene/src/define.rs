@@ -102,8 +102,7 @@ fn too_deep(text: &str) -> Problem {
     Problem::new(format!("{} must have at most {MAX_SEGMENTS} steps", cut(text)))
 }
 
-/// Parses the path at the start of a text. Returns it and the rest, which is empty or starts with `=`. `unreadable`
-/// makes the error.
+/// Parses the path at the start of a text. The rest is empty or starts with `=`. `unreadable` makes the error.
 fn read_key(text: &str, unreadable: fn(&str) -> Problem) -> Result<(KeyPath, &str), Problem> {
     let mut path = Vec::new();
     // The tokens that are valid next: a name, or a separator of names.
@@ -155,7 +154,7 @@ pub(super) fn index(text: &str) -> Option<usize> {
     text.parse().ok().filter(|_| digits)
 }
 
-/// Parses a TOML value, or a string without quotes. Text that starts like a list, table or quoted string must be one.
+/// Parses a TOML value or an unquoted string. Text that starts like a list, table or quoted string must be one.
 fn read_value(text: &str) -> Result<Value, String> {
     let text = text.trim();
     if text.is_empty() {

@@ -16,7 +16,7 @@ impl Problems {
     }
 }
 
-/// Overrides that are applied while a file is parsed. Their paths are kept to attribute errors to them.
+/// Overrides that are applied while a file is parsed; their paths attribute errors to them.
 pub(super) struct Defines<'a> {
     given: &'a [Define],
     /// Applied and failed ones.
@@ -27,7 +27,7 @@ struct Put {
     number: usize,
     /// The key, with indices for list elements.
     path: Vec<Segment>,
-    /// Length of the path of the outermost table or value that the override created or replaced.
+    /// Path length of the outermost table or value created or replaced.
     own: usize,
 }
 
@@ -40,7 +40,6 @@ impl<'a> Defines<'a> {
         Defines::new(self.given)
     }
 
-    /// Resets the state to read the file again.
     pub fn restart(&mut self) {
         self.put.clear();
     }
@@ -55,8 +54,7 @@ impl<'a> Defines<'a> {
         })
     }
 
-    /// Applies the overrides that belong to the table at this path; with an empty path, those for which `is_elsewhere`
-    /// is false.
+    /// Applies the overrides of the table at this path; with an empty path, those for which `is_elsewhere` is false.
     pub fn put(
         &mut self,
         at: &[Segment],
@@ -107,15 +105,15 @@ impl<'a> Defines<'a> {
     }
 }
 
-/// Returns true if the value at a path is a sample count, which is short for a table.
+/// Returns true for a sample count, short for a table.
 fn is_samples(path: &[Segment]) -> bool {
     let names = ["pixel_samples", "light_samples"];
     matches!(path, [Segment::Key(section), Segment::Key(key)] if section == "render" && names.contains(&key.as_str()))
 }
 
 /// Sets a value in a tree of tables and lists. Creates missing tables, except named textures, materials and meshes.
-/// Appends the path of the value, or of the failure, to `path`. Returns the length of the path of the outermost created
-/// table, or else of the value.
+/// Appends the path of the value or failure to `path`. Returns the path length of the outermost created table, else of
+/// the value.
 fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
     let mut own = None;
     let mut value = root;

@@ -42,8 +42,7 @@ impl Level {
     }
 }
 
-/// Returns an image at half its size in linear light. `row` maps the order of rows in the result to the order in the
-/// image.
+/// Returns an image at half its size in linear light. `row` maps rows of the result to rows of the image.
 pub fn half_of(image: &Image, row: impl Fn(usize) -> usize + Sync) -> Level {
     let (width, height) = (image.width as usize, image.height as usize);
     match &image.texels {
@@ -60,12 +59,12 @@ pub fn half_of(image: &Image, row: impl Fn(usize) -> usize + Sync) -> Level {
     }
 }
 
-/// Returns the next coarser level. Each of its texels is the area-weighted mean of the texels that it covers.
+/// Returns the next coarser level: area-weighted means of the covered texels.
 fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Sync) -> Level {
     let (new_width, new_height) = ((width / 2).max(1), (height / 2).max(1));
     let lines = (0..new_height).into_par_iter().with_min_len(16);
     let rows = if width.is_multiple_of(2) && height.is_multiple_of(2) {
-        // Even sizes: the sum of the general case below, in the same order, with constant weights.
+        // Even sizes: the sum below, in the same order, with constant weights.
         let color = |i: usize, j: usize| {
             let texel = |x: usize, y: usize| texel(2 * i + x, 2 * j + y) * 0.25;
             DVec3::ZERO + texel(0, 0) + texel(1, 0) + texel(0, 1) + texel(1, 1)
@@ -89,8 +88,7 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
     Level { width: new_width, rows }
 }
 
-/// Returns the texels among `from` that each of `to` texels of a row or column covers, with their weights. `to` is half
-/// of `from`, rounded down, but at least 1.
+/// Returns the texels among `from` that each of `to` (the half, rounded down, at least 1) covers, with their weights.
 fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     let size = from as f64 / to as f64;
     let cover = |i: usize| {
@@ -105,7 +103,7 @@ fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     (0..to).map(cover).collect()
 }
 
-/// Returns an image of half its width and height, each rounded down, but at least 1.
+/// Halves width and height, rounded down, at least 1.
 pub(super) fn halved(image: &Image) -> Image {
     let Level { width, rows } = half_of(image, |row| row);
     let height = rows.len();

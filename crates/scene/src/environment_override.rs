@@ -131,13 +131,13 @@ const COLOR_NAMES: [(&str, &str); 4] = [
     ("white", "#ffffff"),
 ];
 
-/// Returns the linear RGB of a name or hexadecimal digits, by the curve of sRGB, or of three linear numbers.
+/// Returns the linear RGB of a name or hexadecimal digits (by sRGB's curve), or of three linear numbers.
 fn color_of(text: &str) -> Option<DVec3> {
     let linear = |shown: DVec3| DVec3::from_array(shown.to_array().map(srgb_to_linear));
     display_of(text).map(linear).or_else(|| linear_of(text))
 }
 
-/// Returns the display values, 0 to 1, of a name or of hexadecimal digits: `#rrggbb` or `#rgb`, also without `#`.
+/// Returns the display values, 0 to 1, of a name, `#rrggbb` or `#rgb`, with or without `#`.
 fn display_of(text: &str) -> Option<DVec3> {
     let named = COLOR_NAMES.into_iter().find(|(name, _)| *name == text);
     let hex = named.map_or(text, |(_, hex)| hex);

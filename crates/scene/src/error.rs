@@ -12,7 +12,7 @@ use crate::problem::{ErrorPlace, MAX_PROBLEMS, Problem, Problems};
 #[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
-    // The field is not named `source`: its text is in the message, and must not be printed twice.
+    // Not named `source`: error chains would print its text twice.
     #[error("{}: cannot be read: {error}", path.display())]
     Read {
         /// The file.
@@ -42,7 +42,7 @@ pub enum SceneError {
         /// The problem.
         problem: Problem,
     },
-    /// Several values of the file are invalid, in the order of its lines. The message has one line for each.
+    /// Several values of the file are invalid, in its order, each with a line of the message.
     #[error("{}", self.lines())]
     Several {
         /// The first errors.
@@ -100,8 +100,7 @@ impl SceneError {
         }
     }
 
-    /// Returns the errors of several values one by one, or this error, and a message about those that are not among
-    /// them.
+    /// Returns the errors of several values, or this error, and a message about further ones.
     pub fn each(&self) -> (&[SceneError], Option<String>) {
         match self {
             SceneError::Several { errors, more: 0 } => (errors, None),
@@ -119,7 +118,7 @@ impl SceneError {
 }
 
 impl Problems {
-    /// Returns the error, with the problems in the order of their places in a text.
+    /// Returns the error, with problems in the order of the text.
     pub fn into_error(
         self,
         place: impl Fn(&Problem) -> usize,

@@ -28,7 +28,7 @@ impl Description {
         scene.map_err(|problems| problems.first)
     }
 
-    /// [`Description::validate_with`] with all problems. Lists the files of the scene even if it has problems.
+    /// [`Description::validate_with`] with all problems. Lists the files even then.
     pub(crate) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problems> {
         files.extend(self.files_beside(assets));
         let integrator = self.integrator();

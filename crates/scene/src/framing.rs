@@ -8,21 +8,18 @@ use super::PerspectiveDescription;
 
 /// Vertical field of view in degrees, except in wide images.
 const FOV: f64 = 35.0;
-/// Largest aspect whose horizontal field of view grows with the width: beyond it perspective would stretch the sides.
+/// Largest aspect whose horizontal field of view grows with the width: perspective stretches the sides.
 const WIDEST: f64 = 2.0;
-/// Fraction of the image, from the center to an edge, that the scene fills: margins of 5 % of the image remain.
+/// Fraction of the image that the scene fills, with margins of 5 %.
 const INSIDE: f64 = 0.9;
-/// Smallest distance from the camera to the nearest point, relative to the scene's extent: a long object is not seen
-/// from inside its end.
+/// Smallest distance from the camera to the nearest point, relative to the scene's extent, for long objects.
 const NEAREST: f64 = 0.1;
-/// Smallest and largest diagonal of the bounds of a framed scene: distances and coordinates then stay within their
-/// limits.
+/// Range of the diagonal of a framed scene's bounds, which keeps distances and coordinates within their limits.
 const EXTENTS: (f64, f64) = (1e-8, 4e8);
 /// Elevation in degrees from which on the vertical axis cannot be up in the image.
 const STEEPEST: f64 = 89.9;
 
-/// The side that a scene is seen from. Its front is towards -y and its top towards +z, as those of an upright glTF file
-/// are. Options use the names of [`View::name`].
+/// The side that a scene is seen from. Its front is towards -y and its top towards +z, as of upright glTF files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum View {
@@ -72,7 +69,7 @@ impl View {
         }
     }
 
-    /// Returns the direction from the scene to the camera, not normalized, and the direction that is up in the image.
+    /// Returns the directions to the camera, not normalized, and up in the image.
     fn direction(self) -> (DVec3, DVec3) {
         let from = |x: f64, y: f64, z: f64| (DVec3::new(x, y, z), DVec3::Z);
         match self {
@@ -99,12 +96,12 @@ pub struct Orbit {
 }
 
 impl Orbit {
-    /// Returns the direction from the scene to the camera, and the direction that is up in the image.
+    /// Returns the directions to the camera and up in the image.
     fn direction(self) -> (DVec3, DVec3) {
         let (sin, cos) = self.azimuth.to_radians().sin_cos();
         let (high, level) = self.elevation.to_radians().sin_cos();
         let towards = DVec3::new(sin * level, -cos * level, high);
-        // Seen from straight above or below, up is where the back of the scene is, or its front.
+        // From straight above or below, up is towards the scene's back or front.
         match self.elevation.abs() < STEEPEST {
             true => (towards, DVec3::Z),
             false => (towards, DVec3::new(-sin, cos, 0.0) * high.signum()),
@@ -165,7 +162,7 @@ impl Framing {
     }
 }
 
-/// Checks that the extent of a model is within the limits of the automatic camera. The error is the violated rule.
+/// Checks that a model's extent is within the limits of the automatic camera. The error is the violated rule.
 pub fn check_extent(points: impl Iterator<Item = DVec3>) -> Result<(), String> {
     let (low, top) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, top), p| {
         (low.min(p), top.max(p))
@@ -207,7 +204,7 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
         axis: framing.turns.then_some(up),
     };
     let reach = |n: DVec3| extent.reach(n, DVec3::ZERO).0;
-    // A point is in the image if right . (p - camera) <= w forward . (p - camera), and so on for the other sides.
+    // A point is in the image if right . (p - camera) <= w forward . (p - camera), and likewise at other sides.
     let (w, h) = (INSIDE * wide, INSIDE * high);
     let across = reach(right - w * forward) + reach(-right - w * forward);
     let along = reach(upwards - h * forward) + reach(-upwards - h * forward);
@@ -228,14 +225,14 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
     }
 }
 
-/// Maximum number of Newton steps of [`Extent::offset`], far above the number that any model needs.
+/// Maximum number of Newton steps of [`Extent::offset`], far more than needed.
 const MAX_STEPS: usize = 64;
 
 /// The extent of points relative to the center of their bounding box.
 struct Extent<'a, I> {
     points: &'a I,
     middle: DVec3,
-    /// Axis of rotation, if the points rotate. Each of them then stands for its whole circle.
+    /// Axis of rotation, if any: each point then stands for its whole circle.
     axis: Option<DVec3>,
 }
 
@@ -266,7 +263,7 @@ impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
 
     /// Returns the offset along `side` of a camera at distance `back` that makes both margins along `side` equal.
     ///
-    /// Let w be the tangent of half the angle that the points then fill. They touch both planes of that angle, so that
+    /// Let w be the tangent of half the angle that the points then fill. They touch both planes of that angle:
     /// `reach(side - w forward) + reach(-side - w forward) = 2 w back`. The left side minus the right is convex and
     /// decreasing in w, hence Newton's method from w = 0 converges to its root from below.
     fn offset(&self, side: DVec3, forward: DVec3, back: f64) -> f64 {

@@ -84,8 +84,7 @@ impl Parallelogram {
 }
 
 impl Geometry {
-    /// Returns the value of `type` in a scene file, which distinguishes spheres from ellipsoids and triangles from
-    /// tetrahedra.
+    /// Returns the value of `type` in a scene file; spheres differ from ellipsoids, triangles from tetrahedra.
     pub fn name(&self) -> &'static str {
         match self {
             Geometry::Rectangle(_) => "rectangle",
@@ -134,8 +133,8 @@ impl Geometry {
         }
     }
 
-    /// Calls `point` with points whose projections onto a unit vector bound those of the geometry. A plane has one such
-    /// point; for a mesh they are the corners of its bounding box.
+    /// Calls `point` with points whose projections onto a unit vector bound those of the geometry: one for a plane; for
+    /// a mesh, the corners of its bounding box.
     pub fn each_extreme(&self, direction: DVec3, mut point: impl FnMut(DVec3)) {
         let mut between = |center: DVec3, half: f64| {
             point(center + direction * half);
@@ -167,7 +166,6 @@ fn is_sphere(axes: &[DVec3; 3]) -> bool {
     *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }
 
-/// Returns the union of two bounding boxes.
 pub(crate) fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Bounds {
     (low.min(other_low), high.max(other_high))
 }
@@ -176,7 +174,7 @@ fn around(center: DVec3, reach: DVec3) -> Option<Bounds> {
     Some((center - reach, center + reach))
 }
 
-/// Returns the half extents of a disk or an ellipsoid: per coordinate axis, the norm of its semi-axes' components.
+/// Returns the half extents of a disk or ellipsoid: per coordinate axis, the norm of the semi-axes' components.
 fn root_of_squares(axes: &[DVec3]) -> DVec3 {
     axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt)
 }

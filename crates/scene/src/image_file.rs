@@ -42,7 +42,7 @@ pub struct Assets {
     pub(super) absent: BTreeMap<String, String>,
     /// Meshes in memory by name.
     pub meshes: BTreeMap<String, Arc<Mesh>>,
-    /// If true, damage to a file is an error; otherwise it is a warning and a placeholder is rendered.
+    /// Damage to a file is an error, instead of a warning and a placeholder.
     pub strict: bool,
 }
 
@@ -50,9 +50,7 @@ pub struct Assets {
 pub(super) enum AssetKey {
     /// A canonical path.
     File(PathBuf),
-    /// An image of [`Assets::images`].
     Memory(String),
-    /// A file of [`Assets::encoded`].
     Encoded(String),
 }
 
@@ -95,8 +93,8 @@ impl Assets {
         }
     }
 
-    /// Returns an image in memory. `encoding`, if given, must be that of the image; `fits` checks the header first. The
-    /// error is the value with the violated rule.
+    /// Returns an image in memory, of this `encoding` if given; `fits` checks the header first. The error is the value
+    /// with the violated rule.
     fn image_in_memory(
         &self,
         name: &str,
@@ -138,8 +136,7 @@ impl Assets {
         })
     }
 
-    /// Reads an image; `fits` checks the header before anything is decoded. The error is the value with the violated
-    /// rule.
+    /// Reads an image; `fits` checks the header first. The error is the value with the violated rule.
     pub(super) fn image(
         &self,
         file: &str,
@@ -221,7 +218,7 @@ impl Assets {
         })
     }
 
-    /// Returns a file's name for messages: relative to the current folder if it was given on the command line.
+    /// Returns a file's name for messages: relative to the current folder if from the command line.
     fn shown<'f>(&self, file: &'f str) -> &'f str {
         let is_given = self.elsewhere.contains(Path::new(file));
         let here = std::env::current_dir().ok().filter(|_| is_given);
@@ -229,7 +226,6 @@ impl Assets {
         inside.unwrap_or(file)
     }
 
-    /// Returns the location of an image.
     pub(super) fn find(&self, file: &str) -> Result<AssetKey, Problem> {
         if let Some(why) = self.absent.get(file) {
             return Err(Problem::damage(why));
@@ -350,7 +346,6 @@ impl Part {
 }
 
 impl File {
-    /// Returns true if this is the given part of the file.
     pub fn is(&self, part: Part) -> bool {
         self.is_alpha == (part == Part::Alpha) && part.encoding().unwrap_or(self.default) == self.encoding
     }
@@ -374,7 +369,7 @@ fn check_name(file: &str, format: Format) -> Result<(), String> {
 fn read(file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
     let mut bytes = Vec::new();
     let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20));
-    // Most large files are rejected without reading them.
+    // Rejects most large files unread.
     if fs::metadata(path).is_ok_and(|data| data.len() > MAX_FILE_BYTES) {
         return Err(too_large());
     }

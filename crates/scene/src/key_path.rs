@@ -5,12 +5,12 @@ use std::fmt::{self, Write as _};
 
 /// Maximum length of a value or key in a message, in characters.
 const MAX_VALUE_LEN: usize = 60;
-/// Returns a value or key for a message: only its start and end if it is long.
+/// Returns a value or key for a message, elided if long.
 pub fn cut(text: &str) -> Cow<'_, str> {
     cut_to(MAX_VALUE_LEN, text)
 }
 
-/// Removes the middle of a text that is longer than this number of characters.
+/// Removes the middle of a text longer than this many characters.
 pub fn cut_to(longest: usize, text: &str) -> Cow<'_, str> {
     let count = text.chars().count();
     if count <= longest {

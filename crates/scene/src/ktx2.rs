@@ -24,8 +24,7 @@ const NONE: u32 = 0;
 const BASIS_LZ: u32 = 1;
 const ZSTANDARD: u32 = 2;
 
-/// The color models and channels of the data format descriptor (Khronos Data Format Specification 1.3, sections 5.6.9
-/// and 5.6.10).
+/// Color models and channels (Khronos Data Format Specification 1.3, sections 5.6.9 and 5.6.10).
 const ETC1S: u8 = 163;
 const UASTC: u8 = 166;
 const RGB: u8 = 0;
@@ -40,11 +39,9 @@ pub(crate) struct Ktx2<'a> {
     pub width: u32,
     /// Height of the largest level.
     pub height: u32,
-    /// Set if texels have alpha.
     pub has_alpha: bool,
     supercompression: u32,
     descriptor: Range<usize>,
-    /// The largest level.
     level: Range<usize>,
     /// Length of the largest level after Zstandard decompression.
     inflated: usize,
@@ -80,7 +77,7 @@ pub(crate) fn has_alpha(bytes: &[u8]) -> Option<bool> {
 }
 
 impl<'a> Ktx2<'a> {
-    /// Checks the header. The error is the rule that it violates, to be printed after the file's name.
+    /// Checks the header. The error is the violated rule, to follow the file's name.
     pub fn parse(bytes: &'a [u8]) -> Result<Ktx2<'a>, String> {
         let [format, _, width, height, depth, layers, faces, levels, supercompression] = {
             let mut fields = [0; 9];
@@ -146,8 +143,7 @@ impl<'a> Ktx2<'a> {
         })
     }
 
-    /// Decodes the largest level, to 8 bits per channel. The error is what is wrong, to be printed after the file's
-    /// name.
+    /// Decodes the largest level, to 8 bits per channel. The error is to follow the file's name.
     pub fn decode(&self) -> Result<DynamicImage, String> {
         let inflated;
         let bytes = match self.supercompression {
@@ -172,8 +168,8 @@ impl<'a> Ktx2<'a> {
         })
     }
 
-    /// Returns the file with its largest level alone, decompressed. The decoder of the crate `basisu` is not used for
-    /// Zstandard: version 0.1.0 depends on ruzstd 0.7, which does not limit the length of a block.
+    /// Returns the file with its largest level alone, decompressed. Not by the crate `basisu`: its version 0.1.0
+    /// depends on ruzstd 0.7, which does not limit the length of a block.
     fn inflated(&self) -> Result<Vec<u8>, String> {
         let error = |error: &dyn std::fmt::Display| format!("its Zstandard data cannot be decompressed: {error}");
         let window = (self.inflated as u64).next_power_of_two().max(WINDOW);

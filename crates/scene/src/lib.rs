@@ -1,8 +1,7 @@
 //! Scene files, mesh files and glTF files, loaded as validated scenes.
 //!
-//! Text is parsed into a [`Description`], which has the contents of the file field by field. [`Description::validate`]
-//! returns a [`Scene`], in which every name is resolved and every value is in range. Code that uses a `Scene` does not
-//! validate again.
+//! Text is parsed into a [`Description`], field by field. [`Description::validate`] returns a [`Scene`] with resolved
+//! names and values in range, which its users do not validate again.
 
 mod camera_at;
 mod camera_path;

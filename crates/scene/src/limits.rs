@@ -1,34 +1,30 @@
 //! Ranges of the values of scene files, for validation (`validate`) and the JSON Schema (`schema`).
 
-/// Coordinates.
 pub(super) const COORDINATES: (f64, f64) = (-FARTHEST, FARTHEST);
 /// Maximum absolute coordinate.
 pub(super) const FARTHEST: f64 = 1e9;
-/// Lengths.
 pub(super) const LENGTHS: (f64, f64) = (1e-9, 1e9);
 /// Components of colors.
 pub(super) const COLORS: (f64, f64) = (0.0, BRIGHTEST);
 /// Maximum component of a color.
 pub(super) const BRIGHTEST: f64 = 1e6;
-/// Fractions.
 pub(super) const SHARES: (f64, f64) = (0.0, 1.0);
 /// Rotation angles in degrees.
 pub(super) const TURNS: (f64, f64) = (-360.0, 360.0);
 
-/// Maximum number of pixels along a side of the image, and of samples.
+/// Maximum pixels along a side of the image, and maximum samples.
 pub(super) const MOST: u32 = 65_536;
-/// Minimum number of samples from which adaptive sampling can estimate an error.
+/// Minimum samples for an error estimate.
 pub(super) const MIN_ADAPTIVE_SAMPLES: u32 = 2;
 /// Maximum number of bounces of a path.
 pub(super) const DEEPEST: u32 = 1024;
 /// Maximum contributions of a sample.
 pub(super) const CLAMPS: (f64, f64) = (1e-6, 1e6);
-/// Minimum offsets of ray origins above a surface, relative to the largest coordinate there.
+/// Offsets of ray origins above a surface, relative to the largest coordinate there.
 pub(super) const SHADOW_EPSILONS: (f64, f64) = (0.0, 0.1);
 /// Filter radii in pixels.
 pub(super) const FILTER_RADII: (f64, f64) = (0.01, 16.0);
 
-/// Frames of keys.
 pub(super) const FRAMES: (f64, f64) = (-1e9, 1e9);
 /// Vertical fields of view in degrees.
 pub(super) const FOVS: (f64, f64) = (0.001, 179.999);
@@ -39,7 +35,6 @@ pub(super) const F_NUMBERS: (f64, f64) = (0.1, 1e9);
 /// Corners of lenses that are not round.
 pub(super) const BLADES: (u32, u32) = (3, 16);
 
-/// Phong exponents.
 pub(super) const SHININESS: (f64, f64) = (1e-6, 1e6);
 /// Indices of refraction, relative to the medium in front of a surface.
 pub(super) const IORS: (f64, f64) = (0.01, DENSEST);
@@ -54,12 +49,10 @@ const DENSEST: f64 = 100.0;
 pub(super) const ABSORPTIONS: (f64, f64) = (0.0, 1e6);
 /// Thicknesses of volumes; 0 is a thin sheet.
 pub(super) const THICKNESSES: (f64, f64) = (0.0, 1e9);
-/// Attenuation distances.
 pub(super) const ATTENUATION_DISTANCES: (f64, f64) = (1e-6, 1e9);
 
 /// Absolute scale factors.
 pub(super) const SCALES: (f64, f64) = (1e-6, 1e6);
-/// Offsets of texture coordinates.
 pub(super) const OFFSETS: (f64, f64) = (-1e6, 1e6);
 /// Line widths, both ends excluded.
 pub(super) const LINE_WIDTHS: (f64, f64) = (0.0, 1.0);
@@ -67,18 +60,15 @@ pub(super) const LINE_WIDTHS: (f64, f64) = (0.0, 1.0);
 pub(super) const ANISOTROPIES: (f64, f64) = (1.0, 64.0);
 /// Factors of an image's values.
 pub(super) const FACTORS: (f64, f64) = (0.0, 1e6);
-/// Maximum number of sets of texture coordinates of a mesh.
 pub(super) const UV_SETS: u32 = 8;
 /// Factors of the slopes of normal maps.
 pub(super) const STRENGTHS: (f64, f64) = (-100.0, 100.0);
 
 /// Angles between axis and edge of a cone, in degrees.
 pub(super) const CONES: (f64, f64) = (0.01, 180.0);
-/// Factors of the environment's radiance.
 pub(super) const ENVIRONMENT_SCALES: (f64, f64) = (0.0, 1e6);
 /// Elevations of the sun in degrees.
 pub(super) const ELEVATIONS: (f64, f64) = (0.0, 90.0);
-/// Turbidities of the sky.
 pub(super) const TURBIDITIES: (f64, f64) = (1.0, 10.0);
 /// Times of animations in seconds.
 pub(crate) const TIMES: (f64, f64) = (0.0, 1e9);

@@ -46,7 +46,7 @@ pub enum Reflection {
         /// Factor of the transmitted light, on entry and on exit.
         tint: Color,
     },
-    /// A diffuse surface; this and all following only for [`Integrator::Path`](crate::Integrator::Path).
+    /// A diffuse surface; this and the following only for [`Integrator::Path`](crate::Integrator::Path).
     Diffuse {
         /// Albedo, 0 to 1.
         color: Color,
@@ -93,8 +93,8 @@ pub struct Principled {
     pub anisotropy: Value,
     /// Rotation of the tangent, counter-clockwise in radians.
     pub anisotropy_rotation: f64,
-    /// Index of the image of the tangent before that rotation: red and green, 0 to 1 for -1 to 1, are its components
-    /// along u and v.
+    /// Index of the image of the unrotated tangent: red and green, 0 to 1 for -1 to 1, are its components along u and
+    /// v.
     pub anisotropy_direction: Option<usize>,
     /// Index of refraction of the dielectric, 1 to 100.
     pub ior: f64,
@@ -170,8 +170,7 @@ impl Material {
         colors.chain(values).chain(maps).chain(direction).collect()
     }
 
-    /// Returns true if the material needs a tangent other than that of its normal map: for anisotropy, or a clear
-    /// coat's normals.
+    /// Returns true if anisotropy or a clear coat's normals need a tangent besides that of the normal map.
     pub fn has_direction(&self) -> bool {
         match &self.reflection {
             Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,

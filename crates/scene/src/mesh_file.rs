@@ -37,7 +37,7 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
     if let Some(mesh) = known(&key) {
         return Ok(mesh);
     }
-    // Not under the lock: reading uses all threads, one of which may be here for another scene.
+    // Not under the lock: threads of the reader may be here for another scene.
     let read = Arc::new(Mesh::load(path, normals)?);
     let libraries = libraries(&read);
     if let Some(mesh) = known(&key) {
@@ -99,7 +99,6 @@ mod tests {
         let smooth = load(&path, Some(Normals::Smooth)).unwrap();
         assert_eq!((smooth.normals.len(), flat.normals.len()), (3, 0));
         assert!(Arc::ptr_eq(&first, &load(&path, None).unwrap()));
-        // A copy is another mesh.
         let copy = folder.path().join("b.obj");
         fs::copy(&path, &copy).unwrap();
         assert!(!Arc::ptr_eq(&first, &load(&copy, None).unwrap()));
@@ -152,7 +151,7 @@ mod tests {
         let third = load(&path, None).unwrap();
         assert_eq!(third.positions[3].z, 5.0);
         assert_eq!(second.positions[3].z, 1.0);
-        // A missing or invalid file is an error even if in use.
+        // An error even if in use.
         fs::write(&path, "v 0 0 0\n").unwrap();
         assert!(load(&path, None).is_err());
         fs::remove_file(&path).unwrap();

@@ -43,21 +43,18 @@ impl fmt::Display for Note {
     }
 }
 
-/// Compares the displayed text.
 impl PartialEq<str> for Note {
     fn eq(&self, other: &str) -> bool {
         self.to_string().as_str() == other
     }
 }
 
-/// Compares the displayed text.
 impl PartialEq<&str> for Note {
     fn eq(&self, other: &&str) -> bool {
         self == *other
     }
 }
 
-/// Compares the displayed text.
 impl PartialEq<String> for Note {
     fn eq(&self, other: &String) -> bool {
         self == other.as_str()

@@ -13,17 +13,15 @@ use super::{
 
 /// The fields of view that the automatic camera may have, in degrees.
 const FOVS: (f64, f64) = (1.0, 170.0);
-/// The name of the material of the ground.
 const GROUND: &str = "ground";
 /// The share of light that the ground reflects.
 const GRAY: [f64; 3] = [0.5; 3];
-/// The radius of the ground, relative to the diagonal of the model's bounds: the shadows of low lights stay on it.
+/// The radius of the ground, relative to the diagonal of the model's bounds; holds the shadows of low lights.
 const RADIUS: f64 = 5.0;
-/// The gap between the model and the ground, relative to that diagonal. Without it, a face at the bottom would coincide
-/// with the ground.
+/// The gap above the ground, relative to that diagonal: no face coincides with it.
 const GAP: f64 = 1e-4;
 
-/// Options for a model file that is rendered without a scene.
+/// Options for a model file without a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Presentation {
     /// The vertical field of view of the automatic camera, from 1 to 170 degrees.
@@ -50,7 +48,6 @@ impl Presentation {
         self.fov.map(|_| "fov").or(self.up.map(|_| "up"))
     }
 
-    /// Returns the framing of a model.
     pub(super) fn framing(&self, view: Option<View>, aspect: f64) -> Result<Framing, Problem> {
         if let Some(fov) = self.fov
             && !(FOVS.0..=FOVS.1).contains(&fov)
@@ -102,13 +99,12 @@ impl Presentation {
 }
 
 impl Scene {
-    /// Returns the index of the ground of a model.
     fn ground(&self) -> Option<usize> {
         let is_ground = |material: usize| self.material_names.get(material).is_some_and(|name| name == GROUND);
         self.shapes.iter().position(|shape| is_ground(shape.material))
     }
 
-    /// Copies the ground from another frame of the same model, so that it stands still while the model moves.
+    /// Copies the ground from another frame, so that it stands still while the model moves.
     pub fn keep_ground(&mut self, before: &Scene) {
         if let (Some(now), Some(then)) = (self.ground(), before.ground()) {
             self.shapes[now].geometry = before.shapes[then].geometry.clone();
@@ -125,8 +121,8 @@ pub struct UpAxis {
 }
 
 impl UpAxis {
-    /// Returns the rotation that maps this axis to +z, where `to_scene` maps directions of the file to those of the
-    /// scene; `None` if it is +z already. If it is -z, the model is rotated about the axis from its front to its back.
+    /// Returns the rotation of this axis to +z, unless it is +z; `to_scene` maps directions of the file to the scene.
+    /// -z is rotated about the axis from front to back.
     pub(super) fn rotation(self, to_scene: impl Fn(DVec3) -> DVec3) -> Option<(Rotation, DMat3)> {
         let sign = if self.is_negative { -1.0 } else { 1.0 };
         let up = to_scene(DVec3::AXES[self.axis] * sign);

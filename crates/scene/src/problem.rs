@@ -29,8 +29,7 @@ pub struct Problem {
     pub key: KeyPath,
     /// The value and the rule.
     pub message: String,
-    /// True if it is damage to a file that the scene names, for which a stand-in exists
-    /// ([`Assets::strict`](super::Assets::strict)).
+    /// True for damage to a file of the scene that has a stand-in ([`Assets::strict`](super::Assets::strict)).
     pub(crate) is_damage: bool,
     /// True if the key is unknown.
     pub is_unknown_key: bool,
@@ -83,8 +82,7 @@ impl Problem {
     }
 }
 
-/// Maximum number of problems that are reported. Of each section that many are kept, because the order of the sections
-/// in the file is unknown until all are checked.
+/// Maximum number of reported problems, also per section, as the order of sections in the file is unknown.
 pub(crate) const MAX_PROBLEMS: usize = 20;
 
 /// The problems of a description: at least one.
@@ -92,7 +90,6 @@ pub(crate) const MAX_PROBLEMS: usize = 20;
 pub struct Problems {
     pub first: Problem,
     pub(crate) others: Vec<Problem>,
-    /// The number of further problems.
     pub(crate) more: usize,
 }
 
@@ -132,7 +129,6 @@ impl Problems {
         }
     }
 
-    /// Adds all problems of another section.
     fn extend(&mut self, section: Problems) {
         self.others.push(section.first);
         self.others.extend(section.others);
@@ -179,7 +175,7 @@ impl Collector {
         checked.map_err(add).ok()
     }
 
-    /// Returns a value, or a default that is not used, because [`Collector::end`] returns the problem.
+    /// Returns a value, or an unused default: [`Collector::end`] returns the problem.
     pub fn or_default<T: Default>(&mut self, checked: Result<T, Problem>) -> T {
         self.value(checked).unwrap_or_default()
     }
@@ -218,8 +214,7 @@ impl fmt::Display for Problem {
 
 impl std::error::Error for Problem {}
 
-/// Adds the location of a problem while it is returned, so that no path is built without one:
-/// `check(x).at("center").at(2).at("shapes")?`.
+/// Adds the location of a problem while it is returned: `check(x).at("center").at(2).at("shapes")?`.
 pub(crate) trait At {
     /// Prepends a segment to the path of the problem.
     fn at(self, segment: impl Into<Segment>) -> Self;

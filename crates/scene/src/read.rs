@@ -8,8 +8,7 @@ use crate::parse::is_course;
 use crate::{Description, course};
 
 impl Description {
-    /// Parses a scene file without validating its values. `origin` is the name of the file in messages; if it ends in `.json`, the text is
-    /// JSON.
+    /// Parses a scene file without validating its values. `origin` is the file's name in messages; `.json` means JSON.
     ///
     /// # Errors
     ///
@@ -18,7 +17,6 @@ impl Description {
         Description::parse_with(text, origin, &mut Defines::new(&[]))
     }
 
-    /// Parses a scene file with the defined values.
     pub(crate) fn parse_with(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
         match is_course(Path::new(origin)) {
             true => course::read(text, origin, defines),

@@ -16,8 +16,7 @@ use wgray_image::ViewSettings;
 
 /// A validated scene. Lengths have no unit, colors are linear RGB, and angles are in radians.
 ///
-/// The fields are meant to be read: an edited scene is not validated again, and rendering it may panic. Edit and
-/// validate the [`Description`](crate::Description) instead.
+/// Rendering an edited scene may panic: edit and validate the [`Description`](crate::Description) instead.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Scene {
@@ -33,9 +32,9 @@ pub struct Scene {
     pub camera_path: Option<CameraPath>,
     /// Render settings.
     pub render: Render,
-    /// Textures, which materials refer to by index: those of the scene file by name, then those of MTL files.
+    /// Textures, to which materials refer by index: of the scene file by name, then of MTL files.
     pub textures: Vec<Texture>,
-    /// Materials, which shapes refer to by index: those of the scene file by name, then those of MTL files.
+    /// Materials, to which shapes refer by index: of the scene file by name, then of MTL files.
     pub materials: Vec<Material>,
     /// Names of the materials.
     pub material_names: Vec<String>,
@@ -120,17 +119,17 @@ pub struct Render {
     pub shadow_epsilon: f64,
     /// Shadows of glass; [`Shadows::Opaque`] under [`Integrator::Path`].
     pub shadows: Shadows,
-    /// Maximum number of bounces of a path: under [`Integrator::Phong`], by mirrors and glass, 1 to 64; under
+    /// Maximum number of bounces: under [`Integrator::Phong`], by mirrors and glass, 1 to 64; under
     /// [`Integrator::Path`], all, 0 to 1024: 0 is emission only, 1 adds direct light.
     pub max_depth: u32,
     /// First bounce with Russian roulette, 0 to 1024; only for [`Integrator::Path`].
     pub rr_depth: u32,
-    /// Maximum component of a sample's indirect light (two bounces or more), greater than 0, to 1e6; only for
+    /// Maximum component of a sample's indirect light (two bounces or more), in (0, 1e6]; only for
     /// [`Integrator::Path`].
     pub clamp: Option<f64>,
     /// Transparent background; only for [`Integrator::Path`].
     pub alpha: bool,
-    /// If true, textures are filtered over the footprint of each ray; otherwise they are sampled at a point.
+    /// Filter textures over the footprint of each ray, instead of sampling them at a point.
     pub ray_differentials: bool,
     /// Seed of all random patterns.
     pub seed: u32,
@@ -188,8 +187,8 @@ pub struct Environment {
     pub background: Option<DVec3>,
 }
 
-/// An equirectangular environment map. Without rotation its center is towards +x, its left and right edges towards -x,
-/// and its upper edge towards +z.
+/// An equirectangular environment map. Unrotated, its center is towards +x, its left and right edges towards -x, its
+/// upper edge towards +z.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct EnvironmentImage {
@@ -204,8 +203,8 @@ pub struct EnvironmentImage {
 /// A light source.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
-    /// An area light. Under [`Integrator::Phong`] it emits from both sides, casts no shadow, and the camera sees its
-    /// plain color. Under [`Integrator::Path`] it emits from the side of its normal, u x v, and occludes.
+    /// An area light. Under [`Integrator::Phong`] it emits from both sides, casts no shadow, and shows its plain color.
+    /// Under [`Integrator::Path`] it emits along its normal, u x v, and occludes.
     Rectangle {
         /// Position and size.
         rectangle: Parallelogram,
@@ -237,7 +236,7 @@ pub enum Light {
         direction: DVec3,
         /// Color on the axis, like that of a point light.
         color: DVec3,
-        /// Angle between axis and edge of the cone in radians, greater than 0, to pi.
+        /// Angle between axis and edge of the cone in radians, in (0, pi].
         cone: f64,
         /// Angle from the axis where the falloff starts, 0 to `cone`.
         inner: f64,
@@ -245,7 +244,7 @@ pub enum Light {
 }
 
 impl Scene {
-    /// Returns the bounding box of all shapes except planes, or `None` if there are only planes.
+    /// Returns the bounding box of all shapes except planes, if any.
     pub fn bounds(&self) -> Option<Bounds> {
         let all = self.shapes.iter().filter_map(|shape| shape.geometry.bounds());
         all.reduce(join)

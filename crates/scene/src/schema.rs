@@ -15,7 +15,7 @@ use super::{CameraDescription, Description};
 /// Returns a JSON Schema (draft 2020-12) of scene files in TOML, for completion and validation in editors.
 ///
 /// All files that it rejects are invalid. It omits rules for several values together, such as a camera that looks at
-/// its own position, and for the targets of names.
+/// itself, and for targets of names.
 pub fn schema() -> String {
     let mut schema = of_files();
     without_kinds(&mut schema);
@@ -24,7 +24,6 @@ pub fn schema() -> String {
     format!("{schema:#}\n")
 }
 
-/// Returns the schema, with the kinds of values as titles.
 fn of_files() -> Value {
     // Inlined, because editors ignore descriptions next to a reference.
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
@@ -74,8 +73,7 @@ fn of_camera(schema: &mut Value) {
     }
 }
 
-/// Adds kinds, ranges and defaults to all descriptions, and removes features of JSON that TOML lacks and formats of
-/// Rust.
+/// Adds kinds, ranges and defaults to all descriptions, and removes what TOML lacks and formats of Rust.
 fn finish(schema: &mut Value) {
     match schema {
         Value::Array(all) => all.iter_mut().for_each(finish),
@@ -133,7 +131,7 @@ fn without_null(schema: &mut Value) {
     }
 }
 
-/// Converts names with a description each to a list, which all editors support.
+/// Converts described names to a list, which all editors support.
 fn names(schema: &mut Value) {
     let Some(all) = schema.as_object_mut() else { return };
     let Some(Value::Array(list)) = all.get("oneOf") else {
@@ -183,11 +181,10 @@ fn append_kind(schema: &mut Value) {
 /// Maximum number of keys of a table that is shown as a default.
 const MAX_SHOWN_KEYS: usize = 3;
 
-/// Appends the default to a description.
 fn append_default(property: &mut Value) {
     let Some(all) = property.as_object_mut() else { return };
     match (all.get("default"), all.get("description")) {
-        // A section, whose keys have their own defaults.
+        // The keys of a section have their own defaults.
         (Some(Value::Object(table)), _) if table.is_empty() || table.len() > MAX_SHOWN_KEYS => {
             all.remove("default");
         }
@@ -202,7 +199,6 @@ fn append_default(property: &mut Value) {
     }
 }
 
-/// Formats a value as in a scene file.
 fn toml_of(value: &Value) -> String {
     match value {
         Value::Object(table) => {

@@ -24,10 +24,9 @@ const SUN_RADIUS: f64 = 0.2666 * PI / 180.0;
 /// Single-scattering albedo of haze, and its asymmetry g (Henyey-Greenstein).
 const HAZE_ALBEDO: f64 = 0.9;
 const HAZE_FORWARD: f64 = 0.75;
-/// Fractions of scattered light that come down: of molecules, and of haze, which scatters mostly forwards.
+/// Fractions of scattered light that come down from molecules, and from haze, which scatters forwards.
 const MOLECULES_DOWN: f64 = 0.5;
 const HAZE_DOWN: f64 = 0.8;
-/// Albedo of the ground.
 const GROUND: f64 = 0.25;
 /// Sample points along each side of a texel, for the part that the sun covers.
 const POINTS: usize = 8;
@@ -43,7 +42,6 @@ pub struct Sky {
     pub turbidity: f64,
 }
 
-/// Returns the environment map of a sky.
 pub fn sky(sky: &Sky) -> Image {
     let air = Air::of(sky);
     let mut texels = Vec::with_capacity(WIDTH * HEIGHT);
@@ -86,7 +84,6 @@ pub fn sky(sky: &Sky) -> Image {
     }
 }
 
-/// Angle between rows.
 const ROW: f64 = PI / HEIGHT as f64;
 
 /// Returns the azimuth of a column, from the left edge.
@@ -94,9 +91,7 @@ fn azimuth(column: f64) -> f64 {
     PI - column * TAU / WIDTH as f64
 }
 
-/// Properties of the atmosphere.
 struct Air {
-    /// Direction to the sun.
     sun: DVec3,
     /// Air mass towards the sun, relative to the zenith.
     sun_mass: f64,
@@ -108,7 +103,6 @@ struct Air {
     haze: DVec3,
 }
 
-/// A row of the environment map.
 struct Row {
     /// Sine of the zenith angle.
     sine: f64,
@@ -152,8 +146,8 @@ impl Air {
         }
     }
 
-    /// Returns the radiance of sunlight that was scattered once. Sunlight reaches the vertical optical depth t over t
-    /// times its air mass; the scattered light passes the rest times the ray's air mass.
+    /// Returns the radiance by single scattering. Sunlight reaches the vertical optical depth t over t times its air
+    /// mass; scattered light passes the rest times the ray's.
     fn scattered_once(&self, row: &Row, direction: DVec3) -> DVec3 {
         let cosine = direction.dot(self.sun);
         let g = HAZE_FORWARD;
@@ -183,7 +177,7 @@ fn add_sun(texels: &mut [DVec3], sun: DVec3, irradiance: DVec3) {
     let mut covered = Vec::new();
     let mut all = 0.0;
     for row in nearest.saturating_sub(reach)..(nearest + reach).min(HEIGHT) {
-        // Radiance is linear in the angle between rows, and constant from the first or last row to the pole.
+        // Radiance is linear in the angle between rows, and constant up to the pole.
         let beside_pole = if row == 0 || row + 1 == HEIGHT {
             13.0 / 12.0
         } else {
@@ -221,8 +215,7 @@ mod tests {
         }
     }
 
-    /// Returns the solid angle of a texel of a row. At a pole it is a twelfth larger, because the radiance is constant
-    /// up to the pole and falls off over a row.
+    /// Returns a texel's solid angle. At a pole it is a twelfth larger: the radiance is constant up to the pole.
     fn stands_for(row: usize) -> f64 {
         let square = ((row as f64 + 0.5) * ROW).sin() * ROW * TAU / WIDTH as f64;
         if row == 0 || row == HEIGHT - 1 {
@@ -232,7 +225,6 @@ mod tests {
         }
     }
 
-    /// Returns the irradiance for a normal.
     fn irradiance(image: &Image, normal: DVec3) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for (i, texel) in texels(image).iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Interpolation between keys, linear or C1-continuous. It only uses sums, products and quotients of 64-bit floats, so
-//! that all machines compute the same bits.
+//! Interpolation between keys, linear or C1-continuous. Only sums, products and quotients of 64-bit floats: the same
+//! bits on all machines.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -16,8 +16,7 @@ impl<T: Copy + PartialEq + Default + Add<Output = T> + Sub<Output = T> + Mul<f64
 /// Time and value.
 pub type Key<T> = (f64, T);
 
-/// Interpolates keys with ascending times; `None` without keys. At a key the result is exactly its value; outside, it
-/// is that of the nearest key.
+/// Interpolates keys with ascending times; `None` without keys. Exact at keys; outside, that of the nearest key.
 pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -> Option<T> {
     let next = keys.partition_point(|(time, _)| *time <= at);
     let (Some(&a), Some(&b)) = (
@@ -35,14 +34,14 @@ pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -
         Interpolation::Linear => return Some(a.1 + step * s),
         Interpolation::Smooth => (slope(keys, next - 1), slope(keys, next)),
     };
-    // Cubic Hermite segment, as a smoothstep between the values plus the contribution of the slopes.
+    // Cubic Hermite segment: smoothstep between the values plus the slopes' contribution.
     let rest = 1.0 - s;
     Some(a.1 + step * (s * s * (3.0 - 2.0 * s)) + (start * rest - end * s) * (span * s * rest))
 }
 
 /// Returns the derivative of the smooth curve at a key: the secant of its neighbors (E. Catmull and R. Rom, "A Class of
 /// Local Interpolating Splines", 1974, generalized to non-uniform times). At the ends, the slope makes the segment a
-/// parabola. It is 0 next to an equal value, so that nothing moves between equal keys.
+/// parabola. 0 next to an equal value: nothing moves between equal keys.
 fn slope<T: Point>(keys: &[Key<T>], i: usize) -> T {
     let before = i.checked_sub(1).and_then(|i| keys.get(i));
     let after = keys.get(i + 1);
@@ -157,7 +156,6 @@ mod tests {
         }
     }
 
-    /// Returns the speeds just before and just after each key.
     fn speeds(kind: Interpolation) -> Vec<(f64, f64)> {
         let at = |time| value(&KEYS, time, kind).unwrap();
         let step = 1e-6;

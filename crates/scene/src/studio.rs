@@ -19,15 +19,13 @@ const EDGE: f64 = 0.15;
 
 /// A rectangular emitter at a distance of 1.
 struct Lamp {
-    /// Direction of the center.
     towards: DVec3,
     /// Half of the width and of the height.
     half: [f64; 2],
     radiance: f64,
 }
 
-/// The emitters for a view along +y: a key light on the left, a weaker fill light on the right, one above, and one
-/// behind the object.
+/// For a view along +y: a key light on the left, a weaker fill light on the right, one above, and one behind.
 const LAMPS: [Lamp; 4] = [
     Lamp {
         towards: DVec3::new(-0.75, -0.6, 0.65),
@@ -51,7 +49,6 @@ const LAMPS: [Lamp; 4] = [
     },
 ];
 
-/// Returns the studio as an environment map.
 pub fn studio() -> Image {
     let lamps = LAMPS.map(|lamp| lamp.facing());
     let azimuths: Vec<(f64, f64)> = (0..WIDTH)

@@ -5,14 +5,13 @@ use std::cell::Cell;
 use super::key_path::cut;
 use super::key_path::list;
 
-/// Maximum length of a name that is compared, in bytes. Comparing takes time proportional to the product of both
-/// lengths.
+/// Maximum length in bytes of a compared name: comparing takes the product of both lengths.
 const MAX_LEN: usize = 64;
 
-/// Minimum length in bytes of a prefix that is accepted as an abbreviation of a name.
+/// Minimum length in bytes of an abbreviation.
 const MIN_START_LEN: usize = 3;
 
-/// Returns the name that is most similar to a misspelled one, if any is similar enough.
+/// Returns the most similar name, if similar enough.
 fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if wrong.len() > MAX_LEN {
         return None;
@@ -36,17 +35,15 @@ pub(super) fn hint<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) ->
     closest(wrong, names).map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
 }
 
-/// Maximum number of unknown names for which similar ones are searched: a scene may have 100,000 shapes with unknown
-/// materials, and as many materials.
+/// Maximum number of searches: a scene may have 100,000 materials and as many unknown names.
 const MAX_SEARCHES: usize = 40;
 
-/// Messages about unknown names, of which only a limited number searches for similar names.
+/// Messages about unknown names, with a limited number of searches.
 #[derive(Debug, Default)]
 pub(super) struct Suggestions(Cell<usize>);
 
 impl Suggestions {
-    /// Returns the message about an unknown name of a kind. The first [`MAX_SEARCHES`] messages list the available
-    /// names.
+    /// Returns the message about an unknown name; the first [`MAX_SEARCHES`] list the available ones.
     pub fn unknown<'a>(&self, kind: &str, wrong: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
         let searches = self.0.get();
         self.0.set(searches.saturating_add(1));
@@ -57,7 +54,7 @@ impl Suggestions {
     }
 }
 
-/// Returns the message that a scene has nothing of a kind by this name, and what it has instead.
+/// Returns the message about an unknown name, with the available ones.
 pub(super) fn unknown<'a>(kind: &str, wrong: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
     let instead = match hint(wrong, names.clone()) {
         hint if !hint.is_empty() => hint,

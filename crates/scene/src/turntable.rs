@@ -7,12 +7,10 @@ use glam::{DQuat, DVec3};
 use super::problem::Problem;
 use super::{CameraDescription, CameraKeyDescription, CameraPathDescription, Interpolation};
 
-/// Maximum number of frames.
 pub(super) const MAX_FRAMES: u32 = 100_000;
 
-/// Replaces the path of a camera by an orbit around its target point, counter-clockwise as seen from `up`. Frame 1 is
-/// the original position; a frame after the last would equal it. Each frame has its own key, to be exactly on the
-/// circle.
+/// Replaces a camera's path by an orbit around its target point, counter-clockwise as seen from `up`. Frame 1, and a
+/// frame after the last, is the original position. Each frame has a key, exactly on the circle.
 pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraDescription, Problem> {
     if !(1..=MAX_FRAMES).contains(&frames) {
         return Err(Problem::new(format!("{frames} must be from 1 to {MAX_FRAMES}")));
@@ -38,7 +36,6 @@ pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraD
     Ok(camera.clone().with_path(path))
 }
 
-/// Rotates by a fraction of a full turn.
 fn turned(axis: DVec3, part: f64) -> DQuat {
     DQuat::from_axis_angle(axis.normalize_or(DVec3::Z), part * TAU)
 }

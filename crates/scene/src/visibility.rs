@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::{Bounds, Camera, Color, Geometry, Light, Projection, Reflection, Scene, Shape};
 
 impl Scene {
-    /// Returns warnings if the scene certainly has no light, or no geometry in view of its camera. A scene without
-    /// warnings may still render black: occlusion and the reach of lights are not considered.
+    /// Returns warnings if the scene certainly has no light, or no geometry in view. Others may still render black:
+    /// occlusion and the reach of lights are not considered.
     pub fn visibility_warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if !self.has_geometry_in_view() && !self.shows_environment_only() {
@@ -62,7 +62,7 @@ impl Scene {
         is_lit || self.has_emission()
     }
 
-    /// Returns true if the scene consists of an environment map only: the missing shapes may be intended.
+    /// Returns true if the scene is an environment map only, perhaps intentionally.
     fn shows_environment_only(&self) -> bool {
         let environment = self.environment.as_ref();
         self.shapes.is_empty() && environment.is_some_and(|environment| environment.image.is_some())
@@ -93,7 +93,6 @@ impl Scene {
     }
 }
 
-/// The materials of a shape.
 fn materials(shape: &Shape) -> impl Iterator<Item = usize> {
     let groups = match &shape.geometry {
         Geometry::Mesh { materials, .. } => materials.as_slice(),
@@ -112,14 +111,14 @@ struct HalfSpace {
     offset: f64,
 }
 
-/// Half-spaces around a camera that hold everything it sees.
+/// Half-spaces that hold everything a camera sees.
 struct Frustum {
     position: DVec3,
     sides: [HalfSpace; 5],
 }
 
 impl Frustum {
-    /// Returns the frustum of a scene's camera; `None` for a panorama, which sees all directions.
+    /// Returns the camera's frustum; `None` for a panorama.
     fn of(scene: &Scene) -> Option<Frustum> {
         let Camera {
             position,
@@ -131,7 +130,7 @@ impl Frustum {
             ..
         } = scene.camera;
         let (width, height) = (f64::from(scene.width), f64::from(scene.height));
-        // The pixel filter reaches beyond the edges of the image; one pixel more allows for rounding.
+        // The filter reaches beyond the image; one more pixel allows for rounding.
         let margin = 2.0 * (scene.render.filter.radius + 1.0);
         let extents = |half: f64| (half * (width + margin) / height, half * (height + margin) / height);
         // At depth d, a ray through a lens of radius r focused at f is at most r (1 + d / f) from the central ray.
@@ -161,7 +160,7 @@ impl Frustum {
         })
     }
 
-    /// Returns false only if the whole box is outside one of the half-spaces.
+    /// Returns false only if the box is outside a half-space.
     fn may_see(&self, (low, high): Bounds) -> bool {
         let corners = [low - self.position, high - self.position];
         let tolerance = 1e-6 * (corners[0].abs() + corners[1].abs()).element_sum();

@@ -9,7 +9,6 @@ use toml::{Table, Value};
 
 use super::{Description, RenderDescription, ShapeDescription, TextureDescription, ViewTransform};
 
-/// Defaults of cameras, images, lights and shapes.
 const DEFAULTS: &str = "up = [0.0, 0.0, 1.0]\nfocal_length = 1.0\nblades = 0\nblade_rotation = 0.0\nexposure = 0.0\n\
                         lights = true\nscale = 1.0\nvisible = true\n";
 
@@ -116,15 +115,14 @@ impl Description {
     }
 }
 
-/// Keys that come first, in this order; all others follow alphabetically.
+/// First keys; others follow alphabetically.
 const FIRST: [&str; 5] = ["type", "file", "width", "position", "integrator"];
 
-/// Formats a section without default values.
+/// Omits defaults.
 fn section(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
     written(&format!("[{name}]\n"), name, value, defaults, Value::Table)
 }
 
-/// Formats an element of a list of tables.
 fn element(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
     let list = |table| Value::Array(vec![Value::Table(table)]);
     written(&format!("[[{name}]]\n"), name, value, defaults, list)
@@ -166,7 +164,7 @@ fn from(folder: &Path, path: &Path) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// Tests that all scenes of the project are unchanged after writing and parsing, with defaults omitted.
+    /// All scenes of the project.
     #[test]
     fn texts_read_back_as_the_same_scene() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");

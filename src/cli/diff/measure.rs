@@ -5,7 +5,7 @@ use wgray_image::compare::{self, COLOR, Flip, Layer, Picture};
 use super::metric::Metric;
 use super::report::{LayerReport, Number};
 
-/// Returns the report on a layer, and the FLIP error map if FLIP is requested and `step` is given.
+/// Returns the report, and the error map if FLIP is requested and `step` given.
 pub fn measure(
     layer: &Layer,
     a: &Picture,
@@ -18,7 +18,6 @@ pub fn measure(
     let found = layer.difference(b.width, b.height, threshold);
     let has_colors = layer.name == COLOR && a.colors().is_some() && b.colors().is_some();
     let is_wanted = |metric: Metric| metrics.contains(&metric) && has_colors;
-    // The results for identical layers are known.
     let is_same = found.different == 0;
     let ssim = match (is_wanted(Metric::Ssim), is_same) {
         (true, true) => Some(1.0),

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-/// A measure of the difference of two images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Metric {
     Different,
@@ -15,7 +14,7 @@ pub enum Metric {
     Flip,
 }
 
-/// All metrics, in the order in which they are printed.
+/// In the order of printing.
 pub const METRICS: [Metric; 8] = [
     Metric::Different,
     Metric::Largest,
@@ -52,12 +51,11 @@ impl Metric {
         matches!(self, Metric::Ssim | Metric::Flip)
     }
 
-    /// Returns whether smaller values are worse.
     fn is_likeness(self) -> bool {
         matches!(self, Metric::Psnr | Metric::Ssim)
     }
 
-    /// Returns the minimum and the maximum, and the rule for error messages.
+    /// Minimum, maximum, and rule for messages.
     fn range(self) -> (f64, f64, &'static str) {
         match self {
             Metric::Different | Metric::Largest | Metric::Rmse | Metric::RelMse => (0.0, f64::MAX, "of at least 0"),
@@ -74,7 +72,7 @@ impl fmt::Display for Metric {
     }
 }
 
-/// A limit of a metric: worse values fail.
+/// Worse values fail.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
     pub metric: Metric,
@@ -82,7 +80,6 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// Parses a limit: `rmse=0.01`.
     pub fn parse(text: &str) -> Result<Limit, String> {
         let (name, value) = text.split_once('=').ok_or("must be METRIC=X, such as rmse=0.01")?;
         let metric = Metric::parse(name).map_err(|rule| format!("the metric {rule}"))?;

@@ -7,7 +7,6 @@ use wgray_image::compare::{LargestDifference, Picture, PixelCoord, Values};
 
 use super::metric::{Limit, METRICS, Metric};
 
-/// The whole report.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// Name of the tested image.
@@ -21,7 +20,6 @@ pub struct Report {
     positions: [(i32, i32); 2],
     /// True if the exit code is 0.
     pub passes: bool,
-    /// Reasons for failing.
     fails: Vec<String>,
     /// Conversions and omissions.
     pub notes: Vec<String>,
@@ -79,7 +77,6 @@ impl fmt::Display for PixelReport {
     }
 }
 
-/// Pixel and channel of the largest difference.
 #[derive(Debug, Serialize)]
 pub struct LargestReport {
     x: u32,
@@ -101,7 +98,6 @@ impl From<LargestDifference> for LargestReport {
     }
 }
 
-/// Counts of non-finite values.
 #[derive(Debug, Serialize)]
 pub struct NotFinite {
     nan_a: u64,
@@ -154,7 +150,7 @@ impl fmt::Display for Number {
         if size == 0.0 || !size.is_finite() {
             return write!(f, "{}", self.0);
         }
-        // Shape numbers go up to 2^32 - 1, which stands for the background.
+        // Shape numbers go up to 2^32 - 1, the background.
         let is_whole = size.fract() == 0.0 && size < 1e15;
         let text = if (1e-4..1e9).contains(&size) || is_whole {
             let decimals = (5 - size.log10().floor() as i32).max(0) as usize;
@@ -172,7 +168,6 @@ impl fmt::Display for Number {
     }
 }
 
-/// Removes trailing zeros of a fraction.
 fn short(digits: &str) -> &str {
     match digits.contains('.') {
         true => digits.trim_end_matches('0').trim_end_matches('.'),
@@ -199,7 +194,6 @@ impl LayerReport {
         number.map(|number| number.0)
     }
 
-    /// Returns the line of a metric.
     fn line(&self, metric: Metric) -> Option<String> {
         let value = Number(self.value(metric)?);
         let at = match &self.largest_at {
@@ -243,13 +237,12 @@ impl Report {
         (self.only_a, self.only_b) = (owned(a), owned(b));
     }
 
-    /// Returns whether any layer differs.
     pub fn is_different(&self) -> bool {
         self.layers.iter().any(LayerReport::is_different)
     }
 
-    /// Collects the reasons for failing. Different sizes, positions and channels and non-finite values always fail;
-    /// otherwise values beyond a limit do, or any difference if there are no limits.
+    /// Collects the reasons for failing: different sizes, positions or channels, non-finite values, and values beyond a
+    /// limit, or any difference without limits.
     pub fn judge(&mut self, limits: &[Limit], threshold: f64) {
         let mut fails = Vec::new();
         let (a, b) = (self.size_a, self.size_b);

@@ -17,7 +17,7 @@ use super::kernel::features;
 
 type Counts = BTreeMap<&'static str, u64>;
 
-/// The contents of `wgray info --json`. Angles are in degrees, memory in bytes.
+/// Angles are in degrees, memory in bytes.
 #[derive(Debug, Serialize)]
 pub struct Info {
     pub scene: String,
@@ -30,14 +30,12 @@ pub struct Info {
     pub material_names: Vec<String>,
     pub textures: Vec<TextureInfo>,
     pub lights: Lights,
-    /// The contents of glTF files.
     pub models: Vec<ModelContents>,
     pub memory: Memory,
     pub kernel: Kernel,
     pub device: Device,
     /// Warnings that a render prints.
     pub notes: Vec<String>,
-    /// Files that the scene references.
     pub files: Vec<String>,
 }
 
@@ -48,7 +46,7 @@ pub struct Picture {
     pub integrator: &'static str,
     pub pixel_pattern: &'static str,
     pub pixel_samples: u32,
-    /// Maximum samples per pixel, which differs from `pixel_samples` under adaptive sampling.
+    /// Differs from `pixel_samples` under adaptive sampling.
     pub max_samples: u32,
     /// The former name of `max_samples`, until 0.3.
     #[serde(rename = "most_samples")]
@@ -72,7 +70,6 @@ pub struct CameraInfo {
     pub height: Option<f64>,
     /// Diameter of the lens.
     pub aperture: Option<f64>,
-    /// Distance of the focal plane.
     pub focus_distance: Option<f64>,
     /// First and last frame of the camera's path.
     pub frames: Option<[f64; 2]>,
@@ -101,18 +98,15 @@ impl Kinds {
 pub struct Shapes {
     #[serde(flatten)]
     pub kinds: Kinds,
-    /// Distinct meshes.
     pub meshes: u64,
-    /// Triangles of the distinct meshes.
     pub mesh_triangles: u64,
-    /// Triangles of all mesh instances.
     pub instanced_triangles: u64,
     /// The former name of `instanced_triangles`, until 0.3.
     #[serde(rename = "placed_mesh_triangles")]
     old_instanced_triangles: u64,
     /// Triangles of all mesh instances, triangle shapes and tetrahedra.
     pub triangles: u64,
-    /// Primitives outside of meshes: shapes (a tetrahedron counts as four triangles) and rectangles of area lights.
+    /// Outside of meshes: shapes (a tetrahedron counts as four triangles) and area lights.
     pub primitives: u64,
 }
 
@@ -120,7 +114,6 @@ pub struct Shapes {
 pub struct TextureInfo {
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Size of an image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -149,7 +142,6 @@ pub struct Memory {
     pub scene_on_device: Option<u64>,
     /// Film memory of the largest band.
     pub film: u64,
-    /// Number of bands into which the image is split.
     pub bands: u64,
 }
 
@@ -178,7 +170,6 @@ pub struct Device {
 }
 
 impl Info {
-    /// Gathers information about a scene and the device that would render it.
     pub fn of(path: &Path, scene: &Scene, packed: &Packed, plan: &DevicePlan) -> Info {
         let whole = Region::whole(scene.width, scene.height);
         let split = WorkSplit::of(packed.film_layout());

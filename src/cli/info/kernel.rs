@@ -2,7 +2,7 @@
 
 use wgray_render::records::{BACKGROUND, LOBE_ANISOTROPY, LOBES, Packed, Specialization};
 
-/// Returns all kernel features, each with a flag that is true if the scene uses it.
+/// Returns all kernel features, and whether the scene uses them.
 pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
     let Specialization {
         tlas_kinds,

@@ -10,7 +10,6 @@ use super::gather::{Info, Kinds, TextureInfo};
 /// Maximum number of images, names and notes in a list.
 const MAX_LISTED: usize = 20;
 
-/// A table under construction.
 struct Table(String);
 
 impl Table {
@@ -148,7 +147,7 @@ fn lights(table: &mut Table, info: &Info, verbose: bool) {
     }
 }
 
-/// Adds the scenes, cameras, animations and variants of a glTF file, with the numbers and names that options accept.
+/// Adds the parts of a glTF file, with the numbers and names that options accept.
 fn contents(table: &mut Table, model: &ModelContents) {
     table.row("glTF file", &model.file);
     let ModelContents {
@@ -213,7 +212,7 @@ fn kernel(table: &mut Table, info: &Info) {
     table.row("", &format!("unused: {}", features(&kernel.leaves_out)));
 }
 
-/// Returns the first names of a list, numbered if options accept the numbers.
+/// The first names, numbered if options accept numbers.
 fn list<'a>(names: impl ExactSizeIterator<Item = Option<&'a str>>, numbered: bool) -> String {
     let more = names.len().saturating_sub(MAX_LISTED);
     let one = |(i, name): (usize, Option<&str>)| match (name, numbered) {
@@ -273,7 +272,7 @@ fn point(point: &[f64; 3]) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// Rounds a number to six significant digits.
+/// Rounds to six significant digits.
 fn short(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }

@@ -67,11 +67,9 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The scene and the frames that the options request.
 struct Job<'a> {
     args: &'a Args,
     log: OnceLog,
-    /// The scene at the current frame.
     scene: Scene,
     fps: Option<f64>,
     /// The frames to render, with their destinations.
@@ -79,7 +77,6 @@ struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// Reads the scene and checks all frames.
     fn new(args: &'a Args) -> anyhow::Result<Job<'a>> {
         if args.verbose {
             log::print_events();
@@ -110,7 +107,6 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Sets the scene to a frame.
     fn go_to(&mut self, frame: Frame) -> anyhow::Result<()> {
         if let Some((number, fps)) = frame.number.zip(self.fps) {
             let mut overrides = self.args.overrides();
@@ -119,7 +115,7 @@ impl<'a> Job<'a> {
             let before = std::mem::replace(&mut self.scene, moment);
             self.scene.keep_ground(&before);
             if self.args.options.is_framed(&self.scene) {
-                // The automatic camera frames the model at rest, so that a frame does not depend on the other frames.
+                // The automatic camera frames the model at rest: frames are independent.
                 (self.scene.camera, self.scene.camera_path) = (before.camera, before.camera_path);
             }
         }
@@ -151,7 +147,7 @@ fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-/// Checks all frames before the first is rendered: outputs must not be inputs, and every camera must be valid.
+/// Checks all frames first: outputs must not be inputs, and cameras must be valid.
 fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame, &'a Outputs)>) -> anyhow::Result<()> {
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
     let mut files = BTreeMap::new();
@@ -179,8 +175,7 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
     Ok(())
 }
 
-/// Renders one image, or a part of one. Signals are deferred from the first image on, and end the command after
-/// cleanup.
+/// Renders an image or a part. Signals are deferred from the first image on, and end the command after cleanup.
 fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant) -> anyhow::Result<()> {
     let before = signals.deferred().cloned();
     let mut checkpoint = plan.open_checkpoint(before.as_ref())?;
@@ -261,7 +256,7 @@ fn summary(images: &[String], stats: &Stats, requested: u32) -> String {
     )
 }
 
-/// Returns the signal if it caused the error, else the error.
+/// Returns the signal, if it caused the error.
 fn interrupted(error: anyhow::Error, stop: &Stop) -> anyhow::Error {
     match (error.downcast_ref(), stop.signal()) {
         (Some(RenderError::Cancelled), Some(signal)) => Interrupted(signal).into(),

@@ -28,14 +28,12 @@ use crate::cli::{Interrupted, Usage, option, plain};
 /// The settings of a render, except its destinations.
 pub struct Plan<'a> {
     pub scene: Packed,
-    /// The region of the image.
     pub picture: Region,
     /// The part to render, and its rows.
     pub tile: Option<(Tile, Region)>,
     pub options: Options,
-    /// Time at which rendering stops.
     pub deadline: Option<Instant>,
-    /// Set if the image is written as it grows.
+    /// Write the image as it grows.
     pub preview: bool,
     pub checkpoint: Option<PathBuf>,
     checkpoint_interval: Duration,
@@ -84,12 +82,11 @@ impl<'a> Plan<'a> {
         })
     }
 
-    /// Returns the region to render.
     pub fn region(&self) -> Region {
         self.tile.map_or(self.picture, |(_, rows)| rows)
     }
 
-    /// Returns the layout of the image, given the depth at its center.
+    /// Needs the depth at the image's center.
     pub fn layout(&self, middle_depth: f32) -> Layout {
         Layout {
             picture: (self.scene.camera.width, self.scene.camera.height),
@@ -102,7 +99,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Returns true if a file is the part that this render would write, and is whole.
+    /// Returns true if a file is the whole part of this render.
     pub fn is_done(&self, path: &Path) -> bool {
         let (Some((tile, _)), Ok((identity, found))) = (self.tile, job::read_part(path)) else {
             return false;
@@ -111,13 +108,11 @@ impl<'a> Plan<'a> {
         identity == self.identity() && found == PartHeader::of(tile, &layout, self.metadata.lasting())
     }
 
-    /// Returns the identity of the job.
     pub fn identity(&self) -> Identity {
         Identity::of(&self.scene, self.picture, self.options.exact_rounding)
     }
 
-    /// Opens the checkpoint, if any, and waits while another process writes it. The checkpoint of a part equals that of
-    /// an image cropped to its rows.
+    /// Opens the checkpoint, if any, after other processes. That of a part equals that of an image cropped to its rows.
     pub fn open_checkpoint<'b>(&'b self, stop: Option<&'b Stop>) -> anyhow::Result<Option<Checkpoint<'b>>> {
         let Some(path) = &self.checkpoint else {
             return Ok(None);
@@ -146,7 +141,6 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Opens the device and prepares it for the scene.
     pub fn renderer<'b>(&'b self, stop: &'b Stop) -> anyhow::Result<Renderer<'b>> {
         let on_fault = FaultHandler {
             tell: Box::new(|why, remedy| match remedy {
@@ -176,7 +170,7 @@ fn rows(tile: Tile, picture: Region) -> Result<Region, Usage> {
     tile.rows(picture).ok_or(Usage(rule))
 }
 
-/// Checks that a prefix of each pixel's samples covers the pixel.
+/// Checks that prefixes of the samples cover a pixel.
 fn can_end_early(option: &str, scene: &Scene) -> Result<(), Usage> {
     let pattern = scene.render.pixel_samples.pattern;
     match pattern.needs_square() {

@@ -12,7 +12,6 @@ use crate::cli::metadata::samples_of;
 /// Minimum time between two writes.
 const INTERVAL: Duration = Duration::from_secs(2);
 
-/// The files of the images that are written before they are complete.
 pub struct Previews {
     images: Vec<(Format, Vec<Output>)>,
     last: Option<Instant>,
@@ -23,12 +22,12 @@ impl Previews {
         Previews { images, last: None }
     }
 
-    /// Returns true if the image should be written after this number of samples per pixel.
+    /// Returns true if the image should be written after these samples per pixel.
     pub fn is_due(&self, samples: u32) -> bool {
         samples.is_power_of_two() && self.last.is_none_or(|last| last.elapsed() >= INTERVAL)
     }
 
-    /// Starts the files of the images, except those that have more samples.
+    /// Starts the files, except those with more samples.
     pub fn start(&self, samples: u32, log: &OnceLog) -> io::Result<Vec<Target>> {
         let mut targets = Vec::new();
         for (format, files) in &self.images {
@@ -45,13 +44,12 @@ impl Previews {
         Ok(targets)
     }
 
-    /// Starts the interval until the next write.
     pub fn written(&mut self) {
         self.last = Some(Instant::now());
     }
 }
 
-/// Returns a message if a file exists and may have more samples than an incomplete image.
+/// Returns a message if a file may have more samples.
 fn reason_to_keep(file: &Output, samples: u32) -> Option<String> {
     let path = file.path().filter(|path| path.exists())?;
     let reason = match samples_of(path) {

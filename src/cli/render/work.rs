@@ -17,21 +17,19 @@ use crate::cli::outputs::Files;
 use crate::cli::progress::Progress;
 use crate::cli::signal::Stop;
 
-/// Times and counts of a render.
 #[derive(Default)]
 pub struct RenderTotals {
-    /// Time spent on rendering, excluding the writing of files.
+    /// Excludes the writing of files.
     pub time: Duration,
-    /// Camera rays of the image, and the fraction of them that was rendered instead of read from a checkpoint.
+    /// Camera rays of the image, and the fraction not read from a checkpoint.
     pub camera_rays: u64,
     pub fraction_rendered: f64,
     /// Number of pixels with non-finite values.
     invalid_pixels: usize,
-    /// Minimum samples per pixel.
     pub min_samples: u32,
-    /// Requested samples per pixel; fewer than the scene's if the time limit was reached or the image is partial.
+    /// Fewer than the scene's after the time limit, or if the image is partial.
     pub requested_samples: u32,
-    /// The files with the last whole pass of a render that a signal ended; empty if the image is complete.
+    /// The files with the last whole pass, after a signal.
     pub partial: Vec<String>,
 }
 
@@ -199,8 +197,8 @@ fn put(
     })
 }
 
-/// Writes the last whole pass into the files of the images, except those with more samples. Returns `None` if no file
-/// is written; an output that cannot be written is a warning, because the complete image may succeed.
+/// Writes the last whole pass into the images, except those with more samples. `None` if none is written; failures are
+/// warnings, as the complete image may succeed.
 fn save_pass(
     plan: &Plan,
     renderer: &mut Renderer,

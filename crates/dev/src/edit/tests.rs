@@ -1,6 +1,6 @@
 use super::*;
 
-/// Returns a text after a key was set to a value, or removed if the value is `none`.
+/// Sets a value, or removes the key if it is `none`.
 fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     let value = (value != "none").then(|| {
         let mut table: toml::Table = toml::from_str(&format!("value = {value}")).unwrap();
@@ -9,7 +9,7 @@ fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     edited(text, &path.parse().unwrap(), value.as_ref())
 }
 
-/// Text, key, value, and the expected text. Each text is also edited with DOS line ends and a byte-order mark.
+/// Text, key, value, expected text; also tested with DOS line ends and a byte-order mark.
 const CHANGES: [(&str, &str, &str, &str); 36] = [
     // Existing values.
     (
@@ -210,7 +210,6 @@ fn only_the_bytes_of_a_value_change() {
         assert_eq!(set(text, path, value).as_deref(), Ok(wanted), "{text}{path}");
         let of_dos = set(&dos(text), path, value).unwrap();
         assert_eq!(of_dos, dos(wanted), "{path}");
-        // Setting the same value again changes nothing.
         assert_eq!(set(wanted, path, value).as_deref(), Ok(wanted));
     }
 }

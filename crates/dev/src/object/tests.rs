@@ -53,7 +53,6 @@ fn with(whole: &Value, path: &KeyPath, new: &Value) -> Value {
     whole
 }
 
-/// Returns a valid value that differs from the current one.
 fn another(field: &Field) -> Json {
     let now = field.value.as_ref().or(field.default.as_ref());
     let moved = |now: Option<f64>| {
@@ -90,7 +89,7 @@ fn another(field: &Field) -> Json {
     }
 }
 
-/// Sets every field of every object to its own value and to another one. Returns the number of fields.
+/// Sets every field to its own value and to another one. Returns their number.
 fn set_all(seen: &SceneView) -> usize {
     let text = seen.loaded.text.clone();
     let whole = table(&text);

@@ -66,7 +66,6 @@ impl Painter {
         }
     }
 
-    /// Changes the limits of rendering.
     fn limit(&mut self, limits: Limits) {
         if limits == self.limits {
             return;
@@ -97,14 +96,13 @@ impl Painter {
         });
     }
 
-    /// Withdraws the notice of an earlier error: a value was accepted.
+    /// A value was accepted: withdraws earlier errors.
     pub(super) fn taken(&mut self) {
         if self.state.notice.as_ref().is_some_and(|notice| notice.bad) {
             self.notice(&Ok(()), String::new());
         }
     }
 
-    /// Returns the current camera for a scene.
     pub(super) fn packed_camera(&self, loaded: &Loaded) -> Camera {
         let (own, origin) = (loaded.packed.camera, loaded.packed.origin);
         let camera = self.camera.as_ref().and_then(|camera| camera.validate().ok());
@@ -113,12 +111,12 @@ impl Painter {
         })
     }
 
-    /// Returns the constants that a scene's kernel is compiled for, to show the selected view.
+    /// For the selected view.
     pub(super) fn constants(&self, loaded: &Loaded) -> Constants {
         constants(&loaded.packed, self.view)
     }
 
-    /// Returns a scene with the current camera, for the kernel of the selected view.
+    /// With the current camera, for the selected view.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
         let (specialization, ..) = self.constants(loaded);
         Packed {

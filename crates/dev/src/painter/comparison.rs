@@ -8,21 +8,18 @@ use crate::picture::{Against, Content, Frame, View};
 use crate::reference::{Apart, Reference};
 use wgray_image::Pixels;
 
-/// The images to compare with.
 #[derive(Default)]
 pub struct Comparison {
     /// The last complete image before the last saved change.
     pub before: Option<Reference>,
     /// An image that was set or given as the reference.
     pub reference: Option<Reference>,
-    /// The last difference.
     apart: Option<Apart>,
-    /// True while a difference is measured.
     measuring: bool,
 }
 
 impl Comparison {
-    /// Returns whether there is an image before the last change, and the name of the reference.
+    /// Returns whether there is a `before`, and the name of the reference.
     pub fn comparable(&self) -> (bool, Option<String>) {
         let name = self.reference.as_ref().map(|reference| reference.name.clone());
         (self.before.is_some(), name)
@@ -38,7 +35,7 @@ impl Comparison {
 }
 
 impl Painter {
-    /// Returns the displayed image if it is a complete color image and shows the newest change.
+    /// Returns the displayed image if complete, in color and up to date.
     fn whole_picture(&self) -> Option<Pixels> {
         let frame = self.frame_sender.borrow().clone()?;
         let header = &frame.header;
@@ -49,7 +46,6 @@ impl Painter {
         }
     }
 
-    /// Keeps the displayed image as the one before a change.
     pub(super) fn keep_before(&mut self) {
         if let Some(pixels) = self.whole_picture() {
             self.comparison.before = Some(Reference {
@@ -59,7 +55,6 @@ impl Painter {
         }
     }
 
-    /// Sets the displayed image as the reference.
     pub(super) fn keep(&mut self) {
         match self.whole_picture() {
             Some(pixels) => {
@@ -81,7 +76,7 @@ impl Painter {
         }
     }
 
-    /// Returns the content with the image it is compared with, and the names of both.
+    /// Returns the content with its comparison, and the names of both.
     pub(super) fn beside(&self, content: Content, whole: [u32; 2]) -> (Content, Option<[String; 2]>) {
         let View::Compare(against) = self.view else {
             return (content, None);
@@ -97,7 +92,7 @@ impl Painter {
         }
     }
 
-    /// Measures a finished comparison on a separate thread, because it takes longer than a frame.
+    /// Measures a finished comparison on a thread: it takes longer than a frame.
     pub(super) fn measure(&mut self, frame: &Arc<Frame>) {
         if frame.header.done && !self.comparison.measuring && matches!(frame.content, Content::Compare(..)) {
             self.comparison.measuring = true;
@@ -123,12 +118,11 @@ impl Painter {
         }
     }
 
-    /// Returns the difference of the displayed images.
     pub(super) fn apart(&self) -> Option<Apart> {
         self.comparison.apart.filter(|apart| apart.frame == self.frames)
     }
 
-    /// Returns why a comparison cannot be shown, if it cannot.
+    /// Returns why a comparison cannot be shown.
     pub(super) fn no_comparison(&self) -> Option<String> {
         let View::Compare(against) = self.view else { return None };
         let whole = self.running.as_ref()?.canvas.finest_size();

@@ -55,8 +55,7 @@ impl Painter {
         }
     }
 
-    /// Takes a kernel whose request was overtaken by a newer one. It is newer than the displayed kernel, and is shown
-    /// until the newer one is compiled, if it fits the scene.
+    /// Takes a kernel whose request was overtaken. If it fits the scene, it is shown until the newer one is compiled.
     fn take_overtaken(&mut self, built: BuildResult) {
         let constants = self.loaded.as_ref().map(|loaded| self.constants(loaded));
         let is_useful = self.pending.is_some() && built.id >= self.oldest && constants == Some(built.constants);
@@ -75,7 +74,7 @@ impl Painter {
         }
     }
 
-    /// Starts to render with a kernel, which shows a change that was noticed at a time.
+    /// Starts to render with a kernel that shows a change.
     fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants, noticed: Instant) {
         let Some(loaded) = self.loaded.clone() else { return };
         let info = &gpu.device().info;
@@ -108,7 +107,7 @@ impl Painter {
         }
     }
 
-    /// Remembers that shaders have errors for a scene like this, so that they are not compiled again.
+    /// Remembers that shaders have errors for such scenes.
     fn refuse(&mut self, shaders: (Arc<Shaders>, Constants), problems: Vec<Diagnostic>) {
         self.refused.push(shaders);
         self.problems.shader = problems;
@@ -123,7 +122,7 @@ impl Painter {
         self.settle((Instant::now(), true));
     }
 
-    /// Returns the diagnostic of an image that the kernel cannot render, with advice.
+    /// Returns a diagnostic with advice.
     fn of_render(&self, error: &RenderError) -> Diagnostic {
         match error {
             RenderError::Shader(error) => match &self.shaders {
@@ -146,13 +145,13 @@ impl Painter {
         }
     }
 
-    /// Returns the diagnostic of a shader's error, with the user's path of the file.
+    /// Returns the diagnostic with the user's path of the file.
     fn of_shader(&self, error: &ShaderError, shaders: &Shaders) -> Diagnostic {
         Diagnostic::shader(error, shaders, self.sources.shaders.as_deref())
     }
 
-    /// Handles an error of the device: opens it again, a few times. If the driver truncates the kernel, the last good
-    /// shaders are used instead, or rendering halts if there are no others.
+    /// Opens the device again, a few times. If the driver truncates the kernel, uses the last good shaders, or halts
+    /// without others.
     pub(super) fn fail(&mut self, error: &RenderError) {
         if let (RenderError::LoopTruncated { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running)
         {
@@ -180,12 +179,11 @@ impl Painter {
         self.tell();
     }
 
-    /// Drops the running kernel.
     pub(super) fn stop_running(&mut self) {
         drop_contained(self.running.take());
     }
 
-    /// Keeps a kernel that differs from the new one only in its layers, because viewers switch back to it.
+    /// Keeps a kernel that only differs in its layers: viewers switch back.
     fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
         let is_sibling = |known: &Running| {
             let same_scene = are_of_one_scene(&known.constants, constants);

@@ -38,14 +38,12 @@ use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::sliders::Slider;
 use wgray_scene::CameraDescription;
 
-/// Minimum time between frames of a refining image, of which at most a tenth is spent on them.
+/// Minimum time between frames of a refining image; at most a tenth is spent on them.
 const BETWEEN_FRAMES: Duration = Duration::from_millis(100);
 /// Maximum number of attempts to open a device without an image in between.
 const ATTEMPTS: u32 = 3;
-/// The initial gain of differences.
 const GAIN: f32 = 256.0;
 
-/// The painter of a session.
 pub struct Painter {
     sources: Sources,
     builder: Builder,
@@ -68,11 +66,11 @@ pub struct Painter {
     good: Option<Arc<Shaders>>,
     /// Shaders that were refused for these constants.
     refused: Vec<(Arc<Shaders>, Constants)>,
-    /// The last shaders that were refused because the driver truncates them: in another scene it may not.
+    /// The last shaders that the driver truncated: in another scene it may not.
     cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
-    /// The kernel of color while one for layers runs; otherwise the last kernel for layers, if any.
+    /// The kernel of color while one for layers runs; else the last kernel for layers.
     parked: Option<Running>,
     pending: Option<Pending>,
     requests: u64,
@@ -84,13 +82,11 @@ pub struct Painter {
     /// The camera, if it differs from the file's.
     camera: Option<CameraDescription>,
     sliders: Sliders,
-    /// True if the camera or a slider moved since the current image was started.
+    /// True if the camera or a slider moved since the image was started.
     camera_waits: bool,
-    /// The changes of the scene file that can be undone.
     history: History,
-    /// The changes of the scene file, shared with the watcher, which need not read them again.
+    /// The changes of the scene file, which the watcher need not read again.
     writes: Arc<Mutex<Writes>>,
-    /// The files of the scene.
     files: Vec<(PathBuf, FileStamp)>,
     view: View,
     times: Times,
@@ -98,28 +94,25 @@ pub struct Painter {
     marks: bool,
     look: DisplayOverrides,
     limits: Limits,
-    /// True if rendering pauses after the first image of a change.
     paused: bool,
     walk: CameraHistory,
     comparison: Comparison,
     /// The inbox of the session, for results of other threads.
     events: SyncSender<Event>,
-    /// The last reported sizes of an image that is too large: the size of the image, and the size that is shown.
+    /// The last reported sizes of an image that is too large: in full, and as shown.
     smaller: Option<([u32; 2], [u32; 2])>,
 
-    /// Number of executed commands.
     executed: u64,
-    /// Number of frames.
     frames: u64,
     /// Number of images.
     revision: u64,
-    /// Time at which the newest change that is not displayed yet was noticed, and true if it was a save.
+    /// When the newest change that is not displayed yet was noticed, and whether it was a save.
     since: Option<(Instant, bool)>,
     /// Seconds from the last change to its first image.
     latency: Option<f64>,
     /// Seconds spent on compiling for the next frame.
     compiled: Option<f64>,
-    /// Time at which the first image after a save was shown; `None` once the image is finished.
+    /// When the first image after a save was shown; `None` once it is finished.
     first_frame: Option<Instant>,
     last_frame: Instant,
     frame_cost: Duration,
@@ -131,7 +124,7 @@ struct Running {
     halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,
-    /// The kernel's sliders, as the current shaders describe them.
+    /// The kernel's sliders, by the current shaders.
     sliders: Vec<Slider>,
     /// The bits of their values.
     slider_values: Vec<u32>,
@@ -143,26 +136,20 @@ struct Pending {
     constants: Constants,
 }
 
-/// The receivers of what a session reports.
 pub struct SessionChannels {
     /// The terminal.
     pub report: Box<dyn Fn(Report) + Send>,
-    /// The receivers of the state.
     pub state: watch::Sender<Arc<State>>,
-    /// The receivers of the images.
     pub frames: watch::Sender<Option<Arc<Frame>>>,
-    /// The timings.
     pub times: Times,
     /// The template of links to an editor.
     pub editor: Option<String>,
-    /// The receivers of the scene, for questions.
+    /// For questions.
     pub seen: watch::Sender<Option<Arc<SceneView>>>,
-    /// The inbox of the session.
     pub events: SyncSender<Event>,
 }
 
 impl Painter {
-    /// Returns a painter without a scene.
     pub fn new(
         sources: Sources,
         device: Device,
@@ -242,7 +229,6 @@ impl Painter {
         }
     }
 
-    /// Handles an event.
     pub fn take(&mut self, event: Event) {
         match event {
             Event::Files(snapshot, noticed, writes) => self.take_files(*snapshot, noticed, writes),
@@ -254,8 +240,7 @@ impl Painter {
             Event::Reference(reference) => self.take_reference(reference),
             Event::Measured(apart) => self.take_measured(apart),
             Event::Viewers => {
-                // The latency restarts, because no viewer has waited for the image; nor for the compiler, if it has
-                // finished.
+                // Restarts the latency: no viewer has waited for the image, nor for a finished compiler.
                 if self.pending.is_none() {
                     self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
                     self.compiled = None;
@@ -276,7 +261,7 @@ impl Painter {
                 self.times.part(part, took);
             }
         }
-        // A snapshot from before the last write of this session contains an outdated scene.
+        // Snapshots from before the last write are outdated.
         let is_new = writes == self.writes.lock().unwrap_or_else(PoisonError::into_inner).count;
         let known = self.loaded.as_ref().map(|loaded| loaded.text.as_bytes());
         if let (true, Some((_, FileStamp::Content(content)))) = (is_new, snapshot.files.first())
@@ -299,14 +284,13 @@ impl Painter {
         self.show_files(noticed, shown_otherwise);
     }
 
-    /// Takes a scene or its errors. Returns true if the display settings changed, so that the same rendering is
-    /// displayed differently.
+    /// Takes a scene or its errors. Returns true if the display settings changed.
     fn take_scene(&mut self, scene: Result<Arc<Loaded>, Vec<Diagnostic>>) -> bool {
         let mut shown_otherwise = false;
         match scene {
             Ok(loaded) => {
                 self.problems.scene.clear();
-                // Values of the camera that were edited in the file replace those of the moved camera.
+                // Values edited in the file replace those of the moved camera.
                 if let (Some(camera), Some(old)) = (&self.camera, &self.loaded) {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
@@ -329,13 +313,12 @@ impl Painter {
         shown_otherwise
     }
 
-    /// Shows the current state of the files.
     fn show_files(&mut self, noticed: Instant, shown_otherwise: bool) {
         self.failures = 0;
         self.keep_view();
         self.settle((noticed, true));
         self.upload_sliders((noticed, true));
-        // Shows an unchanged rendering with new display settings. The first image of a new rendering is shown later.
+        // An unchanged rendering with new display settings; the first image of a new one is shown later.
         let picture = self.running.as_ref().filter(|running| !running.canvas.is_new());
         if shown_otherwise && self.pending.is_none() && picture.is_some() {
             self.changed((noticed, true));
@@ -343,8 +326,7 @@ impl Painter {
         }
     }
 
-    /// Returns the scene, and the shaders to render it with: the newest ones, or the last good ones if the newest
-    /// have errors.
+    /// Returns the scene and its shaders: the newest, or the last good ones if those have errors.
     fn wanted(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
         let constants = self.constants(&loaded);
@@ -378,8 +360,6 @@ impl Painter {
 
     fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>, noticed: Instant) {
         let constants = self.constants(loaded);
-        // A running kernel that fits the scene is kept if the new one has errors; otherwise the last good shaders are
-        // compiled.
         let running = self.running.as_ref();
         let stays = running.is_some_and(|running| running.constants == constants);
         let fallback = self.good.clone().filter(|good| !stays && *good != shaders);
@@ -400,7 +380,6 @@ impl Painter {
         });
     }
 
-    /// Renders the scene with the running kernel, which fits.
     fn draw_scene(&mut self, since: (Instant, bool)) {
         let Some(loaded) = self.loaded.clone() else { return };
         let packed = self.packed(&loaded);
@@ -420,20 +399,19 @@ impl Painter {
         }
     }
 
-    /// Notes that an image has been started with the current camera.
+    /// An image was started with the current camera.
     fn begun(&mut self, since: (Instant, bool)) {
         self.camera_waits = false;
         self.tell_size();
         self.changed(since);
     }
 
-    /// Notes that another image is shown from now on.
+    /// Another image is shown from now on.
     fn changed(&mut self, since: (Instant, bool)) {
         self.revision += 1;
         self.since.get_or_insert(since);
     }
 
-    /// Returns whether [`work`](Self::work) has anything to do.
     pub fn has_work(&self) -> bool {
         if self
             .looking
@@ -448,18 +426,17 @@ impl Painter {
             .is_some_and(|running| {
                 let more = !running.canvas.is_done(self.seen());
                 let first = running.canvas.is_new();
-                // While a kernel is compiled, the image is not refined, except that the camera may still move.
+                // While a kernel is compiled, only camera moves are rendered.
                 self.camera_waits || (more && (first || (self.pending.is_none() && !self.paused)))
             })
     }
 
-    /// Makes one dispatch.
     pub fn work(&mut self) {
         let (view, waits) = (self.seen(), self.camera_waits);
         let Some(loaded) = self.loaded.clone() else { return };
         let camera = self.packed_camera(&loaded);
         let Some(running) = &mut self.running else { return };
-        // Only a complete first image is interrupted; otherwise a moving camera would never show an image.
+        // Only a complete first image is interrupted: a moving camera must show images.
         if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
             running.slider_values = self.sliders.bits(&running.sliders);
             let restarted = guarded(|| {

@@ -10,7 +10,6 @@ use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::sliders::{Value, sliders};
 
 impl Painter {
-    /// Takes the current shaders of the files.
     pub(super) fn take_shaders(&mut self, shaders: Arc<Shaders>) {
         if self.shaders.as_ref() == Some(&shaders) {
             return;
@@ -25,7 +24,7 @@ impl Painter {
         let good = self.good.as_ref();
         self.refused
             .retain(|(known, _)| *known == shaders || Some(known) == good);
-        // A kernel with the same code keeps running: later errors and the sliders refer to the lines of the new text.
+        // A kernel with the same code keeps running; errors and sliders refer to the new text.
         let kernels = [&mut self.running, &mut self.parked].into_iter().flatten();
         for kernel in kernels.filter(|kernel| kernel.shaders.has_same_code(&shaders)) {
             let (_, integrator, adaptive) = kernel.constants;
@@ -56,7 +55,7 @@ impl Painter {
         self.upload_sliders((Instant::now(), false));
     }
 
-    /// Makes the running kernel use the values of its sliders, from the next image on.
+    /// From the next image on.
     pub(super) fn upload_sliders(&mut self, since: (Instant, bool)) {
         let Some(running) = &mut self.running else { return };
         if self.sliders.bits(&running.sliders) != running.slider_values {
@@ -66,7 +65,7 @@ impl Painter {
         }
     }
 
-    /// Switches back to the previous kernel, if it is the one that is needed.
+    /// Switches back to the previous kernel, if needed.
     pub(super) fn take_parked(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
         let fits = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
         let found = self.parked.as_ref().is_some_and(fits);
@@ -76,7 +75,7 @@ impl Painter {
         found
     }
 
-    /// Shows the kernel that was switched to, with its current image.
+    /// With its current image.
     pub(super) fn show_parked(&mut self, since: (Instant, bool)) {
         let (view, limits) = (self.seen(), self.limits);
         let packed = self.loaded.as_ref().map(|loaded| self.packed(loaded));
@@ -86,7 +85,7 @@ impl Painter {
             running.canvas.set_limits(limits, view)?;
             running.canvas.change_view(view)
         });
-        // If the scene or the camera changed meanwhile, the image is started again at once.
+        // After changes of scene or camera, the image restarts at once.
         let is_current = packed.is_some_and(|packed| running.canvas.shows(&packed));
         match shown {
             Ok(()) => {

@@ -41,7 +41,6 @@ impl Painter {
             .is_some_and(|running| running.canvas.is_done(self.seen()))
     }
 
-    /// Shows the current image.
     pub(super) fn show(&mut self) {
         let (view, done) = (self.seen(), self.is_done());
         let Some(running) = &mut self.running else { return };
@@ -129,7 +128,7 @@ impl Painter {
         self.tell();
     }
 
-    /// Replaces the file of `--out` when each pixel has a sample, and when the image is finished.
+    /// Replaces `--out` when each pixel has a sample, and when finished.
     fn write_out(&mut self, png: impl FnOnce() -> Vec<u8>, done: bool) {
         let Some(out) = &self.out else { return };
         if done || self.written != Some(self.revision) {
@@ -140,14 +139,14 @@ impl Painter {
         }
     }
 
-    /// Reports an image that is too large to display, once for each size.
+    /// Reports an image too large to display, once per size.
     pub(super) fn tell_size(&mut self) {
         let scale = self.limits.scale;
         let sizes = self
             .running
             .as_ref()
             .map(|running| (running.canvas.size(), running.canvas.finest_size()));
-        // A lower resolution that a viewer selected by the preview scale is not reported.
+        // A viewer's preview scale is not reported.
         let smaller = sizes.filter(|(asked, shown)| asked.map(|side| side.div_ceil(scale)) != *shown);
         if self.smaller != smaller {
             self.smaller = smaller;
@@ -157,7 +156,7 @@ impl Painter {
         }
     }
 
-    /// Publishes the scene and the camera for questions, if they changed.
+    /// Publishes scene and camera for questions.
     fn tell_seen(&self) {
         let Some(loaded) = &self.loaded else { return };
         let camera = self.packed_camera(loaded);
@@ -171,7 +170,6 @@ impl Painter {
         }
     }
 
-    /// Publishes the state, if it changed.
     pub(super) fn tell(&mut self) {
         self.tell_seen();
         let camera = self

@@ -27,14 +27,13 @@ impl Painter {
         }
     }
 
-    /// Shows what is already rendered of a view.
     pub(super) fn show_what_is_there(&mut self) {
         if self.is_done() || self.running.as_ref().is_some_and(|running| !running.canvas.is_new()) {
             self.show();
         }
     }
 
-    /// Falls back to color if the scene does not provide the selected view.
+    /// Falls back to color if the scene lacks the view.
     pub(super) fn keep_view(&mut self) {
         if self.loaded.is_none() {
             return;
@@ -46,19 +45,19 @@ impl Painter {
         self.notice(&Err(format!("view `{}`: {rule}", aov.name())), String::new());
     }
 
-    /// Returns why the scene does not provide a view; `None` if it does.
+    /// Returns why the scene lacks a view, if it does.
     fn missing(&self, view: View) -> Option<&'static str> {
         let packed = &self.loaded.as_ref()?.packed;
         view.aov()?.missing(packed.integrator, packed.sampling.adaptive)
     }
 
-    /// Returns the views that the scene does not provide, and why.
+    /// Views that the scene lacks, and why.
     pub(super) fn missing_views(&self) -> Vec<(View, &'static str)> {
         let rules = View::LAYERS.iter().map(|view| (*view, self.missing(*view)));
         rules.filter_map(|(view, rule)| Some((view, rule?))).collect()
     }
 
-    /// Returns the view that the running kernel shows: the selected one, unless it needs another kernel.
+    /// Returns the shown view: the selected one, unless it needs another kernel.
     pub(super) fn seen(&self) -> View {
         match &self.running {
             Some(running) => shown(&running.constants, self.view),

@@ -15,29 +15,24 @@ use wgray_scene::{Bounds, CameraDescription, Geometry, Light, Scene};
 /// Maximum number of viewpoints that are kept.
 const STEPS: usize = 256;
 
-/// The history of viewpoints.
 #[derive(Default)]
 pub struct CameraHistory {
-    /// The cameras before each step.
     back: Vec<CameraDescription>,
-    /// The cameras that can be returned to.
     forth: Vec<CameraDescription>,
     /// True if the next move belongs to the last step.
     in_step: bool,
 }
 
 impl CameraHistory {
-    /// Returns whether there is a previous and a next viewpoint.
     pub fn steps(&self) -> [bool; 2] {
         [!self.back.is_empty(), !self.forth.is_empty()]
     }
 
-    /// Ends the step: the next move starts another one.
+    /// The next move starts another step.
     pub fn end_step(&mut self) {
         self.in_step = false;
     }
 
-    /// Adds the current camera before a move.
     fn leave(&mut self, camera: &CameraDescription) {
         if !std::mem::replace(&mut self.in_step, true) {
             self.forth.clear();
@@ -50,7 +45,6 @@ impl CameraHistory {
 }
 
 impl Painter {
-    /// Returns the current camera.
     fn seen_by(&self) -> Option<&CameraDescription> {
         self.camera
             .as_ref()
@@ -84,7 +78,7 @@ impl Painter {
         self.step(&old, new);
     }
 
-    /// Frames the object at a pixel, or the whole scene if there is no finite object.
+    /// Frames the finite object at a pixel, or the whole scene.
     pub(super) fn frame(&mut self, pixel: Option<[u32; 2]>) {
         let (Some(loaded), Some(old)) = (self.loaded.clone(), self.seen_by().cloned()) else {
             return;
@@ -124,7 +118,6 @@ impl Painter {
         }
     }
 
-    /// Returns to the previous or the next viewpoint.
     pub(super) fn retrace(&mut self, forth: bool) {
         let Some(now) = self.seen_by().cloned() else { return };
         let walk = &mut self.walk;
@@ -134,7 +127,7 @@ impl Painter {
         };
         let Some(camera) = from.pop() else { return };
         walk.in_step = false;
-        // The camera of the file may be of another kind by now.
+        // The file's camera may be of another kind.
         if std::mem::discriminant(&camera) == std::mem::discriminant(&now) {
             to.push(now);
             self.look_through(camera);

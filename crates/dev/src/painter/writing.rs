@@ -20,15 +20,14 @@ use wgray_image::sanitize::escape_control;
 use wgray_scene::{Field, KeyPath, PendingScene, Segment, cut, folder_of, read_text};
 
 impl Painter {
-    /// Sets a value in the scene file.
     pub(super) fn set(&mut self, set: &Set) {
-        // A viewer may send any text, and the terminal prints the error.
+        // The terminal prints the error, with the viewer's text.
         let result = self.try_set(set).map_err(|why| escape_control(&why).into_owned());
         match &result {
             Ok(()) => self.taken(),
             Err(_) => self.notice(&result, String::new()),
         }
-        // A slider writes many times while it is dragged: only errors are reported.
+        // A dragged slider only reports errors.
         if result.is_err() || set.gesture.is_none() {
             (self.report)(Report::Wrote(escape_control(&cut(&set.path)).into_owned(), result));
         }
@@ -61,7 +60,6 @@ impl Painter {
         self.write(&file, (&loaded, &before), after, step)
     }
 
-    /// Saves the current camera to the scene file.
     pub(super) fn save_camera(&mut self) {
         let result = self.try_save_camera();
         self.notice(&result, format!("Camera saved to {}", self.sources.scene.display()));
@@ -79,7 +77,6 @@ impl Painter {
         self.write(&file, (&loaded, &before), after, step)
     }
 
-    /// Undoes or redoes the last change.
     pub(super) fn turn(&mut self, again: bool) {
         let Some(what) = self.history.last(again).map(|step| step.what.clone()) else {
             if let Some(reason) = self.state.undo_blocked.clone() {
@@ -95,7 +92,6 @@ impl Painter {
         (self.report)(Report::Turned(format!("{text}: {what}"), result));
     }
 
-    /// Drops the undo history because another program has changed the scene file.
     pub(super) fn forget_writes(&mut self) {
         if self.history.forget() {
             let place = self.sources.scene.display();
@@ -119,7 +115,7 @@ impl Painter {
         let read = self.read_change(&loaded, &at, after)?;
         self.replace(&file, &before, &read)?;
         self.history.turn(again);
-        // A saved camera was on screen, and stays there when the save is undone.
+        // A saved camera stays on screen when the save is undone.
         let view = keeps_view.then(|| self.camera.clone().unwrap_or(loaded.camera.clone()));
         let shown_otherwise = self.take_written(read);
         if let (Some(view), Some(loaded)) = (view, &self.loaded) {
@@ -178,7 +174,6 @@ impl Painter {
         Ok(Arc::new(Loaded::new(text, scene, description).with_places(places)))
     }
 
-    /// Writes the text of a valid scene, and shows it.
     fn write(
         &mut self,
         file: &Path,
@@ -207,7 +202,7 @@ impl Painter {
             .map_err(|error| format!("{place}: cannot be written: {error}"))
     }
 
-    /// Takes a scene that this session has written, so that its file is not read again.
+    /// Takes a scene that this session has written, instead of reading it.
     fn take_written(&mut self, read: Arc<Loaded>) -> bool {
         if let Some((_, stamp)) = self.files.first_mut() {
             *stamp = FileStamp::Content(read.text.clone().into_bytes());

@@ -10,7 +10,6 @@ pub const DISPLAY: f64 = 1.0 / 2.2;
 /// Red, green and blue of a range of pixels.
 pub type Rgb = [Vec<f64>; 3];
 
-/// Colors of two images of the same size and kind.
 #[derive(Clone, Debug)]
 pub struct Colors<'a> {
     pub width: usize,
@@ -23,7 +22,7 @@ pub struct Colors<'a> {
 #[derive(Clone, Debug)]
 struct Planes<'a> {
     colors: [&'a Plane; 3],
-    /// Straight alpha, which the colors are not multiplied by yet.
+    /// Straight alpha.
     alpha: Option<&'a Plane>,
 }
 
@@ -65,8 +64,7 @@ impl<'a> Colors<'a> {
         })
     }
 
-    /// Returns part of a row of both images, composited over black. Linear values that are not finite in either image
-    /// are 0 in both.
+    /// Returns part of a row of both images, over black. Linear values not finite in either image are 0 in both.
     pub fn values(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
         let pixels = y * self.width + x.start..y * self.width + x.end;
         let (mut a, mut b) = (self.a.values(pixels.clone()), self.b.values(pixels));
@@ -91,7 +89,7 @@ impl<'a> Colors<'a> {
         (a, b)
     }
 
-    /// Returns true if part of a row is known to be equal in both images; see [`Plane::is_plainly`].
+    /// See [`Plane::is_plainly`].
     pub fn is_plainly_same(&self, y: usize, x: Range<usize>) -> bool {
         let pixels = y * self.width + x.start..y * self.width + x.end;
         let mut planes = self.a.colors.iter().zip(&self.b.colors);

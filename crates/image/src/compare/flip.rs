@@ -199,9 +199,9 @@ fn tone(x: f64) -> f64 {
     (a * x * x + b * x + c) / (d * x * x + e * x + f)
 }
 
-/// Returns the exposures in stops at which linear images are compared. They range from the one that maps the brightest
-/// pixel of the reference to 0.85 to the one that maps the median luminance to 0.85, about one stop apart. If the
-/// median is 0, black pixels are ignored. A black reference has the exposure 0 only.
+/// Returns the exposures in stops for linear images, about one stop apart: from the one that maps the brightest pixel
+/// of the reference to 0.85 to the one of the median luminance. If the median is 0, black pixels are ignored. A black
+/// reference has the exposure 0 only.
 fn exposures(colors: &Colors) -> Vec<f64> {
     let rows = (0..colors.height).into_par_iter();
     let luminances = rows.flat_map_iter(|y| {
@@ -248,7 +248,7 @@ struct Tile {
     height: usize,
 }
 
-/// Three values per pixel of a tile and its filter margin, as separate planes. Pixels beyond the image repeat its edge.
+/// Three planes of a tile and its filter margin. Pixels beyond the image repeat its edge.
 struct Around {
     width: usize,
     values: [Vec<f32>; 3],
@@ -300,7 +300,6 @@ impl Tile {
         errors
     }
 
-    /// Raises the errors to those of two images in opponent colors.
     fn add(&self, a: &Around, b: &Around, filters: &Filters, errors: &mut [f32]) {
         let (lines_a, lines_b) = (
             Lines::across(a, self.width, filters),
@@ -405,8 +404,8 @@ fn color_difference(a: [f32; 3], b: [f32; 3], greatest: f64) -> f64 {
     }
 }
 
-/// A tile filtered horizontally: achromatic, red-green, blue-yellow twice; then the Gaussian of the achromatic channel
-/// and its two derivatives.
+/// A tile filtered horizontally: achromatic, red-green, blue-yellow twice; then Gaussian and two derivatives of the
+/// achromatic channel.
 struct Lines {
     width: usize,
     values: [Vec<f32>; 7],
@@ -439,7 +438,7 @@ impl Lines {
     }
 }
 
-/// A row filtered in both directions: four color results; the first and second derivatives in x, then in y.
+/// A row filtered in both directions: four colors; first and second derivatives in x, then in y.
 struct EdgesAndPoints {
     values: [Vec<f32>; 8],
 }
@@ -490,8 +489,7 @@ fn add(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// Linear value of a displayed value, from the table if it is one of the 256 steps. Other values have been rounded to
-/// `f32`.
+/// Linear value of a displayed one, from the table for the 256 steps. Others have been rounded to `f32`.
 fn screen_to_linear(curve: &[f64; 256], value: f64) -> f64 {
     let step = (value * 255.0 + 0.5) as u8;
     if value as f32 == (f64::from(step) / 255.0) as f32 {

@@ -8,7 +8,7 @@ use super::picture::{Kind, Picture, Plane};
 /// Added to the squared reference in the denominator of the relative error: Rousselle, Knaus and Zwicker, "Adaptive
 /// sampling and reconstruction using greedy error minimization", ACM Trans. Graph. 30 (6), 2011, section 5.
 const EPSILON: f64 = 0.01;
-/// Pixels per work unit. Partial sums are added in order, so the result does not depend on the number of threads.
+/// Pixels per work unit. Partial sums are added in order, whatever the number of threads.
 const CHUNK: usize = 1 << 16;
 
 /// A group of channels that both images have.
@@ -74,7 +74,7 @@ pub struct Difference {
     pub different: u64,
     /// The first of these pixels.
     pub first: Option<PixelCoord>,
-    /// Pixels with a value that differs by more than the threshold, or that is not finite and not bit-identical.
+    /// Pixels with a value that differs by more than the threshold, or that is neither finite nor bit-identical.
     pub beyond: u64,
     /// The largest difference, if it is above 0.
     pub largest: Option<LargestDifference>,
@@ -82,8 +82,8 @@ pub struct Difference {
     pub rmse: f64,
     /// Mean of d² / (b² + 0.01), where b is the value in the second image.
     pub rel_mse: f64,
-    /// 20 log10(peak / rmse) in decibels; infinite for equal images. The peak is 1 for display values, else the maximum
-    /// magnitude in the second image, or 1 if that is 0.
+    /// 20 log10(peak / rmse) in decibels; infinite for equal images. The peak is 1 for display values, else the second
+    /// image's maximum magnitude, or 1 if that is 0.
     pub psnr: f64,
     /// Non-finite values of the first image.
     pub a: Values,
@@ -93,7 +93,7 @@ pub struct Difference {
     pub first_non_finite: Option<PixelCoord>,
 }
 
-/// Returns the layers that both images have, colors first, and the channels that only the first or only the second has.
+/// Returns the layers of both images, colors first, and the channels of only the first or only the second.
 pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a str>, Vec<&'a str>) {
     let mut layers: Vec<Layer> = Vec::new();
     let mut only_a = Vec::new();
@@ -142,7 +142,6 @@ struct DifferenceSums {
     different: u64,
     first: Option<usize>,
     beyond: u64,
-    /// Difference, pixel and channel.
     largest: Option<(f64, usize, usize)>,
     squares: f64,
     relative: f64,

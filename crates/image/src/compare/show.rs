@@ -8,7 +8,7 @@ use super::plain::{COLOR, Layer};
 
 /// Maximum side of a displayed image. Larger images are subsampled by an integer step.
 const LONGEST: usize = 4096;
-/// Smaller images are magnified by an integer factor, up to this size.
+/// Smaller images are magnified up to this size, by an integer factor.
 const SHORTEST: usize = 256;
 /// Minimum width and height of a displayed image.
 const NARROWEST: usize = 16;
@@ -56,8 +56,8 @@ pub fn step(picture: &Picture) -> usize {
     (picture.width.max(picture.height) as usize).div_ceil(LONGEST)
 }
 
-/// Lays out a layer of two images. `error` is the map of [`flip`](super::flip()) with the step of [`step`]. Without it,
-/// the panel shows differences relative to the largest one.
+/// Lays out a layer of two images. `error` is the map of [`flip`](super::flip()) with the step of [`step`]; otherwise
+/// the panel shows relative differences.
 pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option<Map>) -> ErrorImage<'a> {
     let step = step(b);
     let (differing, apart) = layer.maps(b, step);
@@ -171,7 +171,7 @@ impl ErrorImage<'_> {
         (0..self.panel.0).map(pixel).collect()
     }
 
-    /// Returns true if a pixel of the map panel is part of an outline: outside of the marked cells, but close to one.
+    /// Returns true for pixels of outlines: outside of the marked cells, but close to one.
     fn is_line(&self, x: usize, y: usize) -> bool {
         let (wide, high) = (self.cell * self.zoom.0, self.cell * self.zoom.1);
         let thick = (wide.min(high) / 16).max(1);

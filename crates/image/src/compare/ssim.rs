@@ -17,8 +17,7 @@ const C2: f64 = 0.03 * 0.03;
 const TILE: usize = 256;
 
 /// Returns the mean SSIM over all windows and the channels red, green and blue, encoded for display; 1 for equal
-/// images. Windows lie inside the image, except along sides shorter than a window, where they are clipped. `None` if
-/// either image has no colors.
+/// images. Windows lie inside the image, clipped along shorter sides. `None` if either image has no colors.
 pub fn ssim(a: &Picture, b: &Picture) -> Option<f64> {
     let colors = Colors::of(a, b)?;
     let (across, down) = (Axis::of(colors.width), Axis::of(colors.height));
@@ -63,8 +62,8 @@ impl Axis {
         self.first.saturating_sub(RADIUS)..self.side.min(self.first + self.count + RADIUS)
     }
 
-    /// Calls `call` with a range of windows (relative to this axis), the pixels that one tap reads (relative to
-    /// `pixels`) and the weight of the tap. Clipped windows have their own weights and are passed one at a time.
+    /// Calls `call` with a range of windows (relative to this axis), the pixels of a tap (relative to `pixels`) and its
+    /// weight. Clipped windows have their own weights: one at a time.
     fn each(self, mut call: impl FnMut(Range<usize>, Range<usize>, f64)) {
         let kernel: [f64; 2 * RADIUS + 1] = std::array::from_fn(|i| {
             let x = i as f64 - RADIUS as f64;

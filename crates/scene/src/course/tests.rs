@@ -77,7 +77,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Loads a text as a file of this name in the folder `configs`.
+/// Loads a text as a file in the folder `configs`.
 fn load(name: &str, text: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
     let folder = folder();
     let path = folder.path().join("configs").join(name);
@@ -89,7 +89,6 @@ fn near(a: DVec3, b: DVec3) -> bool {
     a.distance(b) < 1e-6
 }
 
-/// Returns center and half size of the bounding box of a shape.
 fn extent(scene: &Scene, shape: usize) -> (DVec3, DVec3) {
     let Geometry::Mesh { mesh, to_world, .. } = &scene.shapes[shape].geometry else {
         panic!("no mesh: {:?}", scene.shapes[shape]);
@@ -359,7 +358,7 @@ fn meshes_lie_in_the_folder_above_or_where_it_is_told() {
     );
 }
 
-/// A fragment of the valid file, an invalid replacement, and the message from the line number on.
+/// Valid fragment, invalid replacement, and the message from the line number on.
 const BAD: &[(&str, &str, &str)] = &[
     // Invalid JSON.
     ("\"spp\": 256,", "\"spp\": 256", "3:3: expected \",\" or \"}\""),

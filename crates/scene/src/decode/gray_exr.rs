@@ -1,5 +1,5 @@
 //! EXR files with one channel of any name, decoded as gray; the crate `image` requires R, G and B. Files with neither
-//! are rejected here, where the channel names are known.
+//! are rejected here.
 
 use std::io::Cursor;
 
@@ -13,8 +13,7 @@ use super::{Channels, DecodeError, Header};
 const COLORS: [&str; 3] = ["R", "G", "B"];
 
 /// Returns the image if the file has one layer with one channel and an optional, ignored `A`; `None` if it is a color
-/// image. Before pixels are decoded, `check_layer` gets the size and the bytes per pixel of each layer, and `check` the
-/// header.
+/// image. First, `check_layer` gets the size and the bytes per pixel of each layer, and `check` the header.
 pub(super) fn gray_exr(
     bytes: &[u8],
     check_layer: impl Fn((u32, u32), u64) -> Result<(), DecodeError>,

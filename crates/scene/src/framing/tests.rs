@@ -3,7 +3,7 @@
 use super::*;
 use crate::{Camera, CameraDescription, Projection};
 
-/// Returns the position of a point in the image, from -1 at the left and lower edges to 1.
+/// Returns a point's position in the image, from -1 at the left and lower edges to 1.
 fn seen(camera: &Camera, aspect: f64, point: DVec3) -> [f64; 2] {
     let Projection::Perspective { fov } = camera.projection else {
         panic!("a perspective camera")
@@ -28,7 +28,7 @@ fn corners(low: [f64; 3], top: [f64; 3]) -> Vec<DVec3> {
     (0..8).map(|i| DVec3::new(side(i, 0), side(i, 1), side(i, 2))).collect()
 }
 
-/// Returns point sets: boxes, flat boxes, lines, a point, and points that are not corners of their bounding box.
+/// Boxes, flat boxes, lines, a point, and points that are not corners of their bounding box.
 fn clouds() -> Vec<Vec<DVec3>> {
     let mut clouds = vec![
         corners([-1.0; 3], [1.0; 3]),

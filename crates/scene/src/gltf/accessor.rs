@@ -14,7 +14,7 @@ use super::json::missing;
 const MAX_ZEROS: u64 = 1 << 22;
 /// Maximum decoded size of such an accessor, in bytes.
 const MAX_ZEROS_BYTES: u64 = 64 << 20;
-/// Overhead per read in bytes, which limits reads of small accessors.
+/// Overhead per read in bytes: limits small reads.
 const BESIDE: u64 = 64;
 
 /// Element type and memory layout of an accessor.
@@ -81,7 +81,7 @@ struct Elements<'a> {
 }
 
 impl Elements<'_> {
-    /// Checks that `count` elements are within `bytes`, which errors call `place`.
+    /// Checks that `count` elements are within `bytes`. Errors name `place`.
     fn in_bytes<'a>(
         key: &str,
         (bytes, place): (&'a [u8], &str),

@@ -17,7 +17,7 @@ const MAX_WEIGHTS: usize = 1 << 24;
 const MAX_NAMED: usize = 5;
 
 impl Document {
-    /// Returns the animations whose properties no earlier one drives. The others are named in `notes`.
+    /// Returns the animations whose properties no earlier one drives. `notes` name the others.
     pub(super) fn compatible(&self, animations: Vec<usize>, notes: &mut Vec<String>) -> Vec<usize> {
         let mut driven = HashSet::new();
         let (mut playing, mut others) = (Vec::new(), Vec::new());
@@ -149,7 +149,7 @@ impl Document {
 }
 
 impl Pose {
-    /// Decomposes the matrix, which the specification forbids on animated nodes.
+    /// Decomposes the matrix, forbidden on animated nodes.
     fn take_apart(&mut self) {
         if let Some(matrix) = self.matrix.take() {
             (self.scale, self.rotation, self.translation) = matrix.to_scale_rotation_translation();
@@ -157,10 +157,8 @@ impl Pose {
     }
 }
 
-/// The keys around a time.
 struct KeyInterval {
     interpolation: Interpolation,
-    /// Key indices.
     keys: [usize; 2],
     /// Interpolation parameter, 0 to 1.
     share: f64,
@@ -222,7 +220,6 @@ impl KeyInterval {
         Some(a.slerp(b, self.share)) // along the shorter arc
     }
 
-    /// Interpolates lists of weights.
     fn list(&self, values: &[[f32; 1]], keys: usize) -> Option<Vec<f32>> {
         let each = self.values(keys);
         let count = values.len() / each;

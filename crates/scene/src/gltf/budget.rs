@@ -3,14 +3,12 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A limited resource.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Resource {
     /// Bytes of accessor reads.
     Read,
     /// Triangles of all meshes, per combination of skin and weights.
     Triangles,
-    /// Instances of meshes.
     Instances,
     /// Bytes of decompressed buffer views.
     Decompressed,
@@ -40,7 +38,6 @@ impl Resource {
     }
 }
 
-/// Resources used by a file.
 #[derive(Debug)]
 pub(super) struct Budget {
     /// Size of the JSON and of the referenced buffers.
@@ -56,7 +53,6 @@ impl Budget {
         }
     }
 
-    /// Returns the limit.
     pub fn most(&self, thing: Resource) -> u64 {
         let (any, (more, of), most) = thing.rates();
         any.saturating_add(self.bytes.saturating_mul(more) / of).min(most)
@@ -66,7 +62,7 @@ impl Budget {
     pub fn take(&self, thing: Resource, count: u64) -> Result<(), String> {
         let most = self.most(thing);
         let taken = &self.taken[thing as usize];
-        // Rejected requests are not counted, so they cannot overflow the counter.
+        // Rejected requests cannot overflow the counter.
         let taking = taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |taken| {
             taken.checked_add(count).filter(|all| *all <= most)
         });

@@ -16,7 +16,6 @@ use super::uri::{self, Folder};
 /// Maximum size of a file, and of all buffers together.
 pub(super) const MAX_BUFFER_BYTES: u64 = 8 << 30;
 
-/// Storage of a buffer.
 enum Bytes {
     /// Unreferenced.
     Unused,
@@ -26,11 +25,9 @@ enum Bytes {
     Read(Vec<u8>),
 }
 
-/// The referenced buffers of a file.
 pub(super) struct Buffers {
     file: Vec<u8>,
     list: Vec<Bytes>,
-    /// Compression of each buffer view.
     compressed: Vec<Option<Compressed>>,
     /// Decompressed buffer views, filled on first use.
     decoded: Vec<OnceLock<Vec<u8>>>,
@@ -38,8 +35,7 @@ pub(super) struct Buffers {
 }
 
 impl Buffers {
-    /// Reads the referenced buffers, and removes data URIs from `root`. `chunk` is the binary chunk of the GLB file
-    /// `file`.
+    /// Reads the referenced buffers, and removes data URIs from `root`. `chunk` is that of the GLB file `file`.
     pub fn read(
         root: &mut Root,
         file: Vec<u8>,
@@ -111,7 +107,6 @@ impl Buffers {
         })
     }
 
-    /// Returns the size of the referenced buffers in bytes.
     pub fn total(&self) -> u64 {
         self.total
     }
@@ -166,7 +161,7 @@ impl Buffers {
         )
     }
 
-    /// Returns a range of a buffer. `key` is for errors.
+    /// `key` is for errors.
     fn part(&self, root: &Root, key: &str, buffer: usize, offset: u64, length: u64) -> Result<&[u8], GltfFault> {
         let bytes = self.buffer(root, buffer)?;
         let end = offset.checked_add(length).filter(|end| *end <= bytes.len() as u64);

@@ -9,7 +9,7 @@ use super::{ImportedCamera, UPRIGHT};
 use crate::{OrthographicDescription, PerspectiveDescription};
 
 impl Document {
-    /// Returns the camera of a node. Its target is at the depth of the centre of the scene bounds.
+    /// The target is at the depth of the centre of the scene bounds.
     pub(super) fn camera(
         &self,
         node: usize,

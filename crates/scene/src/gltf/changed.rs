@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-/// Collects the JSON pointers of all values.
 fn ways(value: &Value, pointer: &mut String, all: &mut Vec<String>) {
     all.push(pointer.clone());
     let length = pointer.len();
@@ -22,7 +21,7 @@ fn ways(value: &Value, pointer: &mut String, all: &mut Vec<String>) {
     }
 }
 
-/// Replaces or removes one value. `below(n)` returns a random number less than `n`.
+/// Replaces or removes one value. `below(n)` is random, less than `n`.
 pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
     let mut all = Vec::new();
     ways(json, &mut String::new(), &mut all);

@@ -27,7 +27,7 @@ pub struct ModelContents {
 }
 
 impl ModelContents {
-    /// Lists the names in a file. Cameras are added by the import, as they are those of one scene.
+    /// Lists the names in a file. The import adds the cameras of one scene.
     pub(super) fn of(document: &Document) -> ModelContents {
         let json = &document.json;
         let file = document.path.file_name().unwrap_or_default();

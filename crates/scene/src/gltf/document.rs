@@ -22,14 +22,12 @@ const SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 /// Maximum size of all image reads in bytes.
 const MAX_IMAGES_BYTES: u64 = 4 << 30;
 
-/// An open file. JSON indices (except in raw extension data) and enumerations are valid, and numbers finite. The node
-/// hierarchy and values are not validated.
+/// An open file. JSON indices (except in raw extension data) and enumerations are valid, and numbers finite; the node
+/// hierarchy and values are unchecked.
 pub(super) struct Document {
     /// JSON without data URIs of buffers.
     pub json: Root,
-    /// Path of the file.
     pub path: PathBuf,
-    /// Warnings for the user.
     pub notes: Vec<String>,
     pub budget: Budget,
     folder: Folder,
@@ -38,7 +36,6 @@ pub(super) struct Document {
     given: AtomicU64,
 }
 
-/// The reason why an image has no bytes.
 enum ImageFault {
     /// Missing or unreadable.
     Missing(String),
@@ -53,7 +50,7 @@ impl From<GltfFault> for ImageFault {
 }
 
 impl Document {
-    /// Opens a file. Other files must be inside `root`. All paths are added to `files`, even on errors.
+    /// Opens a file. Other files must be inside `root`. Adds all paths to `files`, even on errors.
     ///
     /// # Errors
     ///
@@ -115,7 +112,6 @@ impl Document {
         })
     }
 
-    /// Returns an error about a value of the JSON.
     pub fn fault(&self, key: impl Into<String>, message: impl Into<String>) -> GltfError {
         GltfFault::key(key, message).of(&self.path)
     }
@@ -151,7 +147,7 @@ impl Document {
                 GltfFault::key(format!("{key}.extensions.{name}.source"), rule)
             });
         }
-        // In the crate, a missing source is an index out of range.
+        // A missing source is an index out of range.
         match self.json.get(texture.source) {
             Some(_) => Ok(texture.source.value()),
             None => Err(match others.and_then(extension::unknown) {
@@ -216,7 +212,7 @@ impl Document {
         Ok(bytes.into())
     }
 
-    /// Limits the size of an image and of all image reads. A small file may repeat references.
+    /// Limits the size of an image and of all reads: references may repeat.
     fn has_room(&self, index: usize, bytes: u64) -> Result<(), GltfFault> {
         let given = self.given.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
         let fault = |rule: String| Err(GltfFault::key(format!("images[{index}]"), rule));

@@ -115,13 +115,11 @@ pub(super) struct GltfFault {
     pub message: String,
 }
 
-/// A location in a file.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Location {
     File,
     /// In the JSON, from 1.
     Line(usize, usize),
-    /// Byte offset.
     Byte(u64),
     /// Key path in the JSON.
     Key(String),
@@ -162,7 +160,6 @@ impl GltfFault {
     }
 }
 
-/// Elides the middle of a long text.
 fn cut(text: String) -> String {
     let count = text.chars().count();
     if count <= LONGEST {

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use image::{ImageFormat, Rgba, RgbaImage};
 use serde_json::{Value, json};
 
-/// Returns the JSON and the binary chunk of the file.
+/// Returns the JSON and the binary chunk.
 pub fn everything() -> (Value, Vec<u8>) {
     let mut binary = Vec::new();
     let mut views = Vec::new();

@@ -38,7 +38,7 @@ fn is_known(name: &str) -> bool {
     KNOWN.contains(&name)
 }
 
-/// Rejects unsupported extensions that are required or hold the only data of a primitive; notes others.
+/// Rejects required unsupported extensions, or with the only data of a primitive; notes others.
 pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), GltfFault> {
     for (i, name) in root.extensions_required.iter().enumerate() {
         if !is_known(name) {
@@ -84,7 +84,7 @@ fn remedy(name: &str) -> &'static str {
     }
 }
 
-/// Returns the error for data that only an unsupported extension has.
+/// Data that only an unsupported extension has.
 pub(super) fn only_in(key: &str, name: &str) -> GltfFault {
     let rule = "holds its only data and is not supported";
     GltfFault::key(key, format!("{} {rule}{}", shown(name), remedy(name)))

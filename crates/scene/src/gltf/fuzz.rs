@@ -24,7 +24,6 @@ impl Random {
     }
 }
 
-/// Asserts the invariants.
 fn check(imported: &Imported) {
     let all_flat = |note: &String| note.ends_with("their scale is zero");
     assert!(!imported.instances.is_empty() || imported.notes.iter().any(all_flat));
@@ -58,7 +57,7 @@ fn check(imported: &Imported) {
     }
 }
 
-/// Imports a file with several options; returns the number of successes.
+/// Counts successful imports with several options.
 fn read(bytes: &[u8], path: &std::path::Path) -> usize {
     std::fs::write(path, bytes).unwrap();
     let root = path.parent().unwrap();

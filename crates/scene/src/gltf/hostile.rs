@@ -16,7 +16,7 @@ fn read(json: &Value, binary: &[u8]) -> Result<Imported, String> {
     read.map_err(|error| error.to_string().replace(&format!("{}: ", path.display()), ""))
 }
 
-/// Returns a file with one triangle. Accessor 0 has its positions, 1 texture coordinates, 2 normals, and 3 zeros.
+/// Accessor 0 has positions, 1 texture coordinates, 2 normals, and 3 zeros.
 fn triangle(corners: [f32; 9], uvs: [f32; 6]) -> (Value, Vec<u8>) {
     let normals = [0.0, 0.0, 1.0].repeat(3);
     let all = corners.iter().chain(&uvs).chain(&normals);

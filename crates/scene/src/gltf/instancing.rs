@@ -76,7 +76,7 @@ impl Document {
         }
     }
 
-    /// Returns the instance transforms of a node's mesh (EXT_mesh_gpu_instancing), relative to the node.
+    /// Returns the instance transforms of a node (EXT_mesh_gpu_instancing), relative to it.
     pub(super) fn instances(&self, node: usize) -> Result<Vec<DAffine3>, GltfError> {
         let extensions = self.json.nodes[node].extensions.as_ref();
         let Some(extension) = extensions.and_then(|all| all.others.get("EXT_mesh_gpu_instancing")) else {

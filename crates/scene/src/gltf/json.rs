@@ -100,7 +100,6 @@ fn check_size(text: &[u8]) -> Result<(), GltfFault> {
     while let Some(byte) = bytes.next() {
         match byte {
             b'"' => {
-                // Skips the string.
                 while let Some(byte) = bytes.next() {
                     match byte {
                         b'\\' => drop(bytes.next()),
@@ -166,8 +165,8 @@ fn text_of(value: &Value) -> String {
     }
 }
 
-/// Removes `extras`, converts whole floats to integers, and checks that numbers fit 32 bits. The parser limits the
-/// depth. The error is a key path and a rule.
+/// Removes `extras`, converts whole floats to integers, and checks that numbers fit 32 bits. The error is a key path
+/// and a rule.
 fn tidy(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> {
     match value {
         Value::Object(map) => {
@@ -337,7 +336,7 @@ fn is_allowed(path: &str, error: Error) -> bool {
     match error {
         // Checked by `extension::check`.
         Error::Unsupported => is_in("extensionsRequired["),
-        // Accessors without data are zero, bounds are unused, primitives without positions are skipped.
+        // Accessors without data are zero, bounds unused, primitives without positions skipped.
         Error::Missing => {
             is_in("accessors[") && path.ends_with("].bufferView")
                 || is_in("meshes[") && path.contains("attributes[\"POSITION\"]")

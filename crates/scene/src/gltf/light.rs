@@ -10,7 +10,6 @@ use super::document::Document;
 use super::error::{GltfError, plain};
 use crate::{DirectionalLightDescription, LightDescription, PointLightDescription, SpotLightDescription};
 
-/// Maximum colour component in a scene.
 const BRIGHTEST: f64 = 1e6;
 
 #[derive(Deserialize)]
@@ -142,7 +141,7 @@ impl Document {
     }
 }
 
-/// Returns a warning if a white surface at `middle` would be overexposed, as with physical units.
+/// Warns if a white surface at `middle` would be overexposed, as with physical units.
 pub(super) fn brightness(lights: &[LightDescription], middle: DVec3) -> Option<String> {
     /// Maximum radiance without a warning.
     const MOST: f64 = 30.0;

@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 use super::document::Document;
 use super::error::GltfFault;
 
-/// Returns a GLB container with this JSON and this binary chunk.
 pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -26,7 +25,7 @@ pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Reads a file from memory. Its folder does not exist, so it cannot refer to other files.
+/// Reads a file from memory, without other files.
 pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     Document::read(
         bytes,
@@ -36,7 +35,7 @@ pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     )
 }
 
-/// Returns the JSON of a file with one buffer in the container, and these buffer views and accessors.
+/// The JSON has one buffer, in the container.
 pub fn json_of(binary: &[u8], views: Value, accessors: Value) -> Value {
     json!({
         "asset": { "version": "2.0" },
@@ -46,12 +45,11 @@ pub fn json_of(binary: &[u8], views: Value, accessors: Value) -> Value {
     })
 }
 
-/// Returns a document with these buffer views and accessors.
 pub fn document(binary: &[u8], views: Value, accessors: Value) -> Document {
     read(container(&json_of(binary, views, accessors), binary)).unwrap()
 }
 
-/// Returns a document with one accessor, whose buffer view contains all bytes.
+/// The buffer view contains all bytes.
 pub fn accessor(binary: &[u8], accessor: Value) -> Document {
     let views = json!([{ "buffer": 0, "byteLength": binary.len() }]);
     document(binary, views, json!([accessor]))

@@ -26,12 +26,10 @@ pub struct Images {
 
 pub(super) type Textures = BTreeMap<String, TextureDescription>;
 
-/// Maximum emitted radiance in a scene.
+/// Maximum emitted radiance.
 const BRIGHTEST: f64 = 1e6;
-/// Indices of refraction in a scene.
 const IORS: (f64, f64) = (1.0, 100.0);
 
-/// Conversion of a material.
 pub(super) struct Converter<'a> {
     pub document: &'a Document,
     pub place: String,
@@ -254,7 +252,7 @@ impl Converter<'_> {
         Ok(())
     }
 
-    /// Applies the older KHR_materials_pbrSpecularGlossiness. Returns the diffuse colour, alpha and texture.
+    /// Applies KHR_materials_pbrSpecularGlossiness. Returns the diffuse colour, alpha and texture.
     #[allow(clippy::type_complexity, reason = "the two are taken apart at once")]
     fn specular_glossiness(
         &mut self,
@@ -336,7 +334,7 @@ impl Converter<'_> {
         })
     }
 
-    /// Returns the name of a texture with a factor, adding it if new.
+    /// Returns the name of a texture, adding it if new.
     fn texture(&mut self, slot: &Slot, encoding: Encoding, factor: [f64; 4]) -> Result<String, GltfError> {
         let file = self.image(slot)?;
         let mut lookup = self.document.lookup(slot, &self.place, &file, encoding)?;
@@ -405,7 +403,7 @@ impl Converter<'_> {
         })
     }
 
-    /// Clamps to the range 0 to 1, with a note.
+    /// Clamps to 0 to 1, with a note.
     fn share(&mut self, key: &str, x: f64) -> Result<f64, GltfError> {
         let [x, _, _] = self.colors(key, [x, 0.0, 0.0], 1.0)?;
         Ok(x)
@@ -415,7 +413,7 @@ impl Converter<'_> {
         self.colors(key, color, 1.0)
     }
 
-    /// Clamps to the range 0 to `most`, with a note.
+    /// Clamps to 0 to `most`, with a note.
     fn colors(&mut self, key: &str, color: [f64; 3], most: f64) -> Result<[f64; 3], GltfError> {
         if color.iter().any(|x| x.is_nan()) {
             return Err(self.document.fault(&self.place, format!("{key}: must be finite")));

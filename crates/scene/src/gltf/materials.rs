@@ -15,7 +15,6 @@ use crate::{PrincipledDescription, VertexColors};
 /// Maximum length of a name in characters; all instances store it.
 const MAX_NAME_LEN: usize = 200;
 
-/// The materials in use.
 pub struct Materials<'a> {
     document: &'a Document,
     variant: Option<usize>,
@@ -45,7 +44,7 @@ impl<'a> Materials<'a> {
         }
     }
 
-    /// Returns the index of a primitive's material, which becomes used.
+    /// The material becomes used.
     pub fn number(&mut self, primitive: &Primitive, place: &str, is_colored: bool) -> Result<usize, GltfError> {
         let index = self.index(primitive);
         let count = self.document.json.materials.len();
@@ -71,7 +70,6 @@ impl<'a> Materials<'a> {
         &self.used[number]
     }
 
-    /// Returns a primitive's material in the file, by variant.
     fn index(&self, primitive: &Primitive) -> Option<usize> {
         let extension = || primitive.extensions.as_ref()?.others.get("KHR_materials_variants");
         let mappings = || extension()?.get("mappings")?.as_array();

@@ -19,14 +19,13 @@ use super::vertices::{Frames, Source, attribute};
 use super::{Damage, MAX_AXIS_LENGTH};
 use crate::mesh::{Group, MAX_COORDINATE, Mesh, RawMesh, unit};
 
-/// Identity of a mesh.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
     pub mesh: usize,
     pub skin: Option<usize>,
     /// Bits of the node's own morph weights.
     weights: Option<Vec<u32>>,
-    /// Bits of a transform with an axis too short or too long for an instance, which is applied to the vertices.
+    /// Bits of a transform of the vertices, with an axis too short or too long for an instance.
     flat: Option<[u64; 12]>,
 }
 
@@ -41,7 +40,6 @@ impl Key {
         }
     }
 
-    /// Returns the key with a transform of the vertices.
     pub fn at(&self, map: &DAffine3) -> Key {
         Key {
             flat: Some(map.to_cols_array().map(f64::to_bits)),
@@ -73,7 +71,6 @@ impl Key {
     }
 }
 
-/// A mesh, and its groups' materials.
 pub struct BuiltMesh {
     pub mesh: Mesh,
     pub materials: Vec<usize>,
@@ -88,9 +85,9 @@ pub struct Meshes<'a> {
     /// First primitive that lacks a texture coordinate set, and the set.
     bare: Option<(String, u32)>,
     bare_count: usize,
-    /// First primitive with non-finite values, and their number, by attribute.
+    /// First primitive with non-finite values and their number, by attribute.
     non_finite: Mutex<BTreeMap<&'static str, (String, usize)>>,
-    /// First primitive with triangles without valid positions, and the number of these triangles.
+    /// First primitive with triangles without valid positions, and their number.
     unplaced: Mutex<Option<(String, usize)>>,
 }
 
@@ -223,7 +220,6 @@ impl<'a> Meshes<'a> {
         }
     }
 
-    /// Records triangles without valid positions.
     fn lacks_positions(&self, place: &str, triangles: usize) {
         if triangles == 0 {
             return;
@@ -237,12 +233,10 @@ impl<'a> Meshes<'a> {
         }
     }
 
-    /// Records an attribute with non-finite values.
     fn record_non_finite(&self, place: &str, name: &'static str) {
         let mut non_finite = self.non_finite.lock().unwrap_or_else(PoisonError::into_inner);
         let (first, count) = non_finite.entry(name).or_insert_with(|| (place.to_owned(), 0));
         *count += 1;
-        // In any order, as above.
         if (place.len(), place) < (first.len(), first.as_str()) {
             place.clone_into(first);
         }
@@ -336,7 +330,6 @@ impl<'a> Meshes<'a> {
     }
 }
 
-/// A mesh under construction.
 #[derive(Default)]
 struct MeshBuilder {
     draft: RawMesh,
@@ -439,7 +432,7 @@ impl MeshBuilder {
         Ok(())
     }
 
-    /// Generates missing tangents. The primitive gets its own vertices, split where tangents differ.
+    /// Generates missing tangents, with own vertices, split where tangents differ.
     fn with_tangents(
         &mut self,
         part: &Part,
@@ -516,7 +509,6 @@ impl MeshBuilder {
     }
 }
 
-/// Returns the accessors of a primitive, and their uses.
 fn accessors(primitive: &Primitive) -> Vec<usize> {
     let none = usize::MAX;
     let attributes = primitive.attributes.iter();

@@ -187,7 +187,6 @@ impl Imported {
         points.collect()
     }
 
-    /// Returns the corners of the instances' bounding boxes.
     fn corners(&self) -> Vec<DVec3> {
         let corners = self.instances.par_iter().map(|placed| {
             let corners = self.meshes[placed.mesh].corners();
@@ -199,7 +198,7 @@ impl Imported {
     }
 }
 
-/// Returns the message about an unavailable selection, with the available ones.
+/// Returns the message about an unavailable selection.
 pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String {
     const MOST: usize = 20;
     let listed = |(i, name): (usize, &Option<&str>)| match name {
@@ -264,7 +263,6 @@ pub fn load(
 /// Length and modification time.
 type FileStamp = Option<(u64, SystemTime)>;
 
-/// A cached import.
 struct CachedImport {
     path: PathBuf,
     root: PathBuf,

@@ -6,7 +6,6 @@ use gltf_json::scene::Node;
 use super::document::Document;
 use super::error::GltfError;
 
-/// Transform and morph weights of a node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose {
     pub translation: DVec3,
@@ -41,7 +40,7 @@ impl Pose {
     }
 }
 
-/// Normalizes a quaternion; zero becomes the identity.
+/// Zero becomes the identity.
 pub fn quaternion(of: [f32; 4]) -> DQuat {
     let of = DQuat::from_array(of.map(f64::from));
     let length = of.length();

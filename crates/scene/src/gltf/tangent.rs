@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use super::texture::Slot;
 
-/// Vertices with generated tangents.
 pub struct TangentVertices {
     pub triangles: Vec<[u32; 3]>,
     /// Original index of each vertex.
@@ -61,7 +60,6 @@ impl Geometry for Corners<'_> {
     }
 }
 
-/// Generates the tangents of a primitive.
 pub fn generated(
     positions: &[DVec3],
     normals: &[Vec3],
@@ -117,9 +115,8 @@ struct Part {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Partitions triangles for threads. A tangent only depends on triangles that share a vertex.
+/// Partitions triangles for threads: tangents only depend on triangles that share a vertex.
 fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> Vec<Part> {
-    /// Maximum triangles of a part.
     const MOST: usize = 1 << 16;
     if triangles.len() <= MOST {
         return vec![Part {
@@ -168,9 +165,8 @@ fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32;
     chunks.into_par_iter().map(part).collect()
 }
 
-/// Rotates a file's tangent back by the texture transform. The renderer rotates normal maps with their texture; in
-/// glTF the tangent frame ignores the transform. For the second row (x, y) of the transform, the tangent t and the
-/// bitangent b, the result is y t - x b up to a factor.
+/// Rotates a file's tangent back by the texture transform: the renderer rotates normal maps with their texture, glTF
+/// does not. With the transform's second row (x, y), tangent t and bitangent b, the result is y t - x b up to a factor.
 pub fn unturned(tangent: Vec4, normal: Vec3, slot: &Slot) -> Vec4 {
     if !slot.is_turned() {
         return tangent;

@@ -23,7 +23,6 @@ pub(super) const LAST_SET: u32 = 7;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slot {
     pub texture: usize,
-    /// Texture coordinate set.
     pub set: u32,
     pub transform: Transform,
 }
@@ -49,7 +48,6 @@ impl Default for Transform {
     }
 }
 
-/// A texture of an extension.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Info {
@@ -62,7 +60,6 @@ struct Info {
 }
 
 impl Slot {
-    /// Returns a core texture.
     pub fn new(
         document: &Document,
         place: &str,
@@ -119,8 +116,7 @@ impl Slot {
 }
 
 impl Document {
-    /// Returns the lookup. v of the first row is 0 in glTF and 1 here, so the transform is flipped like the mesh's
-    /// coordinates.
+    /// Returns the lookup. v of the first row is 0 in glTF and 1 here: flips the transform like the mesh's coordinates.
     pub(super) fn lookup(
         &self,
         slot: &Slot,
@@ -168,7 +164,7 @@ impl Document {
     }
 }
 
-/// Returns true for images with alpha. Unreadable ones are reported by the decoder.
+/// The decoder reports unreadable images.
 pub(super) fn has_alpha(bytes: &[u8]) -> bool {
     if let Some(has_alpha) = ktx2::has_alpha(bytes) {
         return has_alpha;

@@ -66,9 +66,8 @@ impl From<UriError> for String {
 
 #[derive(Clone, Debug)]
 pub(super) struct Folder {
-    /// Folder of the model, which paths are relative to.
+    /// Folder that paths are relative to.
     pub folder: PathBuf,
-    /// Asset root.
     pub root: PathBuf,
 }
 
@@ -123,7 +122,6 @@ fn scheme(uri: &str) -> Option<&str> {
     is_scheme.then_some(scheme)
 }
 
-/// Reads a regular file of at most `most` bytes.
 pub(super) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     // Checked first: opening a pipe waits for a writer.
     if !fs::metadata(path)?.is_file() {

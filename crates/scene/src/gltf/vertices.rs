@@ -10,10 +10,9 @@ use super::skin::Skin;
 use super::texture::LAST_SET;
 use crate::mesh::unit;
 
-/// The maximum number of vertices of a mesh, including those without a triangle.
+/// Maximum vertices of a mesh, used or not.
 const MAX_VERTICES: usize = 1 << 27;
 
-/// The sets of texture coordinates by their names.
 const TEXCOORDS: [&str; LAST_SET as usize + 1] = [
     "TEXCOORD_0",
     "TEXCOORD_1",
@@ -30,14 +29,13 @@ pub struct Source<'a> {
     document: &'a Document,
     primitive: &'a Primitive,
     place: &'a str,
-    /// Is called with the names of attributes that are not finite.
+    /// Called with names of non-finite attributes.
     report: &'a dyn Fn(&'static str),
     positions: Vec<Vec3>,
 }
 
 impl<'a> Source<'a> {
-    /// Reads the positions; `None` if the primitive has none. `first` is the number of vertices that the mesh has
-    /// before.
+    /// Reads the positions, if any. `first` is the number of vertices before.
     pub fn of(
         document: &'a Document,
         (primitive, place): (&'a Primitive, &'a str),
@@ -61,7 +59,6 @@ impl<'a> Source<'a> {
         Ok(Some(source))
     }
 
-    /// Returns the number of vertices.
     pub fn count(&self) -> usize {
         self.positions.len()
     }
@@ -80,7 +77,6 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// Reads a set of texture coordinates.
     pub fn uvs(&self, set: u32) -> Result<Option<Vec<[f32; 2]>>, GltfError> {
         self.read(TEXCOORDS[set as usize], Semantic::TexCoords(set))
     }
@@ -106,7 +102,7 @@ impl<'a> Source<'a> {
         ))
     }
 
-    /// Reads an attribute. Values that are not finite are reported.
+    /// Reads an attribute, reporting non-finite values.
     fn read<const N: usize>(&self, name: &'static str, semantic: Semantic) -> Result<Option<Vec<[f32; N]>>, GltfError> {
         let Some(accessor) = attribute(self.primitive, semantic) else {
             return Ok(None);
@@ -119,7 +115,6 @@ impl<'a> Source<'a> {
         Ok(Some(vectors))
     }
 
-    /// Reads the displacements of a morph target.
     fn displacements(&self, accessor: Option<usize>) -> Result<Option<Vec<Vec3>>, GltfError> {
         let Some(accessor) = accessor else { return Ok(None) };
         let vectors = vectors(self.document, accessor)?;
@@ -142,7 +137,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Positions, normals and tangents, which morph targets, skins and transforms change together.
+/// Vectors that morph targets, skins and transforms change together.
 pub struct Frames {
     positions: Vec<Vec3>,
     pub normals: Option<Vec<Vec3>>,
@@ -151,7 +146,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Adds the displacements of the morph targets, each with its weight.
+    /// Adds the weighted displacements of morph targets.
     pub fn morph(&mut self, source: &Source, weights: &[f32]) -> Result<(), GltfError> {
         for (target, weight) in source.primitive.targets.iter().flatten().zip(weights) {
             if *weight == 0.0 {
@@ -174,7 +169,7 @@ impl Frames {
         Ok(())
     }
 
-    /// Transforms all vertices by the skin, and by a transform if there is one. Returns the positions.
+    /// Transforms all vertices by the skin and the transform, if any. Returns the positions.
     pub fn place(
         &mut self,
         source: &Source,
@@ -196,7 +191,7 @@ impl Frames {
         Ok(placed)
     }
 
-    /// Transforms a vertex. Normals are transformed by the cofactors, which flat transforms have too.
+    /// Transforms a vertex, its normal by the cofactors, which flat transforms have too.
     fn transform(&mut self, transform: &DAffine3, i: usize, position: &mut DVec3) {
         let DMat3 { x_axis, y_axis, z_axis } = transform.matrix3;
         *position = transform.transform_point3(*position);
@@ -216,7 +211,6 @@ impl Frames {
     }
 }
 
-/// Returns the accessor of an attribute, if the primitive has it.
 pub fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<usize> {
     let accessor = primitive.attributes.get(&Checked::Valid(semantic));
     accessor.map(|accessor| accessor.value())

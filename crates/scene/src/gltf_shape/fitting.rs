@@ -8,7 +8,7 @@ use super::super::texture::{levels, words};
 use super::super::validate::TEXEL_MEMORY;
 use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
 
-/// Maximum number of decoded texels, and the addition per byte of the files. Bounds the decoding time.
+/// Maximum number of decoded texels, and addition per byte of the files: bounds the time.
 const TEXELS: (u64, u64) = (1 << 28, 64);
 /// Memory reserved for other textures and the environment, in bytes.
 const OTHERS: u64 = 128 << 20;
@@ -33,8 +33,7 @@ impl ImportedImage {
     }
 }
 
-/// Returns the maximum side length that fits, and the memory in bytes at full size; `None` if that fits. The error is
-/// the rule.
+/// Returns the maximum side that fits, and the bytes in full; `None` if that fits. The error is the rule.
 pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option<(u32, u64)>, String> {
     let kept = kept(description, assets);
     let texels = |of: &ImportedImage| u64::from(of.header.width) * u64::from(of.header.height) * of.times;
@@ -91,11 +90,10 @@ fn kept(description: &Description, assets: &Assets) -> Vec<ImportedImage> {
     kept.collect()
 }
 
-/// Returns the header. Unreadable images are reported by the decoder.
+/// The decoder reports unreadable images.
 fn header(bytes: &[u8]) -> Option<Header> {
     let format = Format::of(bytes)?;
     let seen = Cell::new(None);
-    // Stops after the header.
     let _ = decode(bytes, format, |header| {
         seen.set(Some(header));
         Err(String::new())

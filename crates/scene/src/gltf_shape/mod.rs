@@ -27,15 +27,14 @@ use crate::note::Note;
 pub struct ExpandedScene {
     pub description: Description,
     pub assets: Assets,
-    /// Warnings for the user.
     pub notes: Vec<Note>,
-    /// The imports, which must outlive the scene.
+    /// Must outlive the scene.
     pub imported: Vec<Arc<Imported>>,
     origins: Vec<Origin>,
     /// Number of shapes per file.
     numbers: BTreeMap<String, usize>,
     prefixes: BTreeSet<String>,
-    /// Imported parts plus [`SHAPE`] per shape: all, and of repeated files.
+    /// Imported parts plus [`SHAPE`] per shape: of all files, and of repeated ones.
     brought: [usize; 2],
 }
 
@@ -46,7 +45,6 @@ const MAX_REPEATED_IMPORTS: usize = 1 << 18;
 /// Cost of a shape in these counts.
 const SHAPE: usize = 16;
 
-/// Parts of a shape.
 struct Origin {
     shape: usize,
     /// Prefix of the names of meshes, materials and textures.
@@ -231,7 +229,7 @@ impl ExpandedScene {
         }
     }
 
-    /// Returns the scene's names of a file's materials, some overridden by the shape.
+    /// Returns the names of a file's materials, some overridden.
     fn materials(&mut self, gltf: &GltfDescription, imported: &Imported, prefix: &str) -> Result<Vec<String>, Problem> {
         let known: BTreeSet<&str> = imported.materials.iter().map(|material| &*material.name).collect();
         for (name, own) in &gltf.materials {

@@ -8,7 +8,7 @@ use crate::error::SceneError;
 use crate::parse::{NOT_UTF8, encoding, syntax_error};
 use wgray_image::blocking_path;
 
-/// Maximum size of a scene file in bytes: far above any that people write, far below the memory of a machine.
+/// Maximum size of a scene file in bytes: far above handwritten ones, far below the memory.
 const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// Returns the folder of a file.

@@ -37,7 +37,7 @@ impl GltfChoice {
         chosen.map(|(_, name)| name)
     }
 
-    /// Converts an error: one of the file, or of the option that selects something the file does not have.
+    /// Converts an error of the file, or of the option that selects something missing.
     pub(super) fn error(&self, error: GltfError) -> SceneError {
         let given = |option: &str| match option {
             "gltf_scene" => self.scene.is_some(),

@@ -26,7 +26,7 @@ pub fn is_gltf(name: &Path) -> bool {
 }
 
 impl Scene {
-    /// Returns true if a glTF file of the scene has animations, of which [`GltfChoice::time`] selects the time.
+    /// Returns true if a glTF file of the scene has animations, for [`GltfChoice::time`].
     pub fn has_animations(&self) -> bool {
         self.imported.iter().any(|imported| imported.animations > 0)
     }
@@ -42,7 +42,7 @@ impl Scene {
     }
 }
 
-/// Describes a glTF file as a scene. The caller keeps the imported file alive until the scene has it.
+/// Describes a glTF file as a scene. The caller keeps the import alive until the scene has it.
 pub(crate) fn describe(
     path: &Path,
     overrides: &Overrides,
@@ -121,8 +121,7 @@ pub(crate) fn describe(
     Ok((description, imported))
 }
 
-/// Makes the orbit of a camera horizontal: `up` becomes +z unless the view is vertical. That of glTF cameras is
-/// perpendicular to the view.
+/// Makes orbits horizontal: `up` becomes +z unless the view is vertical. In glTF, it is perpendicular to the view.
 fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
     let (position, look_at, up) = match &mut camera {
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, &mut camera.up),
@@ -150,7 +149,6 @@ fn chosen<'a>(
     found.map(Some).ok_or_else(unknown)
 }
 
-/// Returns the image size for an aspect ratio.
 fn size(aspect: Option<f64>) -> (u32, u32) {
     let side = |ratio: f64| (f64::from(SIDE) * ratio).round().clamp(1.0, f64::from(SIDE)) as u32;
     match aspect {

@@ -93,7 +93,6 @@ impl Scene {
     }
 }
 
-/// Loads a glTF file as a scene.
 fn load_gltf(
     path: &Path,
     overrides: &Overrides,
@@ -105,7 +104,7 @@ fn load_gltf(
         description = description.defined(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
-    // Messages about the shape are about the file, whose name precedes them.
+    // Errors of the shape are those of the file.
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let place = format!("{name}: ");
     let own = |message: &str| {
@@ -137,7 +136,6 @@ fn load_gltf(
     Ok((scene, description))
 }
 
-/// Loads a mesh file as a scene.
 fn load_mesh(
     path: &Path,
     overrides: &Overrides,
@@ -208,9 +206,8 @@ impl<'a> PendingScene<'a> {
         draft.overridden()
     }
 
-    /// Parses a text that differs from that of `before` only in the table at the first two segments of a path. If this
-    /// table has its own header, only it is parsed again. Also returns the locations of the parts of the text, if they
-    /// were found.
+    /// Parses a text that differs from that of `before` only in the table at the first two segments of a path; only
+    /// this table if it has a header. Also returns the locations of the parts, if found.
     pub fn change(
         text: &'a str,
         origin: &'a str,
@@ -230,7 +227,7 @@ impl<'a> PendingScene<'a> {
             defines,
             description: change.description,
         };
-        // Overrides of values outside of the parts are still applied, unless these were parsed again.
+        // Overrides outside of the parts are still applied, unless parsed again.
         if change.is_rest {
             draft = draft.overridden()?;
         }

@@ -17,7 +17,7 @@ use crate::{
     MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed, is_gltf,
 };
 
-/// Default length of the longer side of the image in pixels, and default number of samples per pixel.
+/// Defaults: longer side of the image in pixels, and samples per pixel.
 pub(super) const SIDE: u32 = 720;
 const SAMPLES: u32 = 32;
 /// Radiance of the background: middle gray.
@@ -26,8 +26,8 @@ const BACKGROUND: DVec3 = DVec3::splat(0.18);
 /// Maximum number of vertices that are framed one by one.
 const MAX_POINTS: usize = 1 << 20;
 
-/// Extensions of mesh files, and the up axis of most files of each format. None of the formats defines one: OBJ and PLY
-/// files are mostly made for viewers with +y up, and STL files for 3D printers with +z up.
+/// Extensions of mesh files, and their usual up axis, as the formats define none: +y of viewers for OBJ and PLY, +z of
+/// 3D printers for STL.
 const MESHES: [(&str, Up); 3] = [("obj", Up::Y), ("ply", Up::Y), ("stl", Up::Z)];
 
 /// Extensions of unsupported files, and the advice about them.
@@ -54,8 +54,7 @@ pub fn is_mesh(name: &Path) -> bool {
     up(name).is_some()
 }
 
-/// Returns true if the extension is that of a model, a glTF file or a mesh file, which is rendered without a scene
-/// file.
+/// Returns true for the extensions of models, glTF or mesh files, which need no scene file.
 pub fn is_model(name: &Path) -> bool {
     is_gltf(name) || is_mesh(name)
 }
@@ -159,8 +158,7 @@ pub(super) fn scene(
     description
 }
 
-/// Returns the light of models that have none. The camera sees gray instead of the studio, unless an environment is
-/// selected.
+/// Returns the light of models that have none. The camera sees gray, unless an environment is selected.
 pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, SceneError> {
     if overrides
         .integrator
@@ -175,7 +173,7 @@ pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, Sc
     })
 }
 
-/// Returns the vertices in the file's coordinates, or the corners of their bounding box if they are many.
+/// Returns the vertices in the file's coordinates, or their bounding box's corners if many.
 fn points(mesh: &Arc<Mesh>) -> Vec<DVec3> {
     match mesh.positions.len() <= MAX_POINTS {
         true => (mesh.positions.iter())
@@ -185,7 +183,7 @@ fn points(mesh: &Arc<Mesh>) -> Vec<DVec3> {
     }
 }
 
-/// Converts a problem of the scene that describes a mesh file into an error of that file.
+/// Converts a problem of the scene into an error of its mesh file.
 pub(super) fn error_of(path: &Path, problem: Problem) -> SceneError {
     SceneError::Mesh(MeshError::File {
         path: path.to_owned(),

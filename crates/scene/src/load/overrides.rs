@@ -36,10 +36,10 @@ pub struct Overrides {
     pub max_depth: Option<u32>,
     /// Folder that must contain all files of the scene; `None` is the folder of the scene file.
     pub asset_root: Option<PathBuf>,
-    /// Frame of an animated camera; `None` is the camera of the file outside of its path, or the first key of the path.
+    /// Frame of an animated camera; `None` is the camera outside of its path, or the first key.
     pub frame: Option<f64>,
-    /// The environment, for [`Integrator::Path`]. Its visibility to the camera is not changed. A file with an absolute
-    /// path may be anywhere.
+    /// The environment, for [`Integrator::Path`]. Keeps its visibility to the camera. A file with an absolute path may
+    /// be anywhere.
     pub environment: Option<EnvironmentDescription>,
     /// The background.
     pub background: Option<Background>,
@@ -47,10 +47,10 @@ pub struct Overrides {
     pub view_transform: Option<ViewTransform>,
     /// The exposure in stops, -100 to 100.
     pub exposure: Option<f64>,
-    /// Number of frames of an orbit around the point that the camera looks at, 1 to 100,000, instead of the path of the
-    /// camera. [`Overrides::frame`] selects one of them, from 1.
+    /// Number of frames of an orbit around the look-at point, 1 to 100,000, instead of the camera's path.
+    /// [`Overrides::frame`] selects one, from 1.
     pub turntable: Option<u32>,
-    /// If true, damage to a file of the scene is an error; otherwise it is a warning and a placeholder is rendered.
+    /// Damage to a file is an error, instead of a warning and a placeholder.
     pub strict: bool,
     /// Presentation of a model file without a scene.
     pub presentation: Presentation,
@@ -189,7 +189,7 @@ impl Overrides {
         if let Some(frame) = self.frame {
             scene.camera = scene.camera_at(frame)?;
         }
-        // The user may have asked for the default count, which validation does not notice.
+        // Validation does not notice a requested default count.
         let is_asked = self.light_samples.is_some() && scene.render.integrator.follows_paths();
         if is_asked && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
             scene.notes.push(LIGHT_SAMPLES.into());
@@ -271,7 +271,7 @@ light_samples = { pattern = 'random', count = 5 }
         assert_eq!(message(None, 0), "max_depth: 0 must be from 1 to 64");
         assert_eq!(message(phong, 65), "max_depth: 65 must be from 1 to 64");
         assert_eq!(message(path, 1025), "max_depth: 1025 must be from 0 to 1024");
-        // Without a pattern of their own, samples use the default pattern of the integrator.
+        // The default pattern depends on the integrator.
         let samples = |integrator| {
             let overrides = Overrides {
                 integrator,

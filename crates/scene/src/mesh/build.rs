@@ -127,7 +127,6 @@ fn round(mesh: &mut Mesh, positions: &[DVec3]) {
     mesh.positions = positions.iter().map(rounded).collect();
 }
 
-/// Returns the vertices in use.
 fn used(triangles: &[[u32; 3]], vertices: usize) -> Vec<bool> {
     let mut used = vec![false; vertices];
     for vertex in triangles.iter().flatten() {
@@ -171,8 +170,8 @@ fn repeat<T: Copy>(list: &mut Vec<T>, vertex: usize) {
     }
 }
 
-/// Returns the centre, rounded to a grid with the extent, rounded up to a power of 2, as cell size. Meshes around the
-/// origin keep their coordinates, and no coordinate needs more bits.
+/// Returns the centre, rounded to a grid whose cell is the extent, rounded up to a power of 2. Meshes around the origin
+/// keep their coordinates, and none needs more bits.
 fn center(positions: impl Iterator<Item = DVec3>) -> DVec3 {
     let (low, high) = positions.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
         (low.min(p), high.max(p))

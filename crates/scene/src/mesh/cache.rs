@@ -6,16 +6,14 @@ use std::sync::{Arc, PoisonError, RwLock, Weak};
 
 use super::Mesh;
 
-/// Values computed from the mesh that contains the cache, one per type. Comparisons ignore the cache, and clones of the
-/// mesh have an empty one.
+/// Values computed from the mesh that contains the cache, one per type. Comparisons ignore it, and clones are empty.
 #[derive(Debug, Default)]
 pub(super) struct Cache(RwLock<Values>);
 
 #[derive(Debug, Default)]
 struct Values {
-    /// The mesh that they were computed from. While this weak reference exists `Arc::get_mut` fails, and a mesh that is
-    /// moved out of its `Arc` to be edited is at another address afterwards; so the values are current where the
-    /// addresses agree.
+    /// Their mesh. While this weak reference exists `Arc::get_mut` fails, and a mesh moved out of its `Arc` gets
+    /// another address: values are current where addresses agree.
     mesh: Weak<Mesh>,
     by_type: HashMap<TypeId, Arc<dyn Any + Send + Sync>>,
 }
@@ -30,8 +28,7 @@ impl Values {
 }
 
 impl Cache {
-    /// Returns the value of this mesh, in which the cache is. No lock is held while it is computed, because the threads
-    /// that compute it may need it as well.
+    /// `mesh` contains the cache. No lock is held during the computation, whose threads may need it as well.
     pub fn get_or_init<T: Any + Send + Sync>(&self, mesh: &Arc<Mesh>, compute: impl FnOnce() -> T) -> Arc<T> {
         if let Some(value) = self.0.read().unwrap_or_else(PoisonError::into_inner).get(mesh) {
             return value;

@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::{MAX_COLOR, MAX_COORDINATE, MOST, Mesh};
 
-/// Maximum deviation of the length of a unit vector from 1.
+/// Maximum deviation of a unit vector's length.
 const UNIT_TOLERANCE: f32 = 1e-3;
 
-/// Returns the first rule that the mesh breaks, as the field, the value and the rule.
+/// Returns the first broken rule, as field, value and rule.
 pub(super) fn check(mesh: &Mesh) -> Result<(), String> {
     let vertices = mesh.positions.len();
     if mesh.triangles.is_empty() {
@@ -79,7 +79,7 @@ fn groups(mesh: &Mesh) -> Result<(), String> {
     })
 }
 
-/// Checks a list that is empty or has an element for each vertex.
+/// For a list that is empty or of vertices.
 fn of_vertices<T: Sync>(
     name: &str,
     list: &[T],
@@ -95,7 +95,7 @@ fn of_vertices<T: Sync>(
     each(name, list, rule)
 }
 
-/// Returns the message of the first element that breaks the rule.
+/// The error is that of the first element.
 fn each<T: Sync>(name: &str, list: &[T], rule: impl Fn(&T) -> Option<String> + Sync) -> Result<(), String> {
     let broken = |(i, element): (usize, &T)| rule(element).map(|message| format!("{name}[{i}]: {message}"));
     match list.par_iter().enumerate().find_map_first(broken) {

@@ -12,7 +12,6 @@ pub(super) const LINE: &str = "the line was ignored";
 pub(super) const END: &str = "the facets up to there are used";
 pub(super) const REST: &str = "the other values were ignored";
 
-/// The damage to a file, by its stand-ins.
 #[derive(Default)]
 pub(super) struct Damages(Vec<Damage>);
 
@@ -23,7 +22,7 @@ struct Damage {
 }
 
 impl Damages {
-    /// Records damage. The message is made for the first of a kind only.
+    /// The message is made for the first of a kind only.
     #[cold]
     pub fn add(&mut self, stand_in: &'static str, fault: impl FnOnce() -> MeshFault) {
         match self.0.iter_mut().find(|damage| damage.stand_in == stand_in) {
@@ -42,7 +41,6 @@ impl Damages {
         (self.0.into_iter().map(|damage| damage.first).collect(), notes)
     }
 
-    /// Returns the fault that was recorded first.
     pub fn first(&self) -> Option<&MeshFault> {
         self.0.first().map(|damage| &damage.first)
     }

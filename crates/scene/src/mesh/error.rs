@@ -86,7 +86,6 @@ pub(crate) struct MeshFault {
     pub is_empty: bool,
 }
 
-/// A location in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Location {
     File,

@@ -5,14 +5,13 @@ use super::MtlMaterial;
 use super::error::{MeshFault, shown};
 use super::tokens::{Tokens, number};
 
-/// Maximum number of materials of a file. A material takes hundreds of bytes in memory but as few as nine in the file.
+/// Maximum number of materials of a file, which take hundreds of bytes in memory but as few as nine in the file.
 pub(super) const MAX_MATERIALS: usize = 1 << 16;
 /// Maximum number of reported invalid lines.
 const MAX_PROBLEMS: usize = 100;
-/// Maximum number of reported statements without effect per material.
+/// Maximum number of reported ineffective statements per material.
 const MAX_IGNORED: usize = 16;
 
-/// The contents of an MTL file.
 #[derive(Debug, Default)]
 pub(super) struct Mtl {
     pub materials: Vec<MtlMaterial>,
@@ -161,7 +160,6 @@ fn ignore(material: &mut MtlMaterial, what: String, line: usize) {
     }
 }
 
-/// Splits a map's arguments into file and options.
 fn map_file(line: &str) -> (String, Vec<String>) {
     let mut words = line.split(' ').peekable();
     let mut options = Vec::new();

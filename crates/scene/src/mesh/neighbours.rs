@@ -6,7 +6,6 @@ use glam::Vec3;
 use hashbrown::{DefaultHashBuilder, HashTable};
 use rayon::prelude::*;
 
-/// The points of a mesh and their adjacent triangles.
 pub(super) struct Neighbours {
     /// Point of each vertex.
     pub points: Vec<u32>,
@@ -63,7 +62,6 @@ impl Neighbours {
                         let repeated = self.repeated(triangles, group_of, point);
                         if !repeated.is_empty() {
                             (crowded, turned) = self.odd(triangles, point, &repeated, &mut others);
-                            // Each duplicate is reported at its lowest point.
                             let lowest = |triangle: &u32| self.points_of(triangles, *triangle).iter().min().copied();
                             edges
                                 .repeated
@@ -149,7 +147,7 @@ impl Neighbours {
 pub(super) struct Edges {
     /// Edges of more than two triangles.
     pub crowded: usize,
-    /// Edges with the same direction in both triangles.
+    /// Same direction in both triangles.
     pub turned: usize,
     /// Repeat an earlier triangle's points, winding and group. Unsorted; not counted in the edges.
     pub repeated: Vec<u32>,
@@ -162,7 +160,6 @@ fn points(positions: &[Vec3]) -> (Vec<u32>, usize) {
         let [x, y, z] = positions[vertex].to_array().map(f32::to_bits);
         (x, y, z)
     };
-    // First vertices of points.
     let mut table: HashTable<u32> = HashTable::with_capacity(positions.len());
     let mut points = Vec::with_capacity(positions.len());
     let mut count = 0;

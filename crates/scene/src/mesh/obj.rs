@@ -149,7 +149,7 @@ impl Reader {
         self.draft.face(&self.face, words.place())
     }
 
-    /// Reads the colour after a position, in sRGB as MeshLab and Blender write it.
+    /// Reads the colour after a position, in sRGB as of MeshLab and Blender.
     fn color(&mut self, words: &mut Tokens) {
         let mut values = [0.0; 3];
         let mut count = 0;

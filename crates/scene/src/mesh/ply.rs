@@ -23,7 +23,7 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<RawMesh, MeshFa
     let header = header(&mut words, &mut damages)?;
     match header.format {
         Format::Ascii => {
-            // One row per line as in other readers, unless lines are too few.
+            // A row per line as in other readers, unless lines are too few.
             let by_lines = words.lines_left() as u128 >= header.rows();
             body(&header, Ascii { words, by_lines }, normals_wanted, damages)
         }
@@ -154,8 +154,8 @@ const COLUMNS: [&[&str]; 12] = [
     &["alpha"],
 ];
 
-/// Converts a colour component to linear RGB or opacity. Integers are normalized sRGB (IEC 61966-2-1), except for
-/// linear opacity; floats are unchanged.
+/// Converts to linear RGB or opacity. Integers are normalized sRGB (IEC 61966-2-1), opacity linear; floats are
+/// unchanged.
 fn color_value(value: f64, scalar: Scalar, is_opacity: bool) -> f32 {
     let Some(largest) = scalar.largest() else {
         return value as f32;

@@ -10,14 +10,13 @@ use rayon::prelude::*;
 
 use super::raw_mesh::{RawMesh, counted};
 
-/// Largest area of fan triangles outside of the polygon, relative to its area, at which the fan is kept.
+/// Largest area of a kept fan outside of the polygon, relative to its area.
 const AREA_TOLERANCE: f64 = 1e-6;
-/// Largest deviation of corners from a plane, relative to the distance of the farthest corner, of a polygon that counts
-/// as planar.
+/// Largest deviation of a planar polygon's corners from the plane, relative to the distance of the farthest corner.
 const PLANE_TOLERANCE: f64 = 0.05;
-/// Largest length of the normal, relative to the fan's cross products, of a polygon whose parts cancel.
+/// Largest normal of a polygon whose parts cancel, relative to the fan's cross products.
 const CANCELLATION: f64 = 1e-6;
-/// Maximum number of corners of a polygon that is clipped: ear clipping takes quadratic time at worst.
+/// Maximum number of corners for ear clipping, which takes quadratic time at worst.
 const MAX_CORNERS: usize = 1 << 14;
 
 /// A polygon of four corners or more, as a fan among the triangles of a draft.
@@ -25,11 +24,10 @@ const MAX_CORNERS: usize = 1 << 14;
 pub(super) struct Polygon {
     /// The fan's first triangle.
     pub first: u32,
-    /// The number of triangles.
     pub count: u32,
 }
 
-/// The properties of a polygon that decide on its triangulation.
+/// Properties that decide on the triangulation.
 struct Form {
     normal: DVec3,
     /// A corner has no position.
@@ -41,7 +39,7 @@ struct Form {
     is_planar: bool,
 }
 
-/// Replaces the fans of concave polygons, and adds notes about polygons that have no unique triangulation.
+/// Replaces the fans of concave polygons, and notes polygons without a unique triangulation.
 pub(super) fn triangulate(draft: &mut RawMesh) {
     let forms: Vec<Form> = (draft.polygons.par_iter())
         .map(|polygon| form(fan(&draft.triangles, polygon), &draft.positions))
@@ -113,7 +111,7 @@ fn form(fan: &[[u32; 3]], positions: &[DVec3]) -> Form {
     }
 }
 
-/// Makes all triangles of a fan refer to its corner without a position, so that the whole face is removed.
+/// Makes all triangles of a fan refer to its corner without a position, to remove the whole face.
 fn mark_damaged(fan: &mut [[u32; 3]], positions: &[DVec3]) {
     let is_bad = |vertex: &u32| !positions[*vertex as usize].is_finite();
     if let Some(bad) = fan.iter().flatten().copied().find(is_bad) {
@@ -121,7 +119,6 @@ fn mark_damaged(fan: &mut [[u32; 3]], positions: &[DVec3]) {
     }
 }
 
-/// Ear clipping with its buffers.
 #[derive(Default)]
 struct Clipper {
     earcut: Earcut<f64>,
@@ -131,8 +128,8 @@ struct Clipper {
 }
 
 impl Clipper {
-    /// Replaces a fan by the triangles of its polygon. Returns false if the polygon intersects itself; then the
-    /// triangles do not cover exactly its area.
+    /// Replaces a fan by the triangles of its polygon. Returns false if it intersects itself: the triangles then do not
+    /// cover exactly its area.
     fn clip(&mut self, fan: &mut [[u32; 3]], normal: DVec3, positions: &[DVec3]) -> bool {
         self.corners.clear();
         self.corners.extend([fan[0][0], fan[0][1]]);

@@ -27,9 +27,8 @@ pub(crate) struct RawMesh {
     pub groups: Vec<Group>,
     /// First triangle and group of each run.
     pub runs: Vec<(usize, u32)>,
-    /// Warnings for the user.
     pub notes: Vec<Note>,
-    /// Why a file without triangles has none.
+    /// Why a file has none.
     pub(super) without_triangles: Option<&'static str>,
     pub(super) damages: Damages,
 }
@@ -77,7 +76,7 @@ pub(super) fn counted(count: usize, one: &str, several: &str) -> Note {
     format!("{count} {}", if count == 1 { one } else { several }).into()
 }
 
-/// Checks a coordinate. -0 becomes +0, so that equal values have equal bits. The error is the value and the rule.
+/// Checks a coordinate. -0 becomes +0, for equal bits. The error is the value and the rule.
 #[inline]
 pub(super) fn coordinate(x: f64) -> Result<f64, String> {
     if x.abs() <= MAX_COORDINATE {
@@ -87,7 +86,6 @@ pub(super) fn coordinate(x: f64) -> Result<f64, String> {
     }
 }
 
-/// Checks a texture coordinate.
 #[inline]
 pub(super) fn texture_coordinate(x: f64) -> Result<f32, String> {
     if (x as f32).is_finite() {

@@ -1,7 +1,7 @@
 //! STL files (3D Systems, "StereoLithography Interface Specification", 1989), with merged vertices.
 //!
 //! The crate `stl_io` 0.11 reads one solid of a text, reports no lines, and takes every file that begins with `solid`
-//! for text. It takes 0.3 s for a million triangles; a whole load takes 0.4 s here.
+//! for text. A million triangles take 0.3 s there; a whole load 0.4 s here.
 
 use std::hash::BuildHasher;
 
@@ -66,7 +66,7 @@ fn binary(bytes: &[u8], facets: &mut Facets) -> Result<(), MeshFault> {
     facets.draft.begin(0);
     let count = bytes.len() / TRIANGLE;
     facets.draft.triangles.reserve(count);
-    // Closed meshes have half as many vertices.
+    // Enough for closed meshes.
     facets.draft.positions.reserve(count / 2);
     facets.vertices = HashTable::with_capacity(count / 2);
     for (i, bytes) in bytes.chunks_exact(TRIANGLE).enumerate() {

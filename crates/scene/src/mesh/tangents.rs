@@ -2,8 +2,8 @@
 //!
 //! The tangents of a triangle are the derivatives of its position by u and v. A vertex has the mean of its triangles',
 //! projected to the plane of its normal, jointly normalized and weighted by angle (Mikkelsen, "Simulation of Wrinkled
-//! Surfaces Revisited", University of Copenhagen, 2008; MikkTSpace of glTF). Unlike there, the derivative by v is
-//! kept, so that textures can be rotated where the two are not perpendicular. Tangents of the mesh are used unchanged.
+//! Surfaces Revisited", University of Copenhagen, 2008; MikkTSpace of glTF). Unlike there, the derivative by v is kept,
+//! to rotate textures where the two are not perpendicular. Tangents of the mesh are used unchanged.
 
 use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ const ONE_DIRECTION: f64 = 0.5;
 /// Tolerance of integer offsets between texture coordinates, which files round.
 const WHOLE: f64 = 1e-4;
 
-/// Tangents of a mesh, whose vertices are split between triangles with plain and with mirrored texture.
+/// Tangents of a mesh; vertices are split between triangles with plain and mirrored texture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VertexTangents {
     /// Triangles; mirrored ones use the copies.
@@ -143,7 +143,7 @@ impl Sum {
     }
 
     /// Returns true if a repeating texture is continuous between two vertices at a point, as where u jumps from 1 to 0
-    /// on a sphere. Atlas charts keep their own tangents as in MikkTSpace, which normal maps are baked with.
+    /// on a sphere. Atlas charts keep their own tangents, as in MikkTSpace.
     fn goes_on_in(&self, other: &Sum) -> bool {
         let apart = self.uv - other.uv;
         let repeats = (apart - apart.round()).abs().max_element() < WHOLE;

@@ -17,8 +17,7 @@ pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text.into_bytes())
 }
 
-/// Words between blanks. `#` at the start of a word begins a comment. A backslash at the end of a line joins it with
-/// the next one.
+/// Words between blanks. `#` at the start of a word begins a comment; a backslash at the end of a line continues it.
 pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -167,7 +166,6 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    /// Returns the number of bytes read.
     pub fn offset(&self) -> usize {
         self.at
     }

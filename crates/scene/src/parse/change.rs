@@ -14,8 +14,8 @@ use crate::problem::At;
 use crate::{CameraDescription, Description};
 
 impl Description {
-    /// Parses a text after a change of the table at the first two segments of a path; `before` is the state before.
-    /// Returns `None` if the whole text must be parsed.
+    /// Parses a text after a change of the table at the first two segments of a path; `None` if the whole text must be
+    /// parsed.
     pub(crate) fn parse_change(
         text: &str,
         origin: &str,
@@ -62,7 +62,6 @@ impl Description {
     }
 }
 
-/// The result of incremental parsing.
 pub struct Change {
     pub description: Description,
     /// True if the text outside of the parts was parsed again.
@@ -81,7 +80,7 @@ impl Places {
     }
 }
 
-/// Parses a changed part. Returns `None` if it is not a standalone table.
+/// Parses a changed part; `None` if not a standalone table.
 fn read_changed_part(
     parts: &Parts,
     part: &Part,
@@ -117,7 +116,7 @@ fn replace<T>(place: Option<&mut T>, table: Table, read: fn(Table) -> Read<T>) -
     place.map(|place| read(table).map(|new| *place = new))
 }
 
-/// Parses a change outside of the parts. Returns `None` if it contains elements of parts.
+/// Parses a change outside of the parts; `None` if it contains elements of parts.
 fn read_changed_rest(
     parts: &Parts,
     defines: &mut Defines,

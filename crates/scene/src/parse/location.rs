@@ -23,16 +23,15 @@ pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) 
     problems.into_error(|problem| keys.place(&problem.key), invalid)
 }
 
-/// Returns the line, from 1, of the path of the camera.
+/// Returns the line, from 1, of the camera's path.
 pub fn line_of_path(text: &str) -> usize {
     let path = KeyPath(["camera", "path"].map(Segment::from).to_vec());
     line_number(text, Keys::of(text).place(&path))
 }
 
-/// The locations of the keys of a text.
 enum Keys<'a> {
     Whole(DeValue<'a>),
-    /// The parts of a text that is too large to parse at once.
+    /// Parts of a text too large to parse at once.
     Parts(Parts<'a>),
 }
 
@@ -69,7 +68,6 @@ fn document(text: &str) -> DeValue<'_> {
     )
 }
 
-/// Returns the byte offset of the key at a path.
 fn place_in(document: &DeValue, path: &KeyPath) -> usize {
     let mut at = 0;
     let mut value = document;

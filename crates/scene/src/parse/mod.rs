@@ -40,7 +40,6 @@ impl Description {
         read_file(file).map_err(|problems| problems.first.at("define"))
     }
 
-    /// Parses a scene file in TOML with the defined values.
     pub(crate) fn parse_toml(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
         let broken = |broken: SyntaxFault| broken.into_error(text, origin);
         let parts = Parts::of(text);
@@ -70,7 +69,6 @@ pub fn is_course(name: &Path) -> bool {
     extension.is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
 }
 
-/// The sections of a file, not yet parsed.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sections {
@@ -149,7 +147,7 @@ fn read_sections(file: Table) -> Result<(Sections, Result<(), Problems>), Proble
     }
 }
 
-/// Adds the name of the section to the problem of a key outside of sections.
+/// Adds a section's name to the problem of a key outside of sections.
 fn with_section(problem: Problem) -> Problem {
     let [Segment::Key(key)] = problem.key.0.as_slice() else {
         return problem;
@@ -182,10 +180,10 @@ fn has_key<T: DeserializeOwned>(name: &str) -> bool {
     !error.is_some_and(|error| error.inner().message().starts_with("unknown field"))
 }
 
-/// Parses a camera. A missing value is taken from the first key of its path that has one.
+/// Parses a camera. Missing values are those of the first key of its path that has one.
 fn read_camera(mut camera: Table) -> Read<CameraDescription> {
     if let Some(Value::Table(path)) = camera.get("path") {
-        // First, so that an error in a key is reported there.
+        // First: errors in keys are reported there.
         let path: CameraPathDescription = read(path.clone()).at("path")?;
         let point = |point: DVec3| Value::from(point.to_array().to_vec());
         let first = |of: fn(&CameraKeyDescription) -> Option<DVec3>| path.keys.iter().find_map(of).map(point);
@@ -216,8 +214,7 @@ fn read_camera(mut camera: Table) -> Read<CameraDescription> {
     read_tagged(camera, Some(CameraDescription::DEFAULT))
 }
 
-/// Parses a file part by part. Returns `None` if the parts depend on each other, so that the file must be parsed at
-/// once.
+/// Parses a file part by part; `None` if the parts depend on each other.
 fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Description, Problems>>, SyntaxFault> {
     let rest = parts.read_rest();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
@@ -273,7 +270,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
         return Ok(None); // a whole list, or a name or index that does not exist
     }
     let read = both(found.end(()), read_file(rest)).map(|((), mut all)| {
-        // The parts and the rest have no kind in common.
+        // Kinds are in the parts or the rest.
         if has(Kind::Textures) {
             all.textures = textures;
         }

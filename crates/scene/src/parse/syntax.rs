@@ -4,10 +4,9 @@ use crate::error::SceneError;
 use crate::key_path::cut;
 use wgray_image::sanitize::escape_control;
 
-/// The message about bytes that are not text.
 pub const NOT_UTF8: &str = "not valid UTF-8";
 
-/// Returns the message about bytes in an encoding other than UTF-8 that is recognized: UTF-16, by its byte order mark.
+/// Returns the message about UTF-16, recognized by its byte order mark.
 pub fn encoding(bytes: &[u8]) -> Option<String> {
     let name = match bytes {
         [0xff, 0xfe, ..] => "UTF-16 (little-endian)",
@@ -17,7 +16,6 @@ pub fn encoding(bytes: &[u8]) -> Option<String> {
     Some(format!("the file is encoded in {name}; save it as UTF-8"))
 }
 
-/// Returns the error of a text at the byte `at`.
 pub fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> SceneError {
     let at = text.floor_char_boundary(at);
     SceneError::Syntax {
@@ -28,8 +26,7 @@ pub fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> Scene
     }
 }
 
-/// Returns the parser's message about the byte `at` with a hint, if the characters there are a common mistake, and the
-/// line.
+/// Returns the parser's message about the byte `at`, with a hint for common mistakes, and the line.
 pub fn explained(text: &str, at: usize, message: &str) -> String {
     let at = text.floor_char_boundary(at);
     let line = text[line_start(text, at)..].lines().next().unwrap_or_default().trim();

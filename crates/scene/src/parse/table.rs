@@ -50,8 +50,8 @@ pub(super) fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) ->
     }
 }
 
-/// Parses a table, whose key `type` was removed if it is `tagged`. serde stops at the first error, so the value there
-/// is removed and the table parsed again, for the errors of the other keys.
+/// Parses a table, whose key `type` was removed if it is `tagged`. serde stops at the first error, whose value is
+/// removed to parse again.
 fn read_keys<T>(
     mut table: Table,
     tagged: bool,
@@ -88,7 +88,7 @@ fn read_keys<T>(
     }
 }
 
-/// Returns true if a key is missing because of an error at another one: that was removed, or may be the misspelled key.
+/// Returns true if a key is missing because of an error at another one, removed or misspelled.
 fn explains(other: &[Segment], missing: &[Segment]) -> bool {
     let table = &missing[..missing.len().saturating_sub(1)];
     other.starts_with(missing) || other.split_last().is_some_and(|(_, others)| others == table)
@@ -104,7 +104,6 @@ fn find<'a>(table: &'a Table, path: &[Segment]) -> Option<&'a Value> {
     })
 }
 
-/// Removes the key at a path from its table, if it has one.
 pub(super) fn remove(table: &mut Table, path: &[Segment]) -> bool {
     let Some((Segment::Key(key), path)) = path.split_last() else {
         return false;
@@ -120,7 +119,7 @@ pub(super) fn remove(table: &mut Table, path: &[Segment]) -> bool {
     inner.is_some_and(|inner| inner.remove(key).is_some())
 }
 
-/// Maximum number of keys in a message, which no table exceeds.
+/// Maximum keys in a message; no table has more.
 const MAX_KEYS: usize = 64;
 
 /// Formats a value as TOML on one line, truncated if it is long.
@@ -128,8 +127,7 @@ fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
 
-/// Returns an error that lists the allowed names. serde only lists them for strings, so the value is replaced by one
-/// and parsed again.
+/// Lists the allowed names. serde only does for strings: the value is replaced by one.
 fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
     if !error.inner().message().ends_with(NAMES_EXPECTED) {
         return error;
@@ -153,7 +151,7 @@ fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<Re
     listing.filter(is_same).unwrap_or(error)
 }
 
-/// End of serde's message about a value that must be a string of an enum.
+/// End of serde's message about a value that must name a variant.
 const NAMES_EXPECTED: &str = ", expected string only";
 
 /// Converts serde's error about `table`, whose key `type` was removed if it is `tagged`.
@@ -171,7 +169,7 @@ fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator
     };
     let is_unknown_key = message.starts_with("unknown field");
     let message = if is_unknown_key {
-        // The first name is the key, which is in the path already.
+        // The first name is the key.
         let names = quoted(message).into_iter().skip(1);
         let tag = (tagged && path.len() == 1).then(|| "type".to_owned());
         let names: Vec<String> = tag.into_iter().chain(names).collect();
@@ -237,7 +235,7 @@ pub fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
     steps.collect()
 }
 
-/// Returns the rule of an integer key. Limits that depend on other keys are checked later.
+/// Returns an integer key's rule, without limits that depend on other keys.
 fn whole(key: Option<&Segment>, integrator: Integrator) -> String {
     if key == Some(&Segment::from("blades")) {
         return format!("0 or a whole number from {} to {}", BLADES.0, BLADES.1);

@@ -328,7 +328,7 @@ fn the_example_of_the_page_is_a_scene() {
     assert_eq!(scene.shapes.len(), 1);
 }
 
-/// Returns the section of the page under a heading, without its subsections.
+/// A section of the page, without subsections.
 fn section(heading: &str) -> &'static str {
     let (_, rest) = PAGE
         .split_once(&format!("\n{heading}\n"))
@@ -336,15 +336,14 @@ fn section(heading: &str) -> &'static str {
     rest.split("\n#").next().unwrap()
 }
 
-/// Returns the names, including quotes, in the first column of a section's tables.
+/// Names, with quotes, in the first column of a section's tables.
 fn rows(heading: &str) -> Vec<&'static str> {
     let lines = section(heading).lines();
     let names = lines.filter_map(|line| Some(line.strip_prefix("| `")?.split_once('`')?.0));
     names.collect()
 }
 
-/// Checks that the page has rows for exactly the keys that are allowed at the end of the text: the error of an unknown
-/// key lists them.
+/// Checks that the page's rows are the keys allowed at the end of the text, by the error of an unknown key.
 fn check_keys(text: &str, heading: &str) {
     let message = message(&format!("{text}\n'?' = 1"));
     let (_, keys) = message

@@ -40,7 +40,7 @@ pub struct Field {
     /// True if it must be a square number.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub squares: bool,
-    /// Range of a slider around the value; for an emitter's color, around its largest component.
+    /// Slider's range around the value, or an emitter color's largest component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slider: Option<Slider>,
     /// The allowed names, truncated if they are many.
@@ -86,7 +86,6 @@ pub struct Names {
     pub meshes: Vec<String>,
 }
 
-/// Maximum number of choices.
 const MAX_CHOICES: usize = 200;
 /// Maximum number of elements of a list of lists or tables that get fields.
 const MAX_ELEMENTS: usize = 32;
@@ -113,7 +112,6 @@ impl Names {
         }
     }
 
-    /// Returns the allowed names of a key.
     fn of(&self, path: &[Segment]) -> Option<&[String]> {
         match Names::section(&KeyPath(path.to_vec()))? {
             "materials" => Some(&self.materials),
@@ -123,8 +121,7 @@ impl Names {
     }
 }
 
-/// Returns the fields of the object at a path, such as `[shapes, 3]` or `[camera]`, with this table; empty for other
-/// values.
+/// Returns the fields of an object (`[shapes, 3]`, `[camera]`) with this table; none for other values.
 pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
     static SCHEMA: OnceLock<Json> = OnceLock::new();
     let whole = SCHEMA.get_or_init(of_files);
@@ -348,7 +345,7 @@ impl FieldList<'_> {
     }
 }
 
-/// Returns the keys that a table must keep: with alternatives, those that all satisfied ones require.
+/// Returns the keys that a table must keep: those that all satisfied alternatives require.
 fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
     let keys_of = |schema: &'a Json| -> Vec<&'a str> {
         let list = schema.get("required").and_then(Json::as_array).into_iter().flatten();
@@ -418,7 +415,6 @@ impl Field {
     }
 }
 
-/// Collects the alternatives of a schema, or the schema itself.
 fn alternatives<'a>(schema: &'a Json, found: &mut Vec<&'a Json>) {
     match (schema.get("type"), schema.get("anyOf").and_then(Json::as_array)) {
         (None, Some(all)) => all.iter().for_each(|one| alternatives(one, found)),

@@ -3,12 +3,9 @@
 use serde::Serialize;
 use serde_json::Value as Json;
 
-/// The range of a slider.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Slider {
-    /// Left end.
     pub from: f64,
-    /// Right end.
     pub to: f64,
     /// Step of a linear slider.
     pub step: f64,
@@ -16,7 +13,7 @@ pub struct Slider {
     pub logarithmic: bool,
 }
 
-/// Distance of the displayed from the excluded ends of a range, relative to its width.
+/// Distance of displayed from excluded ends, relative to the width.
 const INSIDE: f64 = 1e-3;
 
 fn ends(schema: &Json) -> Option<(f64, f64)> {
@@ -48,11 +45,11 @@ pub(super) fn gap_of(schema: &Json) -> Option<(f64, f64)> {
     Some(if a.0 < b.0 { (a.1, b.0) } else { (b.1, a.0) })
 }
 
-/// Maximum width of a range that a linear slider covers.
+/// Maximum width of a linear range.
 const WIDE: f64 = 1000.0;
-/// Minimum ratio of the ends of a logarithmic range.
+/// Minimum ratio of a logarithmic range.
 const RATIO: f64 = 50.0;
-/// Maximum factor from a value to the ends of its slider.
+/// Maximum factor from the value to an end.
 const FACTOR: f64 = 100.0;
 
 pub(super) fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Option<f64>) -> Option<Slider> {

@@ -23,8 +23,7 @@ impl CameraDescription {
         camera(self, VERTICAL_UP).map_err(|problems| problems.first)
     }
 
-    /// Validates the camera at a frame of its path. A view along `up` is an error, because another `up` would be a
-    /// jump.
+    /// Validates the camera at a frame of its path. A view along `up` is an error: another `up` would be a jump.
     pub(crate) fn validate_frame(&self) -> Result<Camera, Problem> {
         camera(self, DVec3::Z).map_err(|problems| problems.first)
     }
@@ -114,7 +113,7 @@ fn aperture(diameter: f64) -> Checked<f64> {
     between(diameter, APERTURES)
 }
 
-/// Validates a camera and its path: each key, the camera without the path, and the camera at all keys.
+/// Validates each key, the camera without the path, and the camera at all keys.
 pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Option<CameraPath>), Problems> {
     let Some(path) = description.path() else {
         return Ok((camera(description, VERTICAL_UP)?, None));
@@ -140,7 +139,7 @@ pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Opti
     Ok((still, moving))
 }
 
-/// Validates a key, and that its frame is greater than that of the previous one.
+/// Validates a key, whose frame must exceed the previous one's.
 fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f64>) -> Checked<()> {
     let CameraKeyDescription {
         frame,
@@ -219,7 +218,7 @@ mod tests {
         Projection, Scene, SceneError,
     };
 
-    /// Returns a scene with these lines for the camera, from line 2.
+    /// The camera begins in line 2.
     fn scene(camera: &str) -> Result<Scene, SceneError> {
         let text = format!("image = {{ width = 4, height = 4 }}\n{camera}");
         Scene::parse(&text, "s.toml")

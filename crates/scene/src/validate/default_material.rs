@@ -7,11 +7,11 @@ use super::principled::dielectric;
 
 /// Albedo.
 const GRAY: f64 = 0.8;
-/// Phong exponent, without effect because the specular factor is black, and roughness under `path`.
+/// Phong exponent, without effect as the specular factor is black, and roughness under `path`.
 const SHININESS: f64 = 16.0;
 const ROUGHNESS: f64 = 0.5;
 
-/// Returns the materials of meshes without and with vertex colors, which `phong` ignores.
+/// For meshes without and with vertex colors, which `phong` ignores.
 pub(super) fn default_materials(integrator: Integrator) -> [Material; 2] {
     [false, true].map(|has_colors| Material {
         reflection: match integrator.follows_paths() {

@@ -17,7 +17,7 @@ use super::{At, Checked, Description, Environment, Integrator, Problem, between,
 const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
 
-/// Returns the environment, from its section or the background, if it emits or is visible.
+/// From its section or the background, if it emits or is visible.
 pub(super) fn environment(
     description: &Description,
     integrator: Integrator,
@@ -95,7 +95,7 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
     }
 }
 
-/// Validates the keys of a sky, which apply to nothing else.
+/// The keys apply to nothing else.
 fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     let is_sky = description.name == Some(EnvironmentName::Sky);
     let value = |key: &str, value: Option<f64>, default: f64, limits: (f64, f64)| {
@@ -110,7 +110,7 @@ fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     })
 }
 
-/// Returns the warning about an image with the wrong aspect ratio.
+/// Warns of an image with the wrong aspect ratio.
 pub(super) fn note(description: &Description, environment: Option<&Environment>) -> Option<String> {
     let file = description.environment.as_ref()?.file.as_ref()?;
     let Image { width, height, .. } = *environment?.image.as_ref()?.image;

@@ -11,16 +11,15 @@ use crate::{Assets, Image, ImageTextureDescription, Texels};
 /// Memory limit of all texels in their render format, in bytes.
 pub(crate) const TEXEL_MEMORY: u64 = 1 << 30;
 
-/// Cache of images: each file is read and stored once.
 pub(super) struct Images<'a> {
     pub(super) assets: &'a Assets,
-    /// False if the scene is invalid already: 1 x 1 images then replace those of files.
+    /// False if the scene is invalid: 1 x 1 images replace files.
     pub(super) reads_files: bool,
     /// Images by location, each with its size in 32-bit words.
     files: BTreeMap<AssetKey, Vec<(File, u64)>>,
     /// Size of all images in bytes.
     taken: u64,
-    /// Warnings about damaged files, without duplicates.
+    /// About damaged files, without duplicates.
     pub(super) notes: Vec<String>,
 }
 
@@ -35,7 +34,7 @@ impl<'a> Images<'a> {
         }
     }
 
-    /// Warns of a damaged file, or returns it as an error ([`Assets::tolerate`]).
+    /// Warns of a damaged file, or returns an error ([`Assets::tolerate`]).
     pub(super) fn tolerate(&mut self, damage: Problem, stand_in: &str) -> Checked<()> {
         let note = self.assets.tolerate(damage, stand_in)?;
         if !self.notes.contains(&note) {
@@ -53,7 +52,7 @@ impl<'a> Images<'a> {
         })
     }
 
-    /// Returns the environment map. Its texels are separate from those of a texture of the same file.
+    /// Returns the environment map, separate from a texture of the same file.
     pub(super) fn around(&mut self, file: &str) -> Checked<Arc<Image>> {
         let others = self.taken;
         let image = self.with_words(file, Part::Colors(None), |header| {
@@ -71,7 +70,6 @@ impl<'a> Images<'a> {
         Ok(image)
     }
 
-    /// Counts the memory of a built-in environment.
     pub(super) fn own(&mut self, name: &str, image: &Image) -> Result<(), String> {
         let bytes = 4 * words_around(image.width, image.height);
         if self.taken + bytes > TEXEL_MEMORY {

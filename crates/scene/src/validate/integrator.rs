@@ -4,8 +4,7 @@ use super::super::key_path::{KeyPath, Segment};
 use super::super::{Description, Integrator, MaterialDescription, ShapeDescription};
 
 impl Description {
-    /// Returns the integrator: the one that `[render]` names, else [`Integrator::Path`] if any key of the scene needs
-    /// it.
+    /// Returns the integrator of `[render]`, else [`Integrator::Path`] if any key needs it.
     pub fn integrator(&self) -> Integrator {
         let needed = || needs_path(self).map_or(Integrator::Phong, |_| Integrator::Path);
         self.render.integrator.unwrap_or_else(needed)
@@ -87,7 +86,7 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
         assert_eq!((scene.render.integrator, scene.notes), (Integrator::Phong, vec![]));
     }
 
-    /// Another integrator changes what the other settings may be, so they are checked with the one that is used.
+    /// The integrator changes what other settings may be.
     #[test]
     fn the_settings_are_those_of_the_chosen_integrator() {
         let scene = load(
@@ -129,7 +128,7 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
                 .message
                 .starts_with("render.integrator is not set; using \"path\", which materials.red.emission requires")
         );
-        // An integrator that is named is kept, without a note.
+        // A named one is kept, without a note.
         let named = load("environment.color = [1, 1, 1]\n", &define("render.integrator=path"));
         assert!(
             !named.notes.iter().any(|note| note.message.contains("integrator: ")),

@@ -18,12 +18,11 @@ impl Textures<'_> {
         };
         needs_path(self.integrator)?;
         let color = self.color(emission)?;
-        // Usually only parts of a surface emit; the factor alone would make all of it an emitter.
+        // The factor alone would make all of the surface an emitter.
         let is_replaced = matches!(color, Color::Texture(texture) if self.replaced.contains(&texture));
         Ok(if is_replaced { Color::BLACK } else { color })
     }
 
-    /// Validates a type that needs the path integrator.
     fn of_path(&self, tag: &str) -> Checked<()> {
         let named = |problem: Problem| Problem::new(format!("{tag:?} {}", problem.message));
         needs_path(self.integrator).map_err(named).at("type")
@@ -160,7 +159,7 @@ fn absorption(absorption: DVec3) -> Checked<DVec3> {
     Ok(absorption)
 }
 
-/// Returns the index of a conductor. Only one kind of key may set the reflectance.
+/// Only one kind of key may set the reflectance.
 fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> {
     let other = |own: &str| {
         let given = [

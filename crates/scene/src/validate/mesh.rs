@@ -28,7 +28,7 @@ pub(super) struct SceneLookup<'a> {
     pub names: &'a BTreeMap<&'a str, usize>,
     pub looks: SceneMaterials<'a>,
     pub assets: &'a Assets,
-    /// False if the scene is invalid already: meshes are then not needed.
+    /// False if the scene is invalid: meshes are not needed.
     pub reads_files: bool,
     pub suggestions: Suggestions,
 }
@@ -40,7 +40,6 @@ impl SceneLookup<'_> {
     }
 }
 
-/// A mesh for instances.
 pub(super) struct NamedMesh<'a> {
     /// `None` if it is invalid, or not needed.
     mesh: Option<Arc<Mesh>>,
@@ -107,7 +106,7 @@ pub(super) fn instance(
     placed(mesh.clone(), file.up, &file.file, &placement, known)
 }
 
-/// Checks the number of groups: their words must have 32-bit indices.
+/// Checks that the words of groups have 32-bit indices.
 pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
     let groups = shapes.iter().map(|shape| match &shape.geometry {
         Geometry::Mesh { materials, .. } => materials.len(),
@@ -168,7 +167,7 @@ fn load(file: &str, normals: Option<Normals>, known: &mut SceneLookup) -> Checke
     Ok(Some(mesh))
 }
 
-/// Returns a placed mesh; without a mesh, only the placement is validated.
+/// Returns a placed mesh; without one, validates the placement.
 fn placed(
     mesh: Option<Arc<Mesh>>,
     up: Up,
@@ -261,9 +260,8 @@ fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Sc
     Ok(indices)
 }
 
-/// Returns the warning about materials that are named in a file but not defined.
+/// Returns the warning about undefined materials.
 fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String {
-    /// Maximum number of names in the message.
     const MAX_NAMES: usize = 8;
     let shown = missing.iter().take(MAX_NAMES);
     let mut names = shown
@@ -291,7 +289,7 @@ fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String
     format!("{file}: no material {names}: {why}")
 }
 
-/// Returns the names that identify a group: its own, and that of its material in the file.
+/// Returns a group's own name, and that of its material in the file.
 fn names(group: &Group) -> impl Iterator<Item = &str> {
     std::iter::once(group.name.as_str()).chain(group.material.as_deref())
 }
@@ -305,7 +303,6 @@ fn has_textures(material: &Material) -> bool {
     is_streaked || !material.textures().is_empty()
 }
 
-/// Returns the rotation of an up axis to +z.
 pub(crate) fn turned_up(up: Up) -> DAffine3 {
     DAffine3::from_mat3(match up {
         Up::X => DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),

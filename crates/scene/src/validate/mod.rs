@@ -48,8 +48,8 @@ pub(super) use self::path::LIGHT_SAMPLES;
 
 /// Default of the first bounce with Russian roulette.
 const RR_DEPTH: u32 = 5;
-/// Sine of the minimum angle between directions that are not parallel; also the minimum height of a triangle or
-/// tetrahedron relative to its longest edge.
+/// Sine of the minimum angle between directions; minimum height of a triangle or tetrahedron relative to its longest
+/// edge.
 const FLATTEST: f64 = 1e-6;
 
 type Checked<T> = Result<T, Problem>;
@@ -75,8 +75,8 @@ impl Description {
         })
     }
 
-    /// Validates a description without glTF files. If the settings are invalid, no files are read, but all other values
-    /// are validated.
+    /// Validates a description without glTF files. With invalid settings, no files are read, but all other values
+    /// validated.
     pub(crate) fn validate_plain(
         &self,
         settings: Result<Settings, Problems>,
@@ -84,7 +84,7 @@ impl Description {
         assets: &Assets,
         files: &mut BTreeSet<PathBuf>,
     ) -> Result<Scene, Problems> {
-        // The map is sorted: the index of a material is that of its name.
+        // The map is sorted: materials have their names' indices.
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
         let reads_files = settings.is_ok();
@@ -300,7 +300,6 @@ pub(super) fn adaptive_error(error: f64) -> Checked<f64> {
     between(error, SHARES)
 }
 
-/// Validates adaptive sampling of pixels with these samples.
 pub(super) fn adaptive(
     description: &AdaptiveDescription,
     pixel_samples: &SamplesDescription,
@@ -378,7 +377,6 @@ pub(super) fn color(c: DVec3) -> Checked<DVec3> {
     Ok(c)
 }
 
-/// Normalizes a direction.
 fn unit(direction: DVec3) -> Checked<DVec3> {
     let length = point(direction)?.length();
     check(length >= LENGTHS.0, || {
@@ -411,7 +409,6 @@ fn check(valid: bool, message: impl FnOnce() -> String) -> Checked<()> {
     }
 }
 
-/// Formats a number briefly.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e6).contains(&x.abs()) {
         x.to_string()

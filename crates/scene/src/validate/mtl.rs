@@ -26,15 +26,14 @@ const NS: f64 = 16.0;
 /// Maximum length, in characters, of the reason why a map is not used.
 const MAX_MAP_MESSAGE: usize = 300;
 
-/// All materials of a scene: first its own, then those of meshes.
+/// The scene's own materials, then those of meshes.
 pub(super) struct SceneMaterials<'a> {
     pub names: Vec<String>,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
-    /// The files that the scene reads.
     pub files: &'a mut BTreeSet<PathBuf>,
     images: Images<'a>,
-    /// The folder that paths in messages are relative to, with symbolic links resolved.
+    /// The folder that paths in messages are relative to, without symbolic links.
     folder: PathBuf,
     /// The materials of each mesh, by its address.
     meshes: HashMap<usize, GroupMaterials>,
@@ -43,9 +42,9 @@ pub(super) struct SceneMaterials<'a> {
     known: HashMap<(PathBuf, usize, Traits), usize>,
     /// The textures of maps.
     maps: BTreeMap<(AssetKey, Part), usize>,
-    /// The first warning about each keyword of a file, and the number of materials that it applies to.
+    /// The first warning about each keyword of a file, and the number of its materials.
     warnings: BTreeMap<(PathBuf, String), (String, usize)>,
-    /// The material of groups that have none, for meshes without and with colors; and its index once it is used.
+    /// The default material for meshes without and with colors, and its index once used.
     defaults: [(Material, Option<usize>); 2],
     /// Notes about materials that mesh files name and no file describes.
     pub unmatched: BTreeSet<String>,
@@ -60,16 +59,15 @@ struct Traits {
     has_colors: bool,
 }
 
-/// The materials of a mesh's groups.
 struct GroupMaterials {
-    /// For each group a file of materials and a material in it, if there is one.
+    /// For each group the file and material in it, if any.
     places: Vec<Option<(usize, usize)>>,
     /// For each group the scene's material, once requested.
     materials: Vec<Option<usize>>,
 }
 
 impl<'a> SceneMaterials<'a> {
-    /// Starts with the scene's own materials and textures, and the images that they use.
+    /// Starts with the scene's own materials, textures and images.
     pub fn new(
         (names, materials): (Vec<String>, Vec<Material>),
         textures: Vec<Texture>,
@@ -96,7 +94,6 @@ impl<'a> SceneMaterials<'a> {
         }
     }
 
-    /// Returns the material of a group that has none.
     pub fn default_material(&mut self, has_colors: bool) -> usize {
         let (material, index) = &mut self.defaults[usize::from(has_colors)];
         *index.get_or_insert_with(|| {
@@ -158,15 +155,13 @@ impl<'a> SceneMaterials<'a> {
         Some(material)
     }
 
-    /// Warns of a group without a material, or returns it as an error
-    /// ([`Assets::tolerate`](super::super::Assets::tolerate)).
+    /// Warns of a group without a material, or returns an error ([`Assets::tolerate`](super::super::Assets::tolerate)).
     pub fn without_material(&mut self, damage: Problem) -> Checked<()> {
         let note = self.images.assets.tolerate(damage, "a gray material is used instead")?;
         self.unmatched.insert(note);
         Ok(())
     }
 
-    /// Returns the warnings about the materials that are used.
     pub fn notes(self) -> impl Iterator<Item = String> {
         let warnings = self.warnings.into_values().map(|(first, count)| match count {
             1 => first,
@@ -176,7 +171,7 @@ impl<'a> SceneMaterials<'a> {
         self.images.notes.into_iter().chain(self.unmatched).chain(warnings)
     }
 
-    /// Returns a Phong material. `Ka` is ignored, as exporters write anything there; ambient light uses `Kd`.
+    /// Returns a Phong material. Exporters write anything as `Ka`: ambient light uses `Kd`.
     fn phong(&mut self, own: &MtlMaterial, file: &Path, has_uvs: bool) -> Material {
         let mut warnings = Warnings::default();
         let mut color = |name: &'static str, color: Option<[f64; 3]>, default: f64| {
@@ -241,7 +236,6 @@ impl<'a> SceneMaterials<'a> {
         }
     }
 
-    /// Returns the first damaged image, if damage is refused.
     pub fn damage(&mut self) -> Option<Problem> {
         self.damage.take()
     }
@@ -270,7 +264,6 @@ impl<'a> SceneMaterials<'a> {
         }
     }
 
-    /// Returns the texture of a part of an image.
     fn map(&mut self, path: &Path, part: Part, has_uvs: bool) -> Checked<usize> {
         if !has_uvs {
             return Err(Problem::new("the mesh has no texture coordinates"));
@@ -296,7 +289,6 @@ impl<'a> SceneMaterials<'a> {
     }
 }
 
-/// A warning about a keyword of a material.
 struct Warning {
     keyword: String,
     message: String,

@@ -31,7 +31,7 @@ pub(super) fn most(color: &Color, textures: &[Texture]) -> Option<DVec3> {
     }
 }
 
-/// Returns the warnings about values that the path tracer ignores or changes.
+/// Warnings about values that the path tracer ignores or changes.
 pub(super) fn notes(
     (render, integrator): (&RenderDescription, Integrator),
     (names, materials): (&[String], &[Material]),
@@ -102,7 +102,6 @@ fn unused_cutoff(names: &[String], materials: &[Material]) -> Option<String> {
     ))
 }
 
-/// Returns the names of `principled` materials for which `is_true`.
 fn that(names: &[String], materials: &[Material], is_true: impl Fn(&Principled) -> bool) -> Option<String> {
     let found = (names.iter().zip(materials)).filter(|(_, material)| match &material.reflection {
         Reflection::Principled(principled) => is_true(principled),
@@ -111,7 +110,7 @@ fn that(names: &[String], materials: &[Material], is_true: impl Fn(&Principled) 
     several(found.map(|(name, _)| format!("{:?}", cut(name))))
 }
 
-/// Joins names as `a, b and c`, truncated if they are many; `None` if empty.
+/// Joins names as `a, b and c`, truncated; `None` if empty.
 fn several(mut all: impl Iterator<Item = String>) -> Option<String> {
     let mut shown: Vec<String> = all.by_ref().take(MAX_NAMES).collect();
     match all.count() {

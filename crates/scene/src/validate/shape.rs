@@ -147,14 +147,14 @@ fn tetrahedron(vertices: [DVec3; 4]) -> Checked<Geometry> {
         format!("{} must not lie in one plane", show_all(&vertices))
     })?;
     if volume < 0.0 {
-        // Negative orientation: without the swap, the normals would point inwards.
+        // Without the swap, normals would point inwards.
         (v1, v2) = (v2, v1);
     }
     let faces = vec![[v0, v2, v1], [v0, v1, v3], [v1, v2, v3], [v0, v3, v2]];
     Ok(Geometry::Triangles(faces))
 }
 
-/// Checks the vertices one by one, then that they are not all the same.
+/// Checks each vertex, then that they differ.
 fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
     for (i, &vertex) in vertices.iter().enumerate() {
         point(vertex).at(i)?;
@@ -167,13 +167,13 @@ fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
     Ok(longest)
 }
 
-/// Returns the unit vectors of u and v: the part of the tangent that is orthogonal to the normal, and normal x tangent.
-/// Without a tangent u is along x, or along y if the normal is nearly along x.
+/// Returns the unit vectors of u and v: the tangent, made orthogonal to the normal, and normal x tangent. Without a
+/// tangent u is along x, or along y if the normal is nearly along x.
 fn frame(normal: DVec3, tangent: Option<DVec3>) -> Checked<(DVec3, DVec3)> {
     across(unit(normal).at("normal")?, normal, tangent, "the normal")
 }
 
-/// Returns the vectors of [`frame`] for a unit normal `n`. Messages show it as `name` and `given`.
+/// Like [`frame`], for a unit normal `n`, in messages `name` and `given`.
 fn across(n: DVec3, given: DVec3, tangent: Option<DVec3>, name: &str) -> Checked<(DVec3, DVec3)> {
     let tangent = tangent.unwrap_or(if n.x.abs() < 0.9 { DVec3::X } else { DVec3::Y });
     let t = unit(tangent).at("tangent")?;

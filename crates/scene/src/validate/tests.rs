@@ -88,7 +88,6 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml")
 }
 
-/// Returns the valid scene with one line changed.
 fn with(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
     assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
@@ -174,7 +173,7 @@ fn tetrahedron_faces_point_outwards_for_any_vertex_order() {
     }
 }
 
-/// A line of the valid scene, its invalid replacement, and the error.
+/// Valid line, invalid replacement, error.
 const BAD: &[(&str, &str, &str)] = &[
     ("width = 8", "width = 0", "image.width: 0 must be from 1 to 65536"),
     (
@@ -531,13 +530,11 @@ fn a_cylinder_has_the_radii_and_heights_that_lengths_have() {
     }
 }
 
-/// Returns the lines of a text's errors.
 fn errors(text: &str) -> Vec<String> {
     let error = Scene::parse(text, "s.toml").unwrap_err().to_string();
     error.lines().map(str::to_owned).collect()
 }
 
-/// A scene whose first line is the size of the image.
 const SMALL: &str = "\
 image = { width = 4, height = 4 }
 camera = { position = [0, -4, 1], look_at = [0, 0, 1], fov = 40 }
@@ -674,7 +671,6 @@ color = [1, 1, 1]
     assert_eq!(errors(&text).len(), 3);
 }
 
-/// Tests that an invalid texture, material or mesh causes no further errors.
 #[test]
 fn an_error_is_reported_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -751,7 +747,7 @@ material = 'm'
     );
 }
 
-/// Tests that no files are read if sections without files are invalid: a typo is reported before gigabytes are read.
+/// A typo is reported before gigabytes are read.
 #[test]
 fn files_are_not_read_for_a_scene_with_invalid_settings() {
     let folder = tempfile::tempdir().unwrap();
@@ -834,7 +830,6 @@ fn of_many_errors_the_first_are_reported() {
         assert_eq!((errors.len(), more.as_deref()), (20, last));
         assert_eq!(errors[19].place().key.as_deref(), Some("shapes[19].material"));
     }
-    // Also with errors of another section before or after them.
     let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 0]\ncolor = [-1, 0, 0]\n";
     let [lights, shapes] = [light.repeat(15), shape.repeat(15)];
     for (text, key) in [
@@ -846,7 +841,7 @@ fn of_many_errors_the_first_are_reported() {
         assert_eq!((errors.len(), more.as_deref()), (20, Some("and 10 more errors")));
         assert_eq!(error.place().key.as_deref(), Some(key));
     }
-    // Only the first error gets suggestions: those of all would take minutes.
+    // Suggestions for all errors would take minutes.
     let materials = (0..50_000)
         .map(|i| format!("m{i}.type = 'mirror'\n"))
         .collect::<String>();

@@ -15,8 +15,7 @@ use crate::{
     ValueDescription,
 };
 
-/// Returns the textures, and the indices of those that are replaced by a constant: the factor of a damaged image, or
-/// any color for an invalid or unread texture.
+/// Returns the textures, and the indices of constant ones: a damaged image's factor, or any color if invalid or unread.
 pub(super) fn textures(
     descriptions: &BTreeMap<String, TextureDescription>,
     images: &mut Images,
@@ -137,16 +136,15 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],
-    /// Alpha textures of images, which follow the others, by name, or their errors.
+    /// Alpha textures, which follow the others, or errors, by name.
     pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
-    /// Textures that are replaced by a constant.
     pub(super) replaced: BTreeSet<usize>,
     /// Determines the valid materials.
     pub(super) integrator: Integrator,
     pub(super) suggestions: Suggestions,
 }
 
-/// Adds the alpha textures of images that materials use by `channel = "a"`.
+/// Adds the alpha textures for `channel = "a"`.
 pub(super) fn alphas<'a>(
     materials: &'a BTreeMap<String, MaterialDescription>,
     descriptions: &BTreeMap<String, TextureDescription>,
@@ -184,7 +182,7 @@ impl Textures<'_> {
 
     fn find_name(&self, name: &str) -> Checked<usize> {
         let unknown = || Problem::new(self.suggestions.unknown("texture", name, self.names.iter().copied()));
-        // The names are sorted: they are the keys of a map.
+        // Keys of a map are sorted.
         self.names.binary_search(&name).map_err(|_| unknown())
     }
 
@@ -245,7 +243,6 @@ impl Textures<'_> {
         Ok(Some(NormalMap { texture, strength }))
     }
 
-    /// Validates an image of directions.
     pub(super) fn direction(&self, description: &Option<TextureReference>) -> Checked<Option<usize>> {
         let Some(TextureReference { texture: name }) = description else {
             return Ok(None);
@@ -287,7 +284,7 @@ impl Textures<'_> {
     }
 }
 
-/// Validates a texture's factor if the product must be from 0 to 1.
+/// For products from 0 to 1.
 fn bounded_factor(factor: f64) -> Checked<()> {
     check(factor <= 1.0, || {
         format!("the texture's factor of {} must be from 0 to 1 here", number(factor))

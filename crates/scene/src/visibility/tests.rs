@@ -5,7 +5,7 @@ const NOT_IN_VIEW: &str = "no shape is in view of the camera; the image shows on
                            (check camera.position and camera.look_at)";
 const NO_SHAPES: &str = "the scene has no shapes; the image shows only the background";
 
-/// A camera at (0, -10, 0) that looks along +y with a vertical field of view of 90 degrees, at 20 x 10 pixels.
+/// At (0, -10, 0), along +y, with a vertical field of view of 90 degrees, at 20 x 10 pixels.
 const CAMERA: &str = "[image]\nwidth = 20\nheight = 10\n\
     [camera]\nposition = [0, -10, 0]\nlook_at = [0, 0, 0]\nfov = 90\n";
 const LIGHT: &str = "[[lights]]\ntype = 'point'\nposition = [0, 0, 5]\ncolor = [1, 1, 1]\n";
@@ -62,8 +62,8 @@ fn any_source_of_light_suffices() {
 
 #[test]
 fn spheres_just_outside_of_the_view_are_reported_and_those_at_its_edge_are_not() {
-    // At depth 10 the view is 40 x 20 wide without the margin of the filter; a sphere that touches a slanted side is at
-    // most sqrt(3) away in the box test.
+    // At depth 10 the view is 40 x 20 without the filter's margin; a sphere at a slanted side is at most sqrt(3) away
+    // in the box test.
     let seen = [
         [0.0, 0.0, 0.0],
         [19.0, 0.0, 0.0],

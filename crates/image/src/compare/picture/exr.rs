@@ -23,7 +23,7 @@ impl From<Error> for Unreadable {
     }
 }
 
-/// Decodes block by block, so that only the values of the image are in memory.
+/// Decodes block by block, which saves memory.
 pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let reader = exr::block::read(source, false)?;
@@ -128,7 +128,7 @@ fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
 }
 
 fn empty(columns: u32, rows: u32, samples: SampleType) -> Result<Plane, Unreadable> {
-    /// Allocates zeroed memory, which the operating system maps on first use: a header may claim any size.
+    /// Allocates zeros, which are mapped on first use: a header may claim any size.
     fn zeros<T: Clone + Default>(width: u64, height: u64) -> Result<Vec<T>, Unreadable> {
         let count = width * height;
         drop(room::<T>(width, height, count)?);

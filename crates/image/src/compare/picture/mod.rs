@@ -83,8 +83,7 @@ impl Plane {
         value[0]
     }
 
-    /// Returns true if both planes have equal values in the same pixels, judged by their stored integers. Floats and
-    /// planes of different types always yield false.
+    /// Returns true if both planes store equal integers in these pixels. Floats and different types always yield false.
     pub fn is_plainly(&self, other: &Plane, pixels: Range<usize>) -> bool {
         match (self, other) {
             (Plane::Bytes(a), Plane::Bytes(b)) => a[pixels.clone()] == b[pixels],
@@ -123,8 +122,7 @@ impl Picture {
         }
     }
 
-    /// Converts linear values to the 8-bit or 16-bit PNG that `wgray render` writes: red, green, blue, and alpha if
-    /// present. `None` if the image has no colors.
+    /// Converts linear values to the PNG of 8 or 16 `bits` that `wgray render` writes; `None` without colors.
     pub fn displayed(&self, bits: u8) -> Option<Picture> {
         let colors = self.colors()?;
         let alpha = self.channel("A");
@@ -172,7 +170,7 @@ fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8,
             alpha.values(start..start + count, &mut shares[..count]);
         }
         for (value, share) in values[..count].iter().zip(&shares) {
-            // In `f32` as in a render, so that the bytes equal those of its PNG.
+            // In `f32` as in a render, for equal bytes.
             let (value, share) = (*value as f32, *share as f32);
             let value = match alpha {
                 Some(_) if !(share > 0.0) => 0.0,

@@ -17,8 +17,7 @@ const BESIDE: usize = 64 << 20;
 /// Maximum pixels per byte of a JPEG: each block of 8 x 8 takes a bit at least, and covers up to 32 x 32 pixels.
 const MAX_JPEG_PIXELS_PER_BYTE: u64 = 8 * 32 * 32;
 
-/// Maximum bytes of an image's values, and the bytes allowed in addition per byte of its file: a small file can
-/// describe 65,536 x 65,536 zeros.
+/// Maximum bytes of an image's values, plus bytes per byte of its file, which may be 65,536 x 65,536 zeros.
 const MAX_BYTES: (u64, u64) = (1 << 30, 256);
 
 /// Why a file cannot be read as an image.
@@ -136,7 +135,7 @@ fn decode(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadab
     }
 }
 
-/// Rejects images with too many pixels, and images whose values are far larger than their file.
+/// Rejects images with too many pixels, or far larger than their file.
 pub(super) fn check(
     most_pixels: u64,
     length: u64,
@@ -200,7 +199,7 @@ pub(super) fn length_of(source: &mut dyn Source) -> io::Result<u64> {
     Ok(length)
 }
 
-/// Decodes row by row unless interlaced, so that only the values of the image are in memory.
+/// Decodes row by row unless interlaced, which saves memory.
 fn png(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let mut options = png::DecodeOptions::default();
@@ -300,7 +299,6 @@ impl Planes {
     }
 }
 
-/// Decodes the formats that the `image` crate reads at once.
 fn other(source: &mut dyn Source, format: ImageFormat, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let mut reader = ImageReader::with_format(source, format);

@@ -52,7 +52,7 @@ fn small() -> (Value, Vec<u8>) {
     (json, binary)
 }
 
-/// Reads everything and returns the number of successes. Failures must not panic.
+/// Counts successful reads. Failures must not panic.
 fn ask(document: &Document) -> usize {
     let mut count = 0;
     for i in 0..document.json.accessors.len() + 1 {

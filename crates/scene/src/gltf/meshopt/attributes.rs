@@ -44,7 +44,7 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
         };
     }
     let most = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
-    // A block has at least one byte per channel, which bounds the memory of an empty file.
+    // A block has at least one byte per channel: bounds the memory.
     if count.div_ceil(most).saturating_mul(stride / 4) > data.len() {
         return Err(TOO_SHORT);
     }
@@ -110,7 +110,7 @@ fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str>
         let i = i as u32;
         let byte = packed[(i / each) as usize];
         let place = i % each;
-        // Single bits are stored from the lowest of a byte, wider deltas from the highest.
+        // Single bits start at the lowest of a byte, wider deltas at the highest.
         let shift = if width == 1 { place } else { 8 - width * (place + 1) };
         *delta = byte >> shift & most;
     }

@@ -60,7 +60,7 @@ fn unfolded(number: u32) -> u32 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }
 
-/// A reader of bytes and of variable-length integers with 7 bits per byte.
+/// Bytes, and variable-length integers with 7 bits per byte.
 struct Numbers<'a> {
     data: &'a [u8],
 }
@@ -85,7 +85,6 @@ impl Numbers<'_> {
     }
 }
 
-/// A FIFO of the last 16 entries.
 #[derive(Default)]
 struct Fifo<T> {
     entries: [T; 16],
@@ -110,9 +109,8 @@ impl<T: Copy> Fifo<T> {
 
 struct Decoder<'a> {
     numbers: Numbers<'a>,
-    /// The next index that has not been used.
     next: u32,
-    /// The last index that was coded explicitly, as a delta.
+    /// The last index coded as a delta.
     last: u32,
     edges: Fifo<[u32; 2]>,
     vertices: Fifo<u32>,

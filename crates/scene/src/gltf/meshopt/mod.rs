@@ -16,7 +16,6 @@ use super::error::{GltfFault, plain, shown};
 /// In order of precedence.
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
-/// Compression of a buffer view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Compressed {
     /// Name of the extension.

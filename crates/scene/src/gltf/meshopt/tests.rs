@@ -154,7 +154,7 @@ fn damaged_streams_do_not_panic() {
     let (mut good, mut bad) = (0, 0);
     for Stream { name, how, bytes, .. } in streams() {
         for length in 0..bytes.len() {
-            // The tail of a truncated stream is misplaced, so the stream cannot end correctly.
+            // The tail of a truncated stream is misplaced.
             if how.decode(&bytes[..length]).is_ok() {
                 panic!("{name}: {length} of {} bytes", bytes.len());
             }

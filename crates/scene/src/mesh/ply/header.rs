@@ -37,7 +37,6 @@ impl Scalar {
         })
     }
 
-    /// Returns the size in bytes.
     pub fn size(self) -> usize {
         match self {
             Scalar::I8 | Scalar::U8 => 1,

@@ -17,7 +17,6 @@ use crate::key_path::{KeyPath, Segment};
 /// Maximum size in bytes of a part, and of a file that must be parsed as a whole.
 pub const LARGEST: usize = 4 << 20;
 
-/// The section of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Textures,
@@ -121,7 +120,7 @@ impl SyntaxFault {
 #[derive(Default)]
 pub struct Rest {
     pub text: String,
-    /// Start of each piece, here and in the whole text.
+    /// Starts of pieces, here and in the whole text.
     pieces: Vec<(usize, usize)>,
 }
 
@@ -134,7 +133,7 @@ impl Rest {
     }
 }
 
-/// The name of a part, if it has one, and its table.
+/// A part's name, if any, and table.
 pub type Named = (Option<String>, Table);
 
 impl<'a> Parts<'a> {
@@ -205,7 +204,7 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// Parses a part; `None` if it is not one element of its section and the file must be parsed as a whole.
+    /// Parses a part; `None` if it is not one element of its section: then the file must be parsed as a whole.
     pub fn read(&self, part: &Part) -> Result<Option<Named>, SyntaxFault> {
         let document = toml::from_str(self.text(part)).map_err(|error| SyntaxFault::of(part.place.start, &error));
         let mut document: Table = document?;
@@ -292,7 +291,6 @@ impl<'a> Headers<'a, toml_parser::lexer::Lexer<'a>> {
 }
 
 impl<'a, T: Iterator<Item = Token>> Headers<'a, T> {
-    /// Parses the header that starts at `start`.
     fn header(&mut self, start: usize) -> Option<Header<'a>> {
         let mut keys = Vec::new();
         let mut brackets = [1, 0]; // opened, closed

@@ -14,13 +14,11 @@ const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'a'\ncenter = [0, 
 const RED: &str = "[materials.a]\ntype = 'phong'\ncolor = [1, 0, 0]\n";
 const BLUE: &str = "[materials.\"b c\"]\ntype = 'phong'\ncolor = [0, 0, 1]\n";
 
-/// Returns the description of a text that is parsed as a whole, or its error.
 fn whole(text: &str) -> Result<Description, SceneError> {
     let table = toml::from_str(text).map_err(|error| SyntaxFault::of(0, &error).into_error(text, "s"))?;
     read_file(table).map_err(|problems| invalid(text, "s", problems, &Defines::new(&[])))
 }
 
-/// Returns the description of a text that is parsed by parts, or its error.
 fn by_parts(text: &str) -> Result<Description, String> {
     Description::parse(text, "s").map_err(|error| error.to_string())
 }

@@ -2,7 +2,6 @@
 
 use crate::{Light, Scene};
 
-/// Returns the light of a scene, or the error.
 fn spot(keys: &str) -> Result<Light, String> {
     let text = format!(
         "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\

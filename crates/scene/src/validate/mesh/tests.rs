@@ -71,14 +71,12 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     parse_in(&folder(), text)
 }
 
-/// Returns the valid scene with one line changed.
 fn with(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
     assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
     GOOD.replace(&line, &format!("\n{changed}\n"))
 }
 
-/// Returns the mesh-to-world transform of a shape.
 fn to_world(scene: &Scene, shape: usize) -> DAffine3 {
     match scene.shapes[shape].geometry {
         Geometry::Mesh { to_world, .. } => to_world,
@@ -96,9 +94,8 @@ fn groups(scene: &Scene, shape: usize) -> &[usize] {
 const LINE_OF_MATERIALS: &str = r#"materials = { roof = "red", brick = "white" }"#;
 const LINE_OF_MATRIX: &str = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]]";
 
-/// A line of the valid scene, its replacement, and the error.
+/// Valid line, replacement, error.
 const BAD: &[(&str, &str, &str)] = &[
-    // Files.
     (
         "file = \"parts.obj\"",
         "file = \"none.obj\"",
@@ -386,7 +383,6 @@ fn textures_are_on_meshes_with_coordinates() {
     assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::X, Vec2::Y]);
 }
 
-/// Tests all textures of the materials of the path integrator.
 #[test]
 fn every_texture_of_a_material_needs_coordinates() {
     let texture = "{ texture = \"checks\" }";

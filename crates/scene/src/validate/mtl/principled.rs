@@ -20,7 +20,7 @@ use crate::mesh::MtlMaterial;
 const SPECULAR: f64 = 2.0;
 
 impl SceneMaterials<'_> {
-    /// Returns a material. `Ka` is ignored, as exporters write anything there.
+    /// Exporters write anything as `Ka`: it is ignored.
     pub(super) fn principled(&mut self, own: &MtlMaterial, file: &Path, traits: Traits) -> Material {
         let mut warnings = Warnings::default();
         let clamped = |warnings: &mut Warnings, name: &'static str, color: [f64; 3], limit: f64| {
@@ -55,7 +55,7 @@ impl SceneMaterials<'_> {
         };
         let roughness = match (own.roughness, own.shininess) {
             (Some(roughness), _) => share(&mut warnings, "Pr", roughness),
-            // The roughness whose microfacet highlight is as wide as that of the Blinn-Phong exponent.
+            // Its highlight is as wide as that of the Blinn-Phong exponent.
             (None, Some(exponent)) => (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25),
             (None, None) => 1.0,
         };
@@ -105,7 +105,7 @@ impl SceneMaterials<'_> {
         }
     }
 
-    /// Returns the opacity by `map_d`: the alpha channel of its image, or its red if it has none.
+    /// Returns the opacity by `map_d`: the alpha of its image, else its red.
     fn opacity(&mut self, own: &MtlMaterial, file: &Path, traits: Traits, warnings: &mut Warnings) -> Option<Value> {
         let path = beside(file, own.opacity_map.as_ref()?);
         if let Ok(texture) = self.map(&path, Part::Alpha, traits.has_uvs) {
@@ -116,7 +116,7 @@ impl SceneMaterials<'_> {
         Some(Value::Texture(texture, Channel::R))
     }
 
-    /// Returns whether an image has normals: a gray one has heights, which are not supported.
+    /// Returns whether an image has normals: gray ones have heights, which are not supported.
     fn has_directions(&self, texture: usize, warnings: &mut Warnings) -> bool {
         let has_colors = match &self.textures[texture].kind {
             TextureKind::Image { image, .. } => match &image.texels {

@@ -20,7 +20,7 @@ const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 2 4\nv 0 0 5\nv 1 0 5\nv 
 struct TestFolder(TempDir);
 
 impl TestFolder {
-    /// Creates the mesh in the folder `in`, with these materials.
+    /// The mesh in the folder `in`.
     fn new(mtl: &str) -> TestFolder {
         let place = TestFolder(tempfile::tempdir().unwrap());
         fs::create_dir(place.path("in")).unwrap();
@@ -59,7 +59,7 @@ fn named<'a>(scene: &'a Scene, name: &str) -> &'a Material {
     &scene.materials[i]
 }
 
-/// Returns the ambient, diffuse and specular factors and the exponent.
+/// Ambient, diffuse, specular, exponent.
 fn phong(material: &Material) -> (Color, Color, Color, f64) {
     assert_eq!((material.emission, material.normal_map), (Color::BLACK, None));
     match material.reflection {

@@ -12,7 +12,7 @@ use super::super::super::{
     ValueDescription,
 };
 
-/// All features of the path tracer. Each line is unique, so that tests can replace it.
+/// All features. Each line is unique: tests replace it.
 const GOOD: &str = r#"
 image = { width = 4, height = 4 }
 camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
@@ -81,7 +81,6 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml")
 }
 
-/// Returns the valid scene with one line changed.
 fn with(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
     assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
@@ -321,7 +320,6 @@ fn the_background_is_the_surroundings() {
     assert_eq!((scene.render.background, scene.environment), (DVec3::ONE, None));
 }
 
-/// Tests that descriptions built in code equal those of a file.
 #[test]
 fn descriptions_made_in_code_are_read_back() {
     let mut clay = DiffuseDescription::new([0.5, 0.4, 0.3]);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A line of the valid scene, its invalid replacement, and the error.
+/// Valid line, invalid replacement, error.
 const BAD: &[(&str, &str, &str)] = &[
     (
         "max_depth = 3",
@@ -230,7 +230,6 @@ fn values_at_the_limits_are_good() {
     parse(&dark.replace("material = \"clay\"", "material = \"coal\"")).unwrap();
 }
 
-/// Tests a Phong scene with each feature of the path tracer.
 #[test]
 fn path_tracer_features_are_rejected_under_phong() {
     const START: &str = "image = { width = 1, height = 1 }\n\
