@@ -32,8 +32,8 @@ fn scene(path: &str, size: u32) -> Packed {
     pack(&Scene::load_with(&path, &overrides).expect("the project's scenes are valid"))
 }
 
-/// Measures the peak arithmetic throughput of one core, in operations: multiplications and additions of eight f32 per
-/// instruction, without memory accesses.
+/// Measures the peak throughput of one core in operations: multiplications and additions of eight f32 per instruction,
+/// without memory accesses.
 #[cfg(target_arch = "x86_64")]
 fn peak(criterion: &mut Criterion) {
     use std::arch::x86_64::{__m256, _mm256_add_ps, _mm256_mul_ps, _mm256_set1_ps};
@@ -67,7 +67,7 @@ fn peak(criterion: &mut Criterion) {
 #[cfg(not(target_arch = "x86_64"))]
 fn peak(_: &mut Criterion) {}
 
-/// Single calls of the functions that dominate the render time.
+/// Functions that dominate the render time.
 fn twins(criterion: &mut Criterion) {
     let scene = scene("scenes/cornell.toml", 400);
     let of_kind = |kind| {
@@ -124,7 +124,7 @@ fn twins(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Renders whole images. The throughput is in nominal rays.
+/// The throughput is in nominal rays.
 fn images(criterion: &mut Criterion) {
     let device = gpu::choose(&AdapterChoice::Auto).expect("benchmarks need an adapter");
     let adapter = device.info.name.clone();

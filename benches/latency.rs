@@ -24,7 +24,7 @@ const TIMEOUT: Duration = Duration::from_secs(120);
 /// The expression of `kernels/render.wgsl` that is multiplied by a factor.
 const EXPRESSION: &str = "path_value(path)";
 
-/// Times from a change until the old image is discarded, until the first image, and until each pixel has a sample.
+/// Times from a change until the old image is discarded, the first image, and a sample in each pixel.
 type Times = [Duration; 3];
 
 fn main() {
@@ -60,7 +60,7 @@ fn main() {
         "{:<14}{:>16}{:>18}{:>22}",
         "change", "old one stopped", "first image", "every pixel sampled"
     );
-    // Each run has its own seeds and kernels, so that no cache contains them.
+    // New seeds and kernels, which no cache contains.
     let now = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .map_or(0, |time| time.as_millis() as usize % 65_536);
@@ -94,14 +94,14 @@ fn main() {
     });
 }
 
-/// Replaces a file in one step, as editors do.
+/// Atomic, like an editor.
 fn replace(path: &Path, text: &str) {
     let mut file = NamedTempFile::new_in(path.parent().expect("a folder")).expect("a file");
     file.write_all(text.as_bytes()).expect("a written file");
     file.persist(path).expect("a replaced file");
 }
 
-/// Makes a change several times, and prints the times to the images.
+/// Repeats a change and prints the times.
 fn rounds(session: &Session, name: &str, change: impl Fn(usize)) {
     let times: Vec<Times> = (0..ROUNDS)
         .map(|i| {

@@ -82,7 +82,6 @@ fn builds(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Width and height of the image in pixels.
 const SIDE: usize = 512;
 const PAD: f32 = 1e-6;
 
@@ -146,7 +145,7 @@ impl View {
         closest(level, &self.mesh(), &line, 0.0, u32::MAX, none)
     }
 
-    /// Returns the mask of the occluded light samples; `None` if the light is behind the surface or the ray misses.
+    /// Mask of occluded samples; `None` if the light is behind the surface or the ray misses.
     fn occluded(&self, level: Level, pixel: usize, hit: Nearest) -> Option<u32> {
         let triangle = self.surface.triangles.get(hit.number as usize)?;
         let [a, b, c] = triangle.map(|i| self.surface.corners[i as usize]);

@@ -41,7 +41,7 @@ fn main() -> Result<(), Error> {
         .with_shape(SphereDescription::new("striped", [0.0, 0.0, 0.9], 0.9))
         .with_shape(SphereDescription::new("glass", [2.0, -0.5, 0.9], 0.9));
 
-    // A texture image in memory, under the file name that the texture refers to.
+    // A texture image in memory, by the texture's file name.
     let colors: Vec<[u8; 3]> = (0..32)
         .map(|i| if i % 4 < 2 { [200, 40, 40] } else { [240, 230, 200] })
         .collect();

@@ -235,7 +235,7 @@ pub fn rock(count: usize) -> Triangles {
     let mut numbers = HashMap::with_capacity(6 * side * side + 2);
     let mut vertex = |lattice: [usize; 3]| -> u32 {
         *numbers.entry(lattice).or_insert_with(|| {
-            // Equiangular coordinates: with the tangent, all cells have about the same size on the sphere.
+            // Equiangular coordinates: with the tangent, cells have similar sizes on the sphere.
             let on_cube = lattice.map(|i| ((2.0 * i as f64 / side as f64 - 1.0) * TAU / 8.0).tan());
             let direction = unit(on_cube);
             let radius = 0.4 + 0.16 * noise(direction.map(|x| 1.3 * x + 7.0), 10);
@@ -283,7 +283,7 @@ fn noise(mut point: [f64; 3], octaves: u32) -> f64 {
         let face = |z: i64| mix(edge(0, z), edge(1, z), weight[1]);
         sum += height * mix(face(0), face(1), weight[2]);
         height *= 0.5;
-        // The offset prevents the lattices of different octaves from coinciding.
+        // The offset keeps lattices from coinciding.
         point = point.map(|x| 2.0 * x + 0.37);
     }
     2.0 * sum

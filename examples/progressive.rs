@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use wgray::{Error, Options, Overrides, Picture, Scene};
 
-/// Width and height of the image. One character shows two pixels, one above the other.
+/// A character shows two pixels, one above the other.
 const SIZE: (u32, u32) = (64, 48);
 
 fn main() -> Result<(), Error> {
@@ -26,7 +26,7 @@ fn main() -> Result<(), Error> {
     let mut last_draw = Instant::now();
     let picture = wgray::render_progressive(&scene, &Options::default(), &mut |progress| {
         if last_draw.elapsed() > Duration::from_millis(100) {
-            // Moves the cursor back up, so that the next image overwrites this one.
+            // Moves the cursor up: the next image overwrites this one.
             let lines = draw(&progress.picture()?);
             print!("{:3.0} %\x1b[{lines}A\r", progress.share() * 100.0);
             last_draw = Instant::now();
@@ -42,7 +42,6 @@ fn main() -> Result<(), Error> {
     Ok(())
 }
 
-/// Prints an image and returns its number of lines.
 fn draw(picture: &Picture) -> usize {
     let (width, bytes) = (picture.width() as usize, picture.rgb8());
     let rows: Vec<&[u8]> = bytes.chunks(3 * width).collect();

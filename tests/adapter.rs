@@ -10,7 +10,7 @@ const ADAPTER: &str = "WGRAY_TEST_ADAPTER";
 /// Set to 1 to run only the tests that need no adapter.
 const WITHOUT: &str = "WGRAY_TEST_WITHOUT_GPU";
 
-/// Returns the adapter under test; `None` if `WGRAY_TEST_WITHOUT_GPU` is 1. Panics if none is found otherwise.
+/// Returns the adapter under test, or `None` if `WGRAY_TEST_WITHOUT_GPU` is 1. Panics if no adapter is found.
 pub fn device() -> Option<&'static Device> {
     static DEVICE: OnceLock<Option<Device>> = OnceLock::new();
     DEVICE.get_or_init(open).as_ref()
@@ -18,14 +18,14 @@ pub fn device() -> Option<&'static Device> {
 
 fn open() -> Option<Device> {
     if std::env::var_os(WITHOUT).is_some_and(|value| value == "1") {
-        tell("adapter: none, as WGRAY_TEST_WITHOUT_GPU=1 asks; GPU and CPU are not compared");
+        print_line("adapter: none, as WGRAY_TEST_WITHOUT_GPU=1 asks; GPU and CPU are not compared");
         return None;
     }
     let choice = std::env::var(ADAPTER).map_or(AdapterChoice::Auto, AdapterChoice::Named);
     match choose(&choice) {
         Ok(device) => {
             let info = &device.info;
-            tell(&format!(
+            print_line(&format!(
                 "adapter: {}, {} ({}, {})",
                 info.name, info.driver, info.backend, info.kind
             ));
@@ -35,8 +35,8 @@ fn open() -> Option<Device> {
     }
 }
 
-/// Prints directly, as the test harness captures `eprintln!`.
-fn tell(line: &str) {
+/// Writes to standard error directly because the test harness captures `eprintln!`.
+fn print_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}"); // a closed stderr does not fail the test
 }
 
@@ -50,7 +50,7 @@ pub fn bit_exact(device: &Device) -> bool {
 pub struct KnownDifference {
     /// Part of the adapter's name or driver.
     pub adapter: &'static str,
-    /// The check: the name of a shared function, `denormal numbers` for all functions, `picture` or `first hits`.
+    /// The affected check: the name of a shared function, `denormal numbers` for all functions, `picture` or `first hits`.
     pub what: &'static str,
     pub reason: &'static str,
     /// Maximum fraction of results that may differ.
@@ -58,7 +58,7 @@ pub struct KnownDifference {
 }
 
 pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
-    swiftshader("denormal numbers", "zero taken for denormal numbers", 0.0096),
+    swiftshader("denormal numbers", "denormal numbers are treated as zero", 0.0096),
     swiftshader("grid_sample", ROUNDED_TWICE, 0.0014),
     swiftshader("rotated_grid_sample", ROUNDED_TWICE, 0.0014),
     swiftshader("jittered_sample", ROUNDED_TWICE, 0.0065),
@@ -66,8 +66,8 @@ pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
     swiftshader("filter_offset", ROUNDED_TWICE, 0.0102),
 ];
 
-/// Conversion to a float in two steps, each of which rounds. Scene indices are below 2^31.
-pub const ROUNDED_TWICE: &str = "unsigned integers from 2^31 on, which are rounded twice";
+/// The driver converts such integers to floats in two rounding steps. Indices in scenes are below 2^31.
+pub const ROUNDED_TWICE: &str = "unsigned integers of 2^31 or more are rounded twice";
 
 const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> KnownDifference {
     KnownDifference {
@@ -85,18 +85,18 @@ pub fn allowed<'a>(known: &'a [KnownDifference], name: &str, driver: &str, what:
         .find(|k| k.what == what && (name.contains(k.adapter) || driver.contains(k.adapter)))
 }
 
-/// Compares the fraction of differing results with the table. Without an entry none may differ; an entry whose
-/// deviation no longer occurs is an error.
+/// Checks the fraction of differing results against the table entry. Without an entry no result may differ. An entry
+/// whose deviation no longer occurs is an error.
 pub fn judge(known: Option<&KnownDifference>, what: &str, share: f64) -> Result<(), String> {
     match known {
         None if share == 0.0 => Ok(()),
         None => Err(format!("{what}: {:.4} % of the results differ", share * 100.0)),
         Some(k) if share == 0.0 => Err(format!(
-            "{what}: nothing differs any more, its entry must go: {}",
+            "{what}: no result differs any more; remove the entry: {}",
             k.reason
         )),
         Some(k) if share > k.share => Err(format!(
-            "{what}: {share} of the results differ, not by {} alone",
+            "{what}: {share} of the results differ, more than explained by: {}",
             k.reason
         )),
         Some(_) => Ok(()),
@@ -114,17 +114,17 @@ fn outdated_or_exceeded_known_differences_fail() {
     let entry = allowed(&known, "Some GPU 9000", "driver 1", "dot");
     assert!(entry.is_some());
     assert!(judge(entry, "dot", 0.05).is_ok());
-    assert!(judge(entry, "dot", 0.0).is_err(), "an entry that no longer applies");
-    assert!(judge(entry, "dot", 0.2).is_err(), "more than is known");
+    assert!(judge(entry, "dot", 0.0).is_err(), "an outdated entry is accepted");
+    assert!(judge(entry, "dot", 0.2).is_err(), "more differences than listed are accepted");
     for (name, driver, what) in [("Some GPU", "driver 1", "cross"), ("Other", "driver 1", "dot")] {
         let entry = allowed(&known, name, driver, what);
         assert!(entry.is_none());
-        assert!(judge(entry, what, 1e-6).is_err(), "an unknown difference");
+        assert!(judge(entry, what, 1e-6).is_err(), "an unlisted difference is accepted");
         assert!(judge(entry, what, 0.0).is_ok());
     }
 }
 
-/// A failed query of the driver properties looks like missing support.
+/// If the query of the driver properties failed, the properties would look unsupported.
 #[test]
 fn software_vulkan_can_be_asked_for_float_controls() {
     let Some(device) = device().filter(|device| bit_exact(device)) else {

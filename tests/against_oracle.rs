@@ -1,4 +1,4 @@
-//! Images and first hits of all scenes, compared with the oracle's.
+//! Compares images and first hits of all scenes with the oracle (`oracle.rs`).
 
 use glam::{DVec2, DVec3};
 use wgray::scene::{Description, Pattern, SamplesDescription};
@@ -8,13 +8,13 @@ use crate::oracle::{Flaw, Meeting, Oracle};
 use crate::pictures::{both, first_hits, means, render};
 use crate::scenes;
 
-/// Tolerance of a value `v`, in units of `1 + v`. An f32 error after a specular exponent of 50 is about as large.
+/// Tolerance of a value `v`, relative to `1 + v`. Rounding errors of f32 reach this size after a specular exponent of 50.
 const TOLERANCE: f64 = 1e-5;
 
 /// Maximum fraction of differing pixels. At an edge, rounding can move a sample to the other side.
 const EDGES: f64 = 0.0005;
 
-/// Scenes with more edges: name, fraction of differing pixels, reason.
+/// Scenes with more edges: name, maximum fraction of differing pixels, reason.
 const MORE_EDGES: &[(&str, f64, &str)] = &[
     (
         "balls-checker.toml",
@@ -163,7 +163,7 @@ fn images_match_the_oracle() {
     }
 }
 
-/// Each flaw is detected in a scene; one that affects all scenes, in every scene.
+/// Every flaw is detected in some scene; a flaw that affects all scenes is detected in each of them.
 #[test]
 fn a_flawed_oracle_is_found() {
     let way = *both().last().expect("the CPU at least");

@@ -123,7 +123,7 @@ fn the_closed_form_of_the_mean_cosine_is_right() {
     }
 }
 
-/// The mean cosine, up to the error of the sample grid (a midpoint rule).
+/// Pixels equal the mean cosine, up to the error of the sample grid, which is a midpoint rule.
 #[test]
 fn light_of_a_rectangle_on_a_plane() {
     let (from, height) = (DVec3::new(0.3, 0.2, 0.5), 4.0);
@@ -160,7 +160,7 @@ fn light_of_a_rectangle_on_a_plane() {
     }
 }
 
-/// A conic section: an ellipse on the plane.
+/// The outline of the shadow is a conic section, here an ellipse.
 #[test]
 fn shadow_of_a_sphere() {
     let (from, height) = (DVec3::new(1.6, 0.0, 1.0), 2.4);
@@ -203,7 +203,7 @@ fn shadow_of_a_sphere() {
         assert!((dark / (PI * long * short) - 1.0).abs() < 0.01, "{mode:?}: {dark}");
         assert!(
             !((dark / (PI * long * long) - 1.0).abs() < 0.05),
-            "a circle is found out"
+            "a circle passes"
         );
         // Outside the shadow only the cosine remains: a point light has no falloff.
         let worst = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
@@ -300,7 +300,7 @@ fn outlines_of_ellipsoids() {
     }
 }
 
-/// Seen along the normal, constant: kd n.l + ks (r.v)^s.
+/// Seen along the normal, the radiance is constant: kd n.l + ks (r.v)^s.
 #[test]
 fn directional_light_on_a_plane() {
     for (exponent, other) in [(16.0, 15.0), (2.5, 2.4), (0.5, 0.6), (1.0, 1.5)] {
@@ -320,7 +320,7 @@ fn directional_light_on_a_plane() {
             assert!(error < 1e-6, "{mode:?}, shininess {exponent}: {error}");
             assert!(!(worst(&scene, mode, |_| expected(other)) < 1e-4), "another shininess");
         }
-        // From below: black, as the normal faces the viewer and the light is behind the surface.
+        // Seen from below, the plane is black: the normal faces the viewer, so the light is behind the surface.
         scene.camera = empty(-DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).camera;
         for mode in both() {
             assert_eq!(worst(&scene, mode, |_| 0.0), 0.0, "{mode:?}");

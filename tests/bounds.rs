@@ -19,7 +19,7 @@ struct Bound {
 const EPSILON: f64 = f32::EPSILON as f64;
 const CALLS: usize = 1 << 20;
 
-/// Returns the error in units in the last place of the truth.
+/// Returns the error in units in the last place (ulp) of the true value.
 fn ulps(result: f64, truth: f64) -> f64 {
     let last_place = (truth as f32).abs().max(f32::MIN_POSITIVE);
     (result - truth).abs() / f64::from(last_place.next_up() - last_place)
@@ -132,7 +132,7 @@ const BOUNDS: &[Bound] = &[
     },
 ];
 
-/// Returns the maximum error over [`CALLS`] arguments, by the first word of each result.
+/// Returns the maximum error over [`CALLS`] arguments. Only the first word of each result is compared.
 fn largest(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
     let random = Random::new(bound.bound.to_bits());
     let arguments: Vec<Vec<f32>> = (0..CALLS).map(|_| (bound.arguments)(&random)).collect();
@@ -214,7 +214,7 @@ fn functions_are_exact_at_special_values() {
         ("atan2", &[-2.0, -2.0], -3.0 * std::f32::consts::FRAC_PI_4),
         ("min", &[1.0, 2.0], 1.0),
         ("max", &[1.0, 2.0], 2.0),
-        ("min", &[0.0, -0.0], -0.0), // the second argument, as neither is less
+        ("min", &[0.0, -0.0], -0.0), // neither is less: the second argument
         ("max", &[f32::NAN, 0.0], 0.0),
         ("positive_zero", &[-0.0], 0.0),
         ("positive_zero", &[-1.5], -1.5),

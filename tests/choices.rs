@@ -50,7 +50,7 @@ fn every_device_choice_gives_the_same_image_and_reports_the_device() {
 }
 
 #[test]
-fn a_progressive_image_ends_as_the_rendered_one() {
+fn the_final_progressive_image_equals_the_rendered_image() {
     let Some(device) = adapter::device() else { return };
     let scene = scene(Overrides {
         size: Some((130, 131)),
@@ -69,7 +69,7 @@ fn a_progressive_image_ends_as_the_rendered_one() {
     assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
 }
 
-/// If the driver truncates loops and a sample exceeds its limit; the image reports it.
+/// Applies if the driver truncates loops and one sample exceeds the limit. The image names the CPU as its device.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_by_the_cpu() {
     let Some(device) = adapter::device() else { return };

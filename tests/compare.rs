@@ -32,7 +32,7 @@ fn picture(width: u32, height: u32, kind: Kind, value: impl Fn(u32, u32, u32) ->
 
 const BYTES: Kind = Kind::Display { bits: 8 };
 
-/// Returns the two images of `formula` in the script.
+/// Returns the two images that `formula` in the script defines.
 fn formula(kind: Kind) -> (Picture, Picture) {
     let smooth = |x: u32, y: u32, c: u32| ((x * 5 + y * 3 + c * 40) % 256) as i32;
     let noise = |x: u32, y: u32, c: u32| ((x * 7919 + y * 104_729 + c * 1_299_709 + x * y * 31) % 101) as i32 - 50;

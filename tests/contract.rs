@@ -1,4 +1,4 @@
-//! Tests of each sentence of the contract of `wgray_render::backend::Backend`, on CPU and GPU, with baked and buffered
+//! Tests every sentence of the contract of `wgray_render::backend::Backend` on CPU and GPU, with baked and buffered
 //! scenes. Deliberately wrong backends must fail.
 
 use std::ops::Range;

@@ -43,7 +43,7 @@ fn scene(n: usize, one: &str) -> String {
 
 const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'first'\ncenter = [{x}, {y}, {z}]\nradius = 0.05";
 
-/// Every kind of object that a scene may have many of.
+/// All kinds of objects that a scene may contain in large numbers.
 const KINDS: [(&str, &str); 13] = [
     ("spheres", SPHERE),
     (
@@ -59,7 +59,7 @@ const KINDS: [(&str, &str); 13] = [
         "triangles",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {z}], [9, {y}, {z}], [{x}, 9, {y}]]",
     ),
-    // A slope of triangles: each triangle has all others on one side.
+    // All other triangles are on the same side of each triangle.
     (
         "triangles on a slope",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {x}], [9, {y}, 9], [9, 9, 9]]",
@@ -92,7 +92,7 @@ const KINDS: [(&str, &str); 13] = [
         "[textures.t{i}]\ntype = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]\n[materials.m{i}]\ntype = 'phong'\n\
          color = { texture = 't{i}' }",
     ),
-    // Parsed in one piece, as the parent table `materials` also exists.
+    // The parent table `materials` also exists, so the parser handles all materials in one piece.
     (
         "materials in one table",
         "[materials.m{i}.color]\ntexture = 't'\n[materials.m{i}]\ntype = 'mirror'",
@@ -104,7 +104,7 @@ fn packed(text: &str) -> Option<Packed> {
     scene.ok().map(|scene| pack(&scene))
 }
 
-/// Returns the thread's CPU time in seconds; `/proc` resolves only some milliseconds.
+/// Returns the CPU time of the thread in seconds. `/proc` has a resolution of several milliseconds, which is too coarse.
 fn processor_time(work: impl Fn()) -> f64 {
     #[cfg(unix)]
     let now = || {
@@ -124,7 +124,7 @@ fn processor_time(work: impl Fn()) -> f64 {
     now() - start
 }
 
-/// Returns the minimum of three times, in a pool of one thread, which runs no work of other tests.
+/// Measures three times and returns the minimum. Uses a pool of one thread, which runs no work of other tests.
 fn least_of_three(work: impl Fn() + Sync) -> f64 {
     let thread = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -134,7 +134,8 @@ fn least_of_three(work: impl Fn() + Sync) -> f64 {
     thread.install(times)
 }
 
-/// Returns the ratio, measured until it is below `bound`, so that load does not fail the test.
+/// Returns the ratio of the times. Repeats the measurement while the ratio is above `bound`, because other processes
+/// may slow it down.
 fn ratio_below(bound: f64, large: impl Fn() + Sync, small: impl Fn() + Sync) -> f64 {
     const ROUNDS: usize = 8;
     let (mut most, mut least) = (f64::INFINITY, f64::INFINITY);

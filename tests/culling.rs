@@ -17,8 +17,8 @@ fn some_scenes(count: usize) -> Vec<Packed> {
     (0..count).map(scene).collect()
 }
 
-/// Returns how many primitives are culled, and wrongly culled. Points are up to 30 radii away, and up to 200 in local
-/// space: at thousands of radii both tests are dominated by rounding. `bound` changes the bounding spheres.
+/// Returns how many primitives are culled, and how many of them wrongly. Points are up to 30 radii away, and up to 200
+/// in local space: at thousands of radii both tests are dominated by rounding. `bound` changes the bounding spheres.
 fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usize) {
     let random = Random::new(11);
     let (mut left_out, mut wrong) = (0, 0);
@@ -61,9 +61,9 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
 #[test]
 fn culled_primitives_occlude_nothing() {
     let scenes = some_scenes(400);
-    let (left_out_rightly, wrong) = left_out(&scenes, |sphere| sphere);
-    println!("{left_out_rightly} primitives were left out, {wrong} of them wrongly");
-    assert!(left_out_rightly > 10_000, "only {left_out_rightly} were left out");
+    let (culled, wrong) = left_out(&scenes, |sphere| sphere);
+    println!("{culled} primitives were culled, {wrong} of them wrongly");
+    assert!(culled > 10_000, "only {culled} primitives were culled");
     assert_eq!(wrong, 0);
     let smaller = |sphere: Sphere| Sphere {
         radius: 0.9 * sphere.radius,
@@ -71,6 +71,6 @@ fn culled_primitives_occlude_nothing() {
     };
     assert!(
         left_out(&scenes, smaller).1 > 0,
-        "spheres that are too small are not found"
+        "too small spheres are not found"
     );
 }

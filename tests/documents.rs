@@ -57,7 +57,7 @@ fn anchors(page: &str) -> Vec<String> {
         .collect()
 }
 
-/// Returns the relative links without an existing target.
+/// Returns the relative links whose targets do not exist.
 fn broken_links(page: &Path, text: &str) -> Vec<String> {
     let leads_nowhere = |link: &String| {
         if link.contains("://") {

@@ -1,5 +1,5 @@
-//! Spheres as ground, with radii of 1e-3 to 1e4 scene sizes, near the origin and far away, compared with the f64
-//! oracle: no self-shadowing, and correct contact shadows.
+//! Compares large and small spheres with the f64 oracle: no self-shadowing, and correct contact shadows. Radii are 1e-3
+//! to 1e4 scene sizes, near the origin and far away.
 
 use glam::DVec3;
 use wgray::scene::Description;

@@ -94,7 +94,7 @@ fn a_crop_may_use_the_size_of_the_option() {
     place.quietly(&["render", "small.toml", "--size", "20x20", "--crop", "0,0,11,7"]);
 }
 
-/// Each rule of scene files is tested next to the parser.
+/// A selection; tests next to the parser cover every rule of scene files.
 #[test]
 fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
     let cases = [
@@ -156,7 +156,7 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
     }
 }
 
-/// With the message of the file.
+/// An error that is caused by the option is reported at the line of the file.
 #[test]
 fn an_integrator_option_validates_the_scene() {
     let place = TestFolder::new();

@@ -71,7 +71,7 @@ fn gray(values: &[f32]) -> Vec<(&'static str, FlatSamples)> {
     ["R", "G", "B"].into_iter().map(|name| (name, floats(values))).collect()
 }
 
-fn two(place: &TestFolder) -> (Vec<u8>, Vec<u8>) {
+fn write_two_pngs(place: &TestFolder) -> (Vec<u8>, Vec<u8>) {
     let a: Vec<u8> = (0..24).map(|i| i * 9).collect();
     let mut b = a.clone();
     b[16] += 10; // pixel (1, 1), green
@@ -81,7 +81,7 @@ fn two(place: &TestFolder) -> (Vec<u8>, Vec<u8>) {
 }
 
 #[track_caller]
-fn says(ran: &Ran, code: i32, text: &str) {
+fn assert_output(ran: &Ran, code: i32, text: &str) {
     assert_eq!(ran.code, code, "{}{}", ran.stdout, ran.stderr);
     let output = if [0, 5].contains(&code) {
         &ran.stdout
@@ -99,29 +99,29 @@ fn json(ran: &Ran) -> serde_json::Value {
 #[test]
 fn the_same_bits_pass_and_any_other_bit_fails() {
     let place = TestFolder::new();
-    let (a, _) = two(&place);
+    let (a, _) = write_two_pngs(&place);
     png(&place, "copy.png", (4, 2), &a);
     for other in ["a.png", "copy.png"] {
         let ran = place.run(&["diff", "a.png", other]);
-        says(&ran, 0, "color R G B: identical\nidentical\n");
+        assert_output(&ran, 0, "color R G B: identical\nidentical\n");
     }
     let ran = place.run(&["diff", "a.png", "b.png"]);
-    says(&ran, 5, "fails: color: 1 pixel differs\n");
-    says(&ran, 5, "  different  1 of 8 pixels, the first at (1, 1)\n");
-    says(
+    assert_output(&ran, 5, "fails: color: 1 pixel differs\n");
+    assert_output(&ran, 5, "  different  1 of 8 pixels, the first at (1, 1)\n");
+    assert_output(
         &ran,
         5,
         "  largest    0.0392157 in G at (1, 1): 0.564706 instead of 0.603922\n",
     );
     // (10 / 255)² / 24 values
-    says(&ran, 5, "  rmse       0.00800487\n");
+    assert_output(&ran, 5, "  rmse       0.00800487\n");
     assert_eq!((ran.stderr.as_str(), place.files().len()), ("", 3));
 }
 
 #[test]
 fn json_has_the_same_names() {
     let place = TestFolder::new();
-    two(&place);
+    write_two_pngs(&place);
     let ran = place.run(&["diff", "a.png", "b.png", "--json"]);
     assert_eq!(ran.code, 5);
     let found = json(&ran);
@@ -161,7 +161,7 @@ fn json_has_the_same_names() {
 #[test]
 fn limits_decide_the_exit_code() {
     let place = TestFolder::new();
-    two(&place);
+    write_two_pngs(&place);
     let passes = |limits: &[&str]| {
         let options: Vec<&str> = limits.iter().flat_map(|limit| ["--fail", limit]).collect();
         let ran = place.run(&[&["diff", "a.png", "b.png"], &options[..]].concat());
@@ -197,7 +197,7 @@ fn limits_decide_the_exit_code() {
 #[test]
 fn wrong_command_lines_exit_with_2() {
     let place = TestFolder::new();
-    two(&place);
+    write_two_pngs(&place);
     exr(&place, "depth.exr", (2, 1), vec![("depth.Z", floats(&[1.0, 2.0]))]);
     let metrics = "different, largest, share, rmse, rel_mse, psnr, ssim, flip";
     let cases: [(&[&str], &str); 17] = [
@@ -242,7 +242,7 @@ fn wrong_command_lines_exit_with_2() {
     ];
     for (arguments, message) in cases {
         let ran = place.run(&[&["diff"], arguments].concat());
-        says(&ran, 2, message);
+        assert_output(&ran, 2, message);
         assert_eq!(ran.stdout, "", "{arguments:?}");
     }
     assert_eq!(place.files(), ["a.png", "b.png", "depth.exr"]);
@@ -251,7 +251,7 @@ fn wrong_command_lines_exit_with_2() {
 #[test]
 fn files_that_are_not_images_exit_with_1() {
     let place = TestFolder::new();
-    let (a, _) = two(&place);
+    let (a, _) = write_two_pngs(&place);
     let whole = place.read("a.png");
     for (name, bytes) in [
         ("empty.png", &[][..]),
@@ -283,7 +283,7 @@ fn files_that_are_not_images_exit_with_1() {
     ] {
         for arguments in [["diff", name, "a.png"], ["diff", "a.png", name]] {
             let ran = place.run(&arguments);
-            says(&ran, 1, &format!("error: {name}: {message}"));
+            assert_output(&ran, 1, &format!("error: {name}: {message}"));
             assert_eq!(ran.stdout, "", "{name}");
         }
     }
@@ -294,28 +294,28 @@ fn files_that_are_not_images_exit_with_1() {
     }
     // the format comes from the content, not from the extension
     png(&place, "a.exr", (4, 2), &a);
-    says(&place.run(&["diff", "a.exr", "a.png"]), 0, "identical\n");
+    assert_output(&place.run(&["diff", "a.exr", "a.png"]), 0, "identical\n");
 }
 
 #[test]
 fn different_sizes_and_positions_differ() {
     let place = TestFolder::new();
-    two(&place);
+    write_two_pngs(&place);
     png(&place, "wide.png", (8, 1), &[0; 24]);
     let ran = place.run(&["diff", "a.png", "wide.png", "--fail", "rmse=1", "--out", "out.png"]);
-    says(&ran, 5, "fails: A has 4 x 2 pixels, B 8 x 1\n");
-    says(&ran, 5, "note: out.png: not written");
+    assert_output(&ran, 5, "fails: A has 4 x 2 pixels, B 8 x 1\n");
+    assert_output(&ran, 5, "note: out.png: not written");
     assert!(!place.path("out.png").exists());
-    // two crops of equal size of one image
+    // two crops of one image, equal in size
     for (name, crop) in [("left.exr", "0,0,2,2"), ("right.exr", "2,0,4,2")] {
         place.quietly(&["render", "small.toml", "--device", "cpu", "-o", name, "--crop", crop]);
     }
-    says(
+    assert_output(
         &place.run(&["diff", "left.exr", "right.exr"]),
         5,
         "fails: A starts at pixel (0, 0) of the whole image, B at (2, 0)\n",
     );
-    says(&place.run(&["diff", "left.exr", "left.exr"]), 0, "identical\n");
+    assert_output(&place.run(&["diff", "left.exr", "left.exr"]), 0, "identical\n");
 }
 
 #[test]
@@ -327,34 +327,34 @@ fn missing_channels_differ_unless_excluded() {
     exr(&place, "deeper.exr", (2, 1), [colors(), depth(2.5)].concat());
     exr(&place, "colors.exr", (2, 1), colors());
     let missing = place.run(&["diff", "both.exr", "colors.exr", "--fail", "rmse=9"]);
-    says(&missing, 5, "fails: B lacks depth.Z, which A has\n");
-    says(
+    assert_output(&missing, 5, "fails: B lacks depth.Z, which A has\n");
+    assert_output(
         &place.run(&["diff", "colors.exr", "both.exr"]),
         5,
         "fails: A lacks depth.Z, which B has\n",
     );
-    says(
+    assert_output(
         &place.run(&["diff", "colors.exr", "both.exr", "--layers", "color"]),
         0,
         "identical\n",
     );
     // differing layers are listed, and identical ones are reported as such
     let ran = place.run(&["diff", "both.exr", "deeper.exr"]);
-    says(&ran, 5, "color R G B: identical\ndepth depth.Z\n");
-    says(&ran, 5, "  largest    0.5 in depth.Z at (1, 0): 2 instead of 2.5\n");
-    says(&ran, 5, "fails: depth: 1 pixel differs\n");
-    says(
+    assert_output(&ran, 5, "color R G B: identical\ndepth depth.Z\n");
+    assert_output(&ran, 5, "  largest    0.5 in depth.Z at (1, 0): 2 instead of 2.5\n");
+    assert_output(&ran, 5, "fails: depth: 1 pixel differs\n");
+    assert_output(
         &place.run(&["diff", "both.exr", "deeper.exr", "--layers", "color"]),
         0,
         "identical\n",
     );
-    says(
+    assert_output(
         &place.run(&["diff", "both.exr", "deeper.exr", "--fail", "rmse=0.3"]),
         5,
         "fails: depth: rmse 0.353553 is above 0.3\n",
     );
     let ran = place.run(&["diff", "both.exr", "deeper.exr", "--out", "out.png"]);
-    says(&ran, 5, "note: out.png: shows layer depth\n");
+    assert_output(&ran, 5, "note: out.png: shows layer depth\n");
     assert!(place.path("out.png").exists());
 }
 
@@ -370,10 +370,10 @@ fn non_finite_values_are_counted_and_fail() {
     exr(&place, "odd.exr", (4, 1), red(&[0.5, nan, inf, -inf]));
     exr(&place, "even.exr", (4, 1), red(&[0.5; 4]));
     let text = "color: 1 NaN and 2 infinite values in A, 1 and 2 in B, the first at (1, 0)";
-    // also fails for identical files, whatever the limits
+    // identical files fail, too, regardless of the limits
     let same = ["diff", "odd.exr", "odd.exr"];
-    says(&place.run(&same), 5, text);
-    says(&place.run(&[&same[..], &["--fail", "rmse=9"]].concat()), 5, text);
+    assert_output(&place.run(&same), 5, text);
+    assert_output(&place.run(&[&same[..], &["--fail", "rmse=9"]].concat()), 5, text);
     let ran = place.run(&["diff", "odd.exr", "even.exr", "--json", "--fail", "share=1"]);
     assert_eq!(ran.code, 5);
     let layer = &json(&ran)["layers"][0];
@@ -381,7 +381,7 @@ fn non_finite_values_are_counted_and_fail() {
         layer["not_finite"],
         serde_json::json!({"nan_a": 1, "nan_b": 0, "infinite_a": 2, "infinite_b": 0, "first": {"x": 1, "y": 0}})
     );
-    // they count as different pixels, and as 0 in the other metrics
+    // pixels with non-finite values count as different, and as 0 in the other metrics
     assert_eq!((&layer["different"], &layer["share"]), (&3.into(), &0.75.into()));
     for metric in ["largest", "rmse", "rel_mse", "flip"] {
         assert_eq!(layer[metric], 0.0, "{metric}");
@@ -394,9 +394,9 @@ fn signed_zeros_differ_by_zero() {
     exr(&place, "plus.exr", (1, 1), gray(&[0.0]));
     exr(&place, "minus.exr", (1, 1), gray(&[-0.0]));
     let ran = place.run(&["diff", "plus.exr", "minus.exr"]);
-    says(&ran, 5, "fails: color: 1 pixel differs\n");
-    says(&ran, 5, "  largest    0\n");
-    says(
+    assert_output(&ran, 5, "fails: color: 1 pixel differs\n");
+    assert_output(&ran, 5, "  largest    0\n");
+    assert_output(
         &place.run(&["diff", "plus.exr", "minus.exr", "--fail", "largest=0"]),
         0,
         "passes\n",
@@ -406,7 +406,7 @@ fn signed_zeros_differ_by_zero() {
 #[test]
 fn the_share_counts_differences_above_the_threshold() {
     let place = TestFolder::new();
-    let (a, mut b) = two(&place);
+    let (a, mut b) = write_two_pngs(&place);
     b[0] += 1;
     png(&place, "b.png", (4, 2), &b);
     png(&place, "a.png", (4, 2), &a);
@@ -417,13 +417,13 @@ fn the_share_counts_differences_above_the_threshold() {
     // 1 / 255 is 0.0039, 10 / 255 is 0.0392
     assert_eq!((share("0"), share("0.01"), share("0.04")), (0.25, 0.125, 0.0));
     let ran = place.run(&["diff", "a.png", "b.png", "--threshold", "0.01", "--fail", "share=0.1"]);
-    says(&ran, 5, "fails: color: share over 0.01 0.125 is above 0.1\n");
+    assert_output(&ran, 5, "fails: color: share over 0.01 0.125 is above 0.1\n");
 }
 
 #[test]
 fn only_requested_metrics_are_computed() {
     let place = TestFolder::new();
-    two(&place);
+    write_two_pngs(&place);
     let ran = place.run(&[
         "diff",
         "a.png",
@@ -474,13 +474,13 @@ fn encodings_of_equal_values_are_equal() {
     let opaque: Vec<u8> = colors.chunks(3).flat_map(|pixel| [pixel, &[255]].concat()).collect();
     png(&place, "opaque.png", (4, 2), &opaque);
     for name in ["palette.png", "deep.png", "opaque.png"] {
-        says(&place.run(&["diff", name, "rgb.png"]), 0, "identical\n");
-        says(&place.run(&["diff", "rgb.png", name]), 0, "identical\n");
+        assert_output(&place.run(&["diff", name, "rgb.png"]), 0, "identical\n");
+        assert_output(&place.run(&["diff", "rgb.png", name]), 0, "identical\n");
     }
     let mut deeper = deep;
     deeper[1] += 1;
     write_png(&place, "deep.png", (4, 2), ColorType::Rgb, BitDepth::Sixteen, &deeper);
-    says(
+    assert_output(
         &place.run(&["diff", "deep.png", "rgb.png"]),
         5,
         "1 of 8 pixels, the first at (0, 0)\n",
@@ -488,14 +488,14 @@ fn encodings_of_equal_values_are_equal() {
     let mut glass = opaque;
     glass[7] = 254;
     png(&place, "glass.png", (4, 2), &glass);
-    says(
+    assert_output(
         &place.run(&["diff", "glass.png", "rgb.png"]),
         5,
         " in A at (1, 0): 0.996078 instead of 1\n",
     );
     png(&place, "gray.png", (2, 1), &[7, 9]);
     png(&place, "grays.png", (2, 1), &[7, 7, 7, 9, 9, 9]);
-    says(&place.run(&["diff", "gray.png", "grays.png"]), 0, "identical\n");
+    assert_output(&place.run(&["diff", "gray.png", "grays.png"]), 0, "identical\n");
     // EXR: half and float, compressed and not, tiles and scan lines, integers
     let values = [0.5_f32, 1.0, 1.5, 65504.0];
     let halves = FlatSamples::F16(values.map(f16::from_f32).to_vec());
@@ -508,12 +508,12 @@ fn encodings_of_equal_values_are_equal() {
     ];
     for encoding in encodings {
         exr_parts(&place, "half.exr", (4, 1), vec![("", half.clone())], encoding);
-        says(&place.run(&["diff", "half.exr", "float.exr"]), 0, "identical\n");
+        assert_output(&place.run(&["diff", "half.exr", "float.exr"]), 0, "identical\n");
     }
     let mut other = values;
     other[2] = 1.5_f32.next_up();
     exr(&place, "other.exr", (4, 1), gray(&other));
-    says(
+    assert_output(
         &place.run(&["diff", "half.exr", "other.exr"]),
         5,
         "1 of 4 pixels, the first at (2, 0)\n",
@@ -521,9 +521,9 @@ fn encodings_of_equal_values_are_equal() {
     let numbers = |last: u32| vec![("primitive.ID", FlatSamples::U32(vec![0, last]))];
     exr(&place, "id.exr", (2, 1), numbers(u32::MAX));
     exr(&place, "next.exr", (2, 1), numbers(u32::MAX - 1));
-    says(&place.run(&["diff", "id.exr", "id.exr"]), 0, "identical\n");
+    assert_output(&place.run(&["diff", "id.exr", "id.exr"]), 0, "identical\n");
     // equal if converted to f32
-    says(
+    assert_output(
         &place.run(&["diff", "id.exr", "next.exr"]),
         5,
         "1 of 2 pixels, the first at (1, 0)\n",
@@ -545,8 +545,8 @@ fn jpegs_and_interlaced_pngs_are_read() {
         (16, 8),
         image::open(place.path("a.jpg")).unwrap().as_bytes(),
     );
-    says(&place.run(&["diff", "a.jpg", "decoded.png"]), 0, "identical\n");
-    says(&place.run(&["diff", "a.jpg", "b.jpg"]), 5, "128 of 128 pixels");
+    assert_output(&place.run(&["diff", "a.jpg", "decoded.png"]), 0, "identical\n");
+    assert_output(&place.run(&["diff", "a.jpg", "b.jpg"]), 5, "128 of 128 pixels");
     // two pixels in a row: in pass 1 and in pass 6 of 7, each row with filter 0
     let chunk = |kind: &[u8; 4], data: &[u8]| {
         let body = [kind.as_slice(), data].concat();
@@ -567,7 +567,7 @@ fn jpegs_and_interlaced_pngs_are_read() {
     ];
     fs::write(place.path("interlaced.png"), file.concat()).unwrap();
     png(&place, "plain.png", (2, 1), &[10, 20, 30, 40, 50, 60]);
-    says(&place.run(&["diff", "interlaced.png", "plain.png"]), 0, "identical\n");
+    assert_output(&place.run(&["diff", "interlaced.png", "plain.png"]), 0, "identical\n");
 }
 
 #[test]
@@ -577,9 +577,9 @@ fn parts_of_an_exr_are_layers() {
     exr_parts(&place, "a.exr", (1, 1), parts(0.0), Encoding::FAST_LOSSLESS);
     exr_parts(&place, "b.exr", (1, 1), parts(1.0), Encoding::FAST_LOSSLESS);
     let ran = place.run(&["diff", "a.exr", "b.exr"]);
-    says(&ran, 5, "beauty.R");
-    says(&ran, 5, "fails: normal: 1 pixel differs\n");
-    says(&place.run(&["diff", "a.exr", "a.exr"]), 0, "identical\n");
+    assert_output(&ran, 5, "beauty.R");
+    assert_output(&ran, 5, "fails: normal: 1 pixel differs\n");
+    assert_output(&place.run(&["diff", "a.exr", "a.exr"]), 0, "identical\n");
 }
 
 #[test]
@@ -590,12 +590,12 @@ fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
     }
     for arguments in [["diff", "out.png", "out.exr"], ["diff", "out.exr", "out.png"]] {
         let ran = place.run(&arguments);
-        says(
+        assert_output(
             &ran,
             0,
             "note: out.exr: linear; converted to a PNG with 8 bits and gamma22 for the comparison\n",
         );
-        says(&ran, 0, "identical\n");
+        assert_output(&ran, 0, "identical\n");
     }
     place.quietly(&[
         "render",
@@ -607,13 +607,13 @@ fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
         "--seed",
         "1",
     ]);
-    says(&place.run(&["diff", "other.png", "out.exr"]), 5, "fails: color");
+    assert_output(&place.run(&["diff", "other.png", "out.exr"]), 5, "fails: color");
 }
 
 #[test]
 fn standard_input_and_pipes_are_read() {
     let place = TestFolder::new();
-    two(&place);
+    write_two_pngs(&place);
     let lines: [(&str, i32); 3] = [
         ("cat a.png | \"$0\" diff - a.png", 0),
         ("cat b.png | \"$0\" diff a.png -", 5),
@@ -623,13 +623,13 @@ fn standard_input_and_pipes_are_read() {
         let ran = place.shell("sh", line);
         assert_eq!(ran.code, code, "{line}: {}{}", ran.stdout, ran.stderr);
     }
-    says(
+    assert_output(
         &place.shell("sh", "printf x | \"$0\" diff - a.png"),
         1,
         "error: standard input: is not an image",
     );
     // a full standard output is an error, a closed pipe is not
-    says(
+    assert_output(
         &place.shell("sh", "\"$0\" diff a.png a.png > /dev/full"),
         8,
         "standard output: cannot be written",
@@ -646,7 +646,7 @@ fn the_difference_image_shows_the_location() {
     values[3 * (123 * width + 456)] ^= 1;
     png(&place, "b.png", (width as u32, height as u32), &values);
     let ran = place.run(&["diff", "a.png", "b.png", "--out", "out.png"]);
-    says(&ran, 5, "the first at (456, 123)\n");
+    assert_output(&ran, 5, "the first at (456, 123)\n");
     let (across, _, bytes) = super::read_png(&place.path("out.png"));
     let line: Vec<(usize, usize)> = (bytes.chunks(3).enumerate())
         .filter(|(_, pixel)| pixel == &[0, 220, 220])
@@ -657,7 +657,7 @@ fn the_difference_image_shows_the_location() {
         assert!(high - low < 40, "{low} {high}");
         (low + high) / 2
     };
-    // the map is to the right of both, below a label of 20 rows and a gap of 8
+    // the map is to the right of both images, below a label of 20 rows and a gap of 8
     let middle = (ends(|place| place.0), ends(|place| place.1));
     let expected = (8 + 2 * (width + 8) + 456, 8 + 20 + 123);
     assert!(
@@ -665,7 +665,7 @@ fn the_difference_image_shows_the_location() {
         "{middle:?} {expected:?}"
     );
     // identical images have no marker
-    says(
+    assert_output(
         &place.run(&["diff", "a.png", "a.png", "--out", "out.png"]),
         0,
         "identical\n",
@@ -677,7 +677,7 @@ fn the_difference_image_shows_the_location() {
 #[test]
 fn an_unwritable_difference_image_exits_with_8() {
     let place = TestFolder::new();
-    two(&place);
+    write_two_pngs(&place);
     let before = place.read("a.png");
     fs::create_dir(place.path("folder.png")).unwrap();
     fs::write(place.path("fixed.png"), "old").unwrap();
@@ -686,12 +686,12 @@ fn an_unwritable_difference_image_exits_with_8() {
     fs::set_permissions(place.path("fixed.png"), mode).unwrap();
     for out in ["absent/out.png", "folder.png", "fixed.png", "/dev/full"] {
         let ran = place.run(&["diff", "a.png", "b.png", "--out", out]);
-        says(&ran, 8, &format!("error: {out}: cannot be written"));
+        assert_output(&ran, 8, &format!("error: {out}: cannot be written"));
     }
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink("a.png", place.path("link.png")).unwrap();
-        says(
+        assert_output(
             &place.run(&["diff", "a.png", "b.png", "--out", "link.png"]),
             2,
             "--out: link.png: is the input a.png",

@@ -1,5 +1,5 @@
-//! Templates of `examples/farm`: their tasks render the same image as a single `wgray render`. `scripts/farms` runs
-//! them on the farm engines.
+//! The tasks of the templates in `examples/farm` render the same image as a single `wgray render`. `scripts/farms` runs
+//! the templates on the farm engines.
 #![cfg(unix)]
 
 use std::fs;
@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt as _;
 
 use super::{Ran, TestFolder, program, project};
 
-/// Special characters of a shell, of YAML and of Open Job Description.
+/// A file name with special characters of shells, YAML and Open Job Description.
 const ODD: &str = "it's $HOME \"{{a}}\" #1 é.toml";
 const ODD_QUOTED: &str = "'it'\\''s $HOME \"{{a}}\" #1 é.toml'";
 const OPTIONS: &str = "--size 20x12 --spp 4 -D 'materials.gray.color=[0.1, 0.5, 0.3]' --aov normal --device cpu";
@@ -30,7 +30,7 @@ fn write_slurm(place: &TestFolder, variables: &str, scene: &str, options: &str, 
     place.write("slurm.sh", &(head.to_owned() + &settings + rest));
 }
 
-/// Runs a shell script in a folder other than the scene's.
+/// Runs a shell script in a folder that does not contain the scene.
 fn run(words: &[&str], variables: &[(&str, &str)]) -> Ran {
     let mut command = assert_cmd::Command::new("sh");
     command.current_dir("/").args(words).envs(variables.iter().copied());
@@ -52,7 +52,7 @@ fn task(place: &TestFolder, kind: &str, first: &str, index: &str) -> Ran {
     run(&[&script, kind, &folder, first], &[("SLURM_ARRAY_TASK_ID", index)])
 }
 
-/// Returns the image of the scene with the odd name, and that with another seed.
+/// Returns the image of the scene named [`ODD`], and its image with another seed.
 fn whole(place: &TestFolder) -> [Vec<u8>; 2] {
     fs::copy(place.path("small.toml"), place.path(ODD)).expect("a copy");
     ["", "--seed 5"].map(|more| {
@@ -150,7 +150,7 @@ fn path_with_bin(place: &TestFolder) -> String {
     )
 }
 
-/// Before the time limit, unless cancelled or requeued too often.
+/// Slurm signals tasks before the time limit. They are requeued unless they were cancelled or requeued too often.
 #[test]
 fn signaled_tasks_of_slurm_are_requeued() {
     let place = TestFolder::new();
@@ -328,7 +328,7 @@ fn scripts_of_open_job_description_render_the_image() {
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(place.read("- {{}} .exr") == expected);
     assert!(!place.path("- {{}} .exr.farm/checkpoints/image-of-2").exists());
-    // Options that differ between the attempts give another image.
+    // An attempt with other options does not reuse the parts of the first attempt.
     let options = OPTIONS.to_owned() + " --seed 5";
     for tile in ["1", "2"] {
         let ran = run(

@@ -83,7 +83,7 @@ mod unix {
         );
     }
 
-    /// Starts a render of minutes and waits for its temporary file.
+    /// Starts a render that takes minutes, and waits for its temporary file.
     fn long_render(place: &TestFolder, shell: &str, options: &[&str]) -> Child {
         let before = temporary(place);
         let child = Command::new("sh")
@@ -171,7 +171,7 @@ mod unix {
         let [left] = temporary(&place).try_into().unwrap();
         let process = format!(".wgray-{}@", killed.id());
         assert!(left.starts_with(&process) && left.ends_with("-out.exr"), "{left}");
-        // Files of another output, another machine or a running process stay, as does a folder.
+        // Folders and temporary files of another output, another machine or a running process are kept.
         let other_machine = left.replace('@', "@not-");
         let other_output = left.replace("-out.exr", "-about.exr");
         let folder = left.replace(&process, ".wgray-1@");

@@ -64,7 +64,7 @@ fn a_frame_equals_a_still_image_of_its_camera() {
             );
         }
         assert_ne!(bits(&place, "out.001.exr"), bits(&place, "out.009.exr"));
-        // Halfway between two keys, alone and in any order with others.
+        // A frame halfway between two keys is the same alone and among other frames in any order.
         place.write("still.toml", &SCENE.replace("[0, -5, 1]", "[-1, -5, 1]"));
         quietly(&place, &["still.toml", "-o", "still.exr"]);
         quietly(&place, &["moving.toml", "--frames", "3", "-o", "alone.exr"]);
@@ -72,14 +72,14 @@ fn a_frame_equals_a_still_image_of_its_camera() {
         for name in ["alone.exr", "3.exr"] {
             assert_eq!(bits(&place, name), bits(&place, "still.exr"), "{name}");
         }
-        // Without `--frames` the camera's own keys apply: those of frame 5.
+        // Without `--frames` the camera's own keys apply, which describe frame 5.
         quietly(&place, &["moving.toml", "-o", "itself.exr"]);
         assert_eq!(bits(&place, "itself.exr"), bits(&place, "out.005.exr"));
     }
 }
 
 #[test]
-fn on_any_device_frames_have_the_same_bits() {
+fn frames_are_bit_identical_on_every_device() {
     let place = TestFolder::new();
     moving(&place, "smooth");
     place.run(&["render", "moving.toml", "--frames", "2-4", "-o", "any.#.exr"]);
@@ -92,7 +92,7 @@ fn on_any_device_frames_have_the_same_bits() {
 }
 
 #[test]
-fn names_have_the_numbers_and_folders_keep_their_marks() {
+fn file_names_get_frame_numbers_and_folder_names_do_not() {
     let place = TestFolder::new();
     moving(&place, "linear");
     fs::create_dir(place.path("a##b")).unwrap();
@@ -128,7 +128,7 @@ fn names_have_the_numbers_and_folders_keep_their_marks() {
     assert_eq!(inner, wanted);
     let stats: serde_json::Value = serde_json::from_slice(&place.read("s10.json")).unwrap();
     assert_eq!(stats["frame"], 10);
-    // The default name, from the scene file.
+    // The default name is derived from the name of the scene file.
     fs::rename(place.path("moving.toml"), place.path("m#.toml")).unwrap();
     quietly(&place, &["m#.toml", "--frames", "3,12345"]);
     quietly(&place, &["m#.toml"]);
@@ -266,7 +266,7 @@ fn existing_frames_are_skipped_on_request() {
     again("note: skipped 2 of 3: the output files exist\n");
     let renewed: Vec<_> = all.into_iter().filter(|name| !is_old(name)).collect();
     assert_eq!(renewed, ["2.png", "2.normal.png"]);
-    // Statistics count as output files, and may be streams.
+    // A statistics file counts as an output file; statistics on standard output do not.
     let more = [&["render"], &arguments[..], &CPU, &["--stats", "#.json"]].concat();
     assert_eq!(place.run(&more).stderr, "");
     assert!(place.run(&more).stderr.starts_with("note: skipped 3 of 3"));
@@ -288,7 +288,7 @@ fn existing_frames_are_skipped_on_request() {
     .concat();
     place.quietly(&one);
     let whole = place.read("p.png");
-    assert!(!whole.is_empty(), "an empty file is not complete");
+    assert!(!whole.is_empty(), "an empty file counts as complete");
     place.quietly(&one);
     assert_eq!(place.read("p.png"), whole);
 }

@@ -145,7 +145,7 @@ fn options_select_parts_by_name_or_index() {
 }
 
 #[test]
-fn what_is_not_there_is_told_with_what_is() {
+fn unknown_gltf_selections_list_the_available_ones() {
     let place = place(&with_cameras());
     for (option, value, message) in [
         (
@@ -245,7 +245,7 @@ fn what_is_not_there_is_told_with_what_is() {
 }
 
 #[test]
-fn frames_are_times_of_the_animation() {
+fn frames_select_times_of_the_animation() {
     let place = place(&with_cameras());
     quietly(&place, &["box.glb", "--frames", "0-12:6", "-o", "f.##.exr"]);
     quietly(&place, &["box.glb", "--frames", "5", "--fps", "10", "-o", "fps.exr"]);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::{Ran, TestFolder, program};
 
-/// Takes a few seconds.
+/// A render that takes a few seconds.
 const LONG: [&str; 8] = [
     "render",
     "small.toml",
@@ -47,7 +47,7 @@ fn wait_for(place: &TestFolder, file: &str, bytes: u64) {
 }
 
 /// Waits for 0.15 s of CPU time, after which the signal handlers are installed even on a busy machine.
-fn work_of(child: &Child) {
+fn wait_for_work(child: &Child) {
     let ticks = || {
         let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
         let fields: Vec<&str> = stat.rsplit(") ").next()?.split(' ').collect();
@@ -72,7 +72,7 @@ fn ended(child: Child) -> Ran {
 }
 
 /// Resumes from the checkpoint.
-fn go_on(place: &TestFolder, device: &str) -> Ran {
+fn resume_render(place: &TestFolder, device: &str) -> Ran {
     let mut arguments = LONG.to_vec();
     arguments.extend(["--reproducible", "--checkpoint", "c", "--resume", "--device", device]);
     arguments.extend(["-o", "out.exr"]);
@@ -104,11 +104,11 @@ fn a_killed_render_resumes() {
         child.kill().expect("a kill"); // SIGKILL
         child.wait().expect("an end");
     }
-    let ran = go_on(&place, "cpu");
+    let ran = resume_render(&place, "cpu");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(place.read("out.exr") == expected);
     // The complete checkpoint remains and can be resumed.
-    let ran = go_on(&place, "gpu");
+    let ran = resume_render(&place, "gpu");
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(place.read("out.exr") == expected);
     assert_eq!(place.files(), ["c", "out.exr", "whole.exr"]);
@@ -159,7 +159,7 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
             assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", place.files());
             std::thread::sleep(Duration::from_millis(2));
         }
-        work_of(&child);
+        wait_for_work(&child);
         let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
         assert!(sent.expect("kill").success());
         let ran = ended(child);
@@ -170,7 +170,7 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
         );
         assert_eq!(place.files(), ["c", "whole.exr"]);
     }
-    let ran = go_on(&place, "cpu");
+    let ran = resume_render(&place, "cpu");
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(place.read("out.exr") == expected);
 }
@@ -194,7 +194,7 @@ fn a_second_writer_waits_and_resumes() {
     std::thread::sleep(Duration::from_millis(300));
     assert!(!place.path("second.exr").exists());
     #[cfg(target_os = "linux")]
-    a_farm_ends_one_that_waits(&place, &options);
+    check_sigterm_while_waiting(&place, &options);
     first.kill().expect("a kill");
     first.wait().expect("an end");
     let ran = ended(second);
@@ -214,9 +214,9 @@ fn a_second_writer_waits_and_resumes() {
     );
 }
 
-/// SIGTERM before the start of the render also exits with the code that requests another attempt.
+/// On SIGTERM, a render that still waits for the checkpoint also exits with the code of `--requeue-exit`.
 #[cfg(target_os = "linux")]
-fn a_farm_ends_one_that_waits(place: &TestFolder, options: &[&str]) {
+fn check_sigterm_while_waiting(place: &TestFolder, options: &[&str]) {
     let waiting = start(place, &[options, &["-o", "third.exr", "--requeue-exit", "75"]].concat());
     let id = waiting.id().to_string();
     let catches_sigterm = || {
@@ -233,7 +233,7 @@ fn a_farm_ends_one_that_waits(place: &TestFolder, options: &[&str]) {
     assert_eq!(ended(waiting).code, 75);
 }
 
-/// Existing checkpoints, those of other options, and files that are not checkpoints.
+/// Rejects checkpoints that exist, checkpoints of renders with other options, and files that are not checkpoints.
 #[test]
 fn checkpoints_of_other_jobs_are_rejected() {
     let place = TestFolder::new();
@@ -366,7 +366,7 @@ fn a_folder_has_a_checkpoint_for_each_job() {
     assert!(ran.stderr.contains("--checkpoint: kept: needs #"), "{}", ran.stderr);
 }
 
-/// Behind the header of this one.
+/// The pieces follow a header of this job.
 #[test]
 fn pieces_of_another_job_are_rejected() {
     let place = TestFolder::new();
@@ -387,7 +387,7 @@ fn pieces_of_another_job_are_rejected() {
     assert!(place.read("c.exr") == place.read("a.exr") && place.read("a.exr") != place.read("b.exr"));
 }
 
-/// Moved, removed or replaced while the render writes to it.
+/// The checkpoint is removed or replaced while the render writes to it.
 #[cfg(unix)]
 #[test]
 fn a_removed_checkpoint_is_restored_or_reported() {
@@ -440,7 +440,7 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(place.path("c"), &bytes).expect("a file");
-    let ran = go_on(&place, "cpu");
+    let ran = resume_render(&place, "cpu");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(
         ran.stderr.starts_with("warning: c: ") && ran.stderr.contains("are damaged"),
@@ -450,16 +450,16 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
     assert!(place.read("out.exr") == expected);
     let mut file = fs::File::options().append(true).open(place.path("c")).expect("a file");
     file.write_all(&bytes[200..900]).expect("bytes");
-    let ran = go_on(&place, "cpu");
+    let ran = resume_render(&place, "cpu");
     assert!(ran.stderr.contains("dropped 700 bytes after byte"), "{}", ran.stderr);
-    assert_eq!(go_on(&place, "cpu").stderr, "", "damaged pieces are still in the file");
+    assert_eq!(resume_render(&place, "cpu").stderr, "", "damaged pieces are still in the file");
     assert!(place.read("out.exr") == expected);
 }
 
-/// The output fails; with free space the render resumes.
+/// Writing the image fails; once space is available, the render resumes from the checkpoint.
 #[cfg(unix)]
 #[test]
-fn a_full_disk_keeps_the_checkpoint() {
+fn the_checkpoint_is_kept_when_the_disk_is_full() {
     let place = TestFolder::new();
     let expected = expected(&place);
     // A file size limit of 250 KiB; the checkpoint needs 400 KiB.
@@ -475,13 +475,13 @@ fn a_full_disk_keeps_the_checkpoint() {
     assert_eq!(place.files(), ["c", "whole.exr"], "an incomplete file is left");
     let kept = fs::metadata(place.path("c")).expect("the checkpoint").len();
     assert!(kept > 50_000, "{kept}");
-    let ran = go_on(&place, "cpu");
+    let ran = resume_render(&place, "cpu");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(place.read("out.exr") == expected);
 }
 
-/// In a separate mount namespace; where that is not permitted, only the file size limit above and a read-only folder
-/// are tested.
+/// Runs in a separate mount namespace. Where namespaces are not permitted, only the file size limit above and a
+/// read-only folder are tested.
 #[cfg(target_os = "linux")]
 #[test]
 fn full_and_read_only_file_systems() {
@@ -587,7 +587,7 @@ fn parts_merge_to_the_same_image() {
     );
     render(&["--tile", "2/3", "-o", "other.part"]);
     refused(&[&shuffled[..], &["other.part"]].concat(), "other.part: overlaps");
-    // Parts of different divisions that together cover the image.
+    // Parts of different divisions of the image are accepted if they cover it without overlaps.
     render(&["--tile", "1/1", "-o", "all.part"]);
     assert_eq!(merge(&["all.part"]).code, 0);
     for end in ["png", "exr", "normal.png", "depth.png", "instance.png"] {
@@ -738,7 +738,7 @@ fn a_time_limit_ends_with_a_complete_image() {
             ran.stderr
         );
     }
-    // With enough time the limit has no effect; a stopped render resumes to the same image.
+    // A limit that is not reached has no effect. A stopped render resumes and gives the same image.
     let short = [
         "render",
         "small.toml",

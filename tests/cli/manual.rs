@@ -45,8 +45,8 @@ fn every_command_has_a_page() {
         }
         let command = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
         let arguments: Vec<&str> = std::iter::once("man").chain(command).collect();
-        assert_eq!(place.run(&arguments).stdout, page, "{name} is printed");
-        // Every option of the help, in bold and with escaped hyphens.
+        assert_eq!(place.run(&arguments).stdout, page, "`wgray man` prints another page than {name}");
+        // The page contains every option of the help in bold, with escaped hyphens.
         let arguments: Vec<&str> = command.into_iter().chain(["--help"]).collect();
         let help = place.run(&arguments).stdout;
         let is_option = |line: &&str| line.starts_with("  -") || line.starts_with("      -");
@@ -112,7 +112,7 @@ fn has_no_warnings(page: &std::path::Path) {
     }
 }
 
-/// Also by the help, which the manual pages repeat.
+/// The documentation and the help list the same exit codes; manual pages repeat the help.
 #[test]
 fn exit_codes_are_documented() {
     let page = std::fs::read_to_string(super::project("docs/command-line.md")).unwrap();
@@ -191,7 +191,7 @@ fn bash_completes_commands_options_names_and_files() {
         files
     };
     assert_eq!(files("--checkpoint"), ["small.toml", "smalls"]);
-    // Bash completes folders without further candidates.
+    // Bash completes folder names itself.
     assert_eq!(files("--asset-root"), ["", "compopt -o plusdirs"]);
     assert!(offered(&place, &["wgray", "xyz"]).iter().all(String::is_empty));
 }

@@ -59,7 +59,7 @@ mod unix {
         }
     }
 
-    /// A closed pipe is not an error, a full disk is.
+    /// A full disk is an error; a closed pipe is not.
     #[test]
     fn incomplete_output_changes_the_exit_code() {
         let place = TestFolder::new();

@@ -29,7 +29,7 @@ fn large(place: &TestFolder) {
     );
 }
 
-/// Whichever allocation fails first: one line, no file left behind.
+/// Whichever allocation fails first, the program prints one line and leaves no file.
 #[test]
 fn the_program_ends_with_code_7() {
     let place = TestFolder::new();
@@ -66,7 +66,7 @@ fn the_program_ends_with_code_7() {
     assert!(failed > 2 && succeeded > 3, "{failed} failed, {succeeded} succeeded");
 }
 
-/// If a thread cannot be started.
+/// Memory is too small for all threads.
 #[test]
 fn other_commands_end_with_code_7() {
     let place = TestFolder::new();
@@ -82,7 +82,7 @@ fn other_commands_end_with_code_7() {
     assert!(failed > 2, "{failed}");
 }
 
-/// An image too large for the memory, with its size in the message.
+/// An image that exceeds the memory is reported as an error, not as a failed allocation.
 #[test]
 fn handled_allocations_are_errors() {
     let place = TestFolder::new();

@@ -266,7 +266,7 @@ fn layers_of_paths_are_those_of_the_film() {
 }
 
 #[test]
-fn path_layers_are_rejected_under_phong() {
+fn path_layers_are_rejected_with_the_phong_integrator() {
     let place = TestFolder::new();
     for name in ["albedo", "direct", "indirect", "emission"] {
         let names = format!("depth,{name}");
@@ -307,7 +307,7 @@ fn path_layers_are_files_beside_a_png() {
             "{name}"
         );
     }
-    // The sum of the normals is mapped to colors; samples without a hit are black.
+    // Normals are mapped to colors before averaging; samples that hit nothing are black.
     let (_, _, normals) = read_png(&place.path("out.shading_normal.png"));
     for (i, found) in normals.chunks(3).enumerate() {
         let (sum, share) = (film.layers[4][i] / film.sums[i].w, film.alpha(i));
@@ -454,7 +454,7 @@ fn stats_have_the_documented_fields() {
     }
 }
 
-/// If the driver truncates loops and a sample exceeds its limit; a message reports it.
+/// Applies if the driver truncates loops and one sample exceeds the limit. A message reports the use of the CPU.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_on_the_cpu() {
     if crate::adapter::device().is_none() {

@@ -87,7 +87,7 @@ fn a_mesh_has_the_materials_of_its_file() {
     assert!(picture("other.toml") != with_own);
 }
 
-/// Checks that the render is rejected and leaves all files.
+/// Checks that the render is rejected and changes no file.
 #[track_caller]
 pub fn refused(place: &TestFolder, arguments: &[&str], code: i32, message: &str) {
     let content = |place: &TestFolder| -> Vec<(String, Vec<u8>)> {
@@ -277,7 +277,7 @@ mod unix {
         );
     }
 
-    /// The same bytes as a file.
+    /// Standard output receives the same bytes as a file.
     #[test]
     fn standard_output_receives_an_image_or_statistics() {
         let place = TestFolder::new();
@@ -447,7 +447,7 @@ mod unix {
         );
     }
 
-    /// By the mode bits, as root can write to any file.
+    /// The mode bits decide, because root can write to any file.
     #[test]
     fn a_read_only_file_is_not_replaced_and_other_files_keep_their_mode() {
         let place = TestFolder::new();
@@ -486,7 +486,7 @@ mod unix {
             .spawn()
             .unwrap();
         std::thread::sleep(std::time::Duration::from_millis(300));
-        assert!(child.try_wait().unwrap().is_none(), "it waits");
+        assert!(child.try_wait().unwrap().is_none(), "the render does not wait for a reader");
         let killed = Command::new("kill")
             .args(["-INT", &child.id().to_string()])
             .status()

@@ -87,7 +87,7 @@ fn one_render_writes_several_images() {
 }
 
 #[test]
-fn a_format_without_alpha_is_noted() {
+fn transparency_in_a_format_without_alpha_is_reported() {
     let place = TestFolder::new();
     place.write("clear.toml", &path_scene());
     for (name, is_noted) in [("a.jpg", true), ("a.png", false)] {
@@ -121,7 +121,7 @@ fn a_failed_output_leaves_no_incomplete_files() {
     ]);
     assert_ne!(ran.code, 0);
     assert!(ran.stderr.contains("/dev/full: cannot be written"), "{}", ran.stderr);
-    // Outputs are renamed one after the other: those before the failure may exist, complete; later ones must not.
+    // Outputs are renamed one after the other: complete files from before the failure may exist, later files must not.
     assert!(!place.files().contains(&"b.png".to_owned()), "{:?}", place.files());
     assert!(
         place.files().iter().all(|name| !name.starts_with('.')),
@@ -157,7 +157,7 @@ fn pngs_have_8_or_16_bits_and_name_their_curve() {
         };
         let expected: Vec<u16> = shown.map(to_16_bits).collect();
         assert_eq!(deep.into_raw(), expected, "{name}");
-        assert!(expected.iter().any(|value| value % 257 != 0), "the values fit 8 bits");
+        assert!(expected.iter().any(|value| value % 257 != 0), "all values fit in 8 bits");
         assert_eq!(png_info(&place.path("b.normal.png")).bit_depth, png::BitDepth::Sixteen);
         let info = png_info(&place.path("a.png"));
         let (srgb, gamma) = (info.srgb.is_some(), info.gama_chunk.map(|gamma| gamma.into_scaled()));
@@ -383,7 +383,7 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
     }
 }
 
-/// Albedo has only the sRGB curve, other layers no transform.
+/// Albedo is only sRGB-encoded, and other layers are not transformed.
 #[test]
 fn radiance_layers_use_the_view_of_the_image() {
     let place = TestFolder::new();
@@ -608,7 +608,7 @@ fn options_without_an_applicable_output_are_rejected() {
     assert!(samples(&place.path("b")).contains_key("R"));
 }
 
-/// Before the render, which would take long.
+/// The error is reported before the render, which would take long.
 #[test]
 fn images_too_large_for_a_format_are_rejected() {
     let place = TestFolder::new();

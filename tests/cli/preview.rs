@@ -9,7 +9,7 @@ use wgray::image::read_metadata;
 
 use super::{Ran, TestFolder, heed_interrupts, program, project_scene};
 
-/// Takes minutes, with passes of some hundredths of a second.
+/// A render that takes minutes, with passes of a few hundredths of a second.
 const LONG: [&str; 8] = [
     "render",
     "small.toml",
@@ -62,7 +62,7 @@ fn ended(child: Child) -> Ran {
     Ran::new(output.status.code(), String::new(), &stderr, &[])
 }
 
-/// Returns samples and requested samples of a file that is marked as partial.
+/// Returns the actual and the requested number of samples of a file that is marked as partial.
 fn partial(path: &Path) -> Option<(u32, u32)> {
     let metadata = read_metadata(path).expect("metadata");
     let text = metadata.get("partial")?.strip_suffix(" samples").expect("samples");
@@ -268,7 +268,7 @@ fn files_with_more_samples_stay() {
     );
     assert!(ran.summary.is_empty() && !place.path("stats.json").exists());
     assert_eq!(files.map(|file| place.read(file)), before);
-    // A preview replaces a file with as many samples.
+    // A preview replaces a file with the same number of samples.
     let ran = render(&[&outputs[..], &["--preview", "--spp", "2"]].concat());
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(files.iter().all(|file| partial(&place.path(file)).is_none()));
@@ -419,7 +419,7 @@ fn on_a_full_disk_previews_are_not_written_and_the_older_file_remains() {
         assert_eq!(ran.code, 8, "{}", ran.stderr);
         assert!(ran.stderr.starts_with(&warning), "{}", ran.stderr);
         assert!(ran.stderr.contains("error: "), "{}", ran.stderr);
-        // The same if a signal ends the render.
+        // A signal that ends the render has the same effect.
         let child = start_in_shell(&place, limit, &["-o", output, "--device", "cpu"]);
         wait_until("a temporary file", || {
             place.files().iter().any(|name| name.starts_with(".wgray-"))

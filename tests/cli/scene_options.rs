@@ -190,7 +190,8 @@ fn a_turntable_is_one_full_turn() {
     let names = ["t.01.exr", "t.02.exr", "t.03.exr", "t.04.exr"];
     let found = place.files_but(|name| !name.starts_with("t."));
     assert_eq!(found, names);
-    // The first frame is the still image. A quarter turn is at +x of the target, a half at +y.
+    // The first frame equals the still image. After a quarter turn the camera is at +x of the target, after a half turn
+    // at +y.
     assert_eq!(place.read("t.01.exr"), place.read("still.exr"));
     assert_eq!(place.read("t.03.exr"), place.read("alone.exr"));
     let at = |position: &str, name: &str| {

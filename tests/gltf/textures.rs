@@ -42,7 +42,7 @@ fn the_first_texel_is_at_the_upper_left() {
 fn images_may_lie_in_the_buffer_beside_the_file_or_in_a_data_uri() {
     let bytes = png(2, &[RED, GREEN, BLUE, WHITE]);
     let place = TestFolder::with_file("a", "");
-    for uri in ["my%20picture.png", "data"] {
+    for uri in ["my%20image.png", "data"] {
         let data = format!("data:image/png;base64,{}", super::build::base64(&bytes));
         let uri = if uri == "data" { data.as_str() } else { uri };
         let mut builder = Builder::new();

@@ -245,7 +245,7 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
     const PATH: &str = "integrators/path.wgsl";
     const AFAR: &str = "environment.wgsl";
     const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
-    const OF_RAY: &str = "select(1.0, power_heuristic(pdf, arriving.pdf), pdf > 0.0)";
+    const OF_RAY: &str = "select(1.0, power_heuristic(pdf, eval.pdf), pdf > 0.0)";
     let light_alone = with([(PATH, OF_LIGHT, "1.0"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
     let material_alone = with([(PATH, OF_LIGHT, "0.0"), (AFAR, OF_RAY, "1.0")]);
     let wrong = with([(PATH, OF_LIGHT, "1.1"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
