@@ -115,7 +115,10 @@ fn outdated_or_exceeded_known_differences_fail() {
     assert!(entry.is_some());
     assert!(judge(entry, "dot", 0.05).is_ok());
     assert!(judge(entry, "dot", 0.0).is_err(), "an outdated entry is accepted");
-    assert!(judge(entry, "dot", 0.2).is_err(), "more differences than listed are accepted");
+    assert!(
+        judge(entry, "dot", 0.2).is_err(),
+        "more differences than listed are accepted"
+    );
     for (name, driver, what) in [("Some GPU", "driver 1", "cross"), ("Other", "driver 1", "dot")] {
         let entry = allowed(&known, name, driver, what);
         assert!(entry.is_none());

@@ -150,12 +150,12 @@ fn light_of_a_rectangle_on_a_plane() {
         let error = worst(&|at| mean_cosine(size, h, at));
         println!("{mode:?}: light of a rectangle within {error:.1e}");
         assert!(error < 1e-4, "{mode:?}: {error}");
-        assert!(!(worst(&|_| 1.0) < 1e-2), "a missing cosine");
-        assert!(!(worst(&|at| mean_cosine(swapped, h, at)) < 1e-2), "swapped axes");
+        assert!(!(worst(&|_| 1.0) < 1e-2), "a missing cosine passes");
+        assert!(!(worst(&|at| mean_cosine(swapped, h, at)) < 1e-2), "swapped axes pass");
         let pixel = height / f64::from(SIDE);
         assert!(
             !(worst(&|at| mean_cosine(size, h, at + DVec2::X * pixel)) < 1e-2),
-            "a shifted pixel"
+            "a shifted pixel passes"
         );
     }
 }
@@ -192,8 +192,8 @@ fn shadow_of_a_sphere() {
         };
         assert_eq!(wrong(DVec2::ZERO, 1e-5), 0, "{mode:?}");
         let pixel = height / f64::from(SIDE);
-        assert!(wrong(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel");
-        assert!(wrong(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel");
+        assert!(wrong(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel passes");
+        assert!(wrong(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel passes");
         // Semi-axes of the ellipse; `lean` is the angle between the cone's axis and the vertical.
         let lean = (axis.x / axis.z).abs().atan();
         let long = light.z * ((lean + half_angle).tan() - (lean - half_angle).tan()) / 2.0;
@@ -201,10 +201,7 @@ fn shadow_of_a_sphere() {
         let dark = (0..SIDE * SIDE).filter(|pixel| !lit(*pixel)).count() as f64 * pixel * pixel;
         println!("{mode:?}: the shadow's area is {dark:.4}, of {:.4}", PI * long * short);
         assert!((dark / (PI * long * short) - 1.0).abs() < 0.01, "{mode:?}: {dark}");
-        assert!(
-            !((dark / (PI * long * long) - 1.0).abs() < 0.05),
-            "a circle passes"
-        );
+        assert!(!((dark / (PI * long * long) - 1.0).abs() < 0.05), "a circle passes");
         // Outside the shadow only the cosine remains: a point light has no falloff.
         let worst = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
             let to = light - on_floor(from, height, pixel).extend(0.0);
@@ -278,7 +275,10 @@ fn outlines_of_ellipsoids() {
                 (centroid - middle).length() < 0.1,
                 "{mode:?} {center} from {view}: {centroid} for {middle}"
             );
-            assert!(!((centroid + DVec2::X - middle).length() < 0.1), "a shifted pixel");
+            assert!(
+                !((centroid + DVec2::X - middle).length() < 0.1),
+                "a shifted pixel passes"
+            );
             // Depth of the center minus the half-extent along the view direction.
             let half = [a, b, c]
                 .map(|axis| axis.dot(forward))
@@ -318,7 +318,10 @@ fn directional_light_on_a_plane() {
         for mode in both() {
             let error = worst(&scene, mode, |_| expected(exponent));
             assert!(error < 1e-6, "{mode:?}, shininess {exponent}: {error}");
-            assert!(!(worst(&scene, mode, |_| expected(other)) < 1e-4), "another shininess");
+            assert!(
+                !(worst(&scene, mode, |_| expected(other)) < 1e-4),
+                "a wrong shininess passes"
+            );
         }
         // Seen from below, the plane is black: the normal faces the viewer, so the light is behind the surface.
         scene.camera = empty(-DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).camera;

@@ -104,14 +104,14 @@ fn packed(text: &str) -> Option<Packed> {
     scene.ok().map(|scene| pack(&scene))
 }
 
-/// Returns the CPU time of the thread in seconds. `/proc` has a resolution of several milliseconds, which is too coarse.
+/// Returns the CPU time of the thread in seconds. The resolution of `/proc`, several milliseconds, is too coarse.
 fn processor_time(work: impl Fn()) -> f64 {
     #[cfg(unix)]
     let now = || {
         let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
         // SAFETY: the clock writes to a valid `timespec`.
         let result = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-        assert_eq!(result, 0, "there is no clock of threads");
+        assert_eq!(result, 0, "threads have no clock");
         time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
     };
     #[cfg(not(unix))]

@@ -19,9 +19,9 @@ fn some_scenes(count: usize) -> Vec<Packed> {
 
 /// Returns how many primitives are culled, and how many of them wrongly. Points are up to 30 radii away, and up to 200
 /// in local space: at thousands of radii both tests are dominated by rounding. `bound` changes the bounding spheres.
-fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usize) {
+fn count_culled(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usize) {
     let random = Random::new(11);
-    let (mut left_out, mut wrong) = (0, 0);
+    let (mut culled, mut wrong) = (0, 0);
     for scene in scenes
         .iter()
         .filter(|scene| !scene.lighting.lights.is_empty() && !scene.primitives.is_empty())
@@ -49,28 +49,25 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
             let primitives = scene.primitives.iter().zip(&scene.bounds);
             for (q, sphere) in primitives.filter(|(q, _)| vector_to_local(q, p - q.anchor).length() < 200.0) {
                 if !may_block(&bound(*sphere), &cone) {
-                    left_out += 1;
+                    culled += 1;
                     wrong += usize::from(occlusion_mask(q.kind, q, p, false, light, block) != 0);
                 }
             }
         }
     }
-    (left_out, wrong)
+    (culled, wrong)
 }
 
 #[test]
 fn culled_primitives_occlude_nothing() {
     let scenes = some_scenes(400);
-    let (culled, wrong) = left_out(&scenes, |sphere| sphere);
-    println!("{culled} primitives were culled, {wrong} of them wrongly");
+    let (culled, wrong) = count_culled(&scenes, |sphere| sphere);
+    println!("{culled} primitives were left out as occluders, {wrong} of them wrongly");
     assert!(culled > 10_000, "only {culled} primitives were culled");
     assert_eq!(wrong, 0);
     let smaller = |sphere: Sphere| Sphere {
         radius: 0.9 * sphere.radius,
         ..sphere
     };
-    assert!(
-        left_out(&scenes, smaller).1 > 0,
-        "too small spheres are not found"
-    );
+    assert!(count_culled(&scenes, smaller).1 > 0, "too small spheres are not found");
 }

@@ -71,7 +71,8 @@ fn same_on_all_paths(d: &Description) {
     }
 }
 
-/// A missing light changes a value by 0.1, rounding of the normal at the limb of a small sphere by less.
+/// A missing light changes a value by 0.1. Rounding of the normal at the limb of a small sphere changes a value by less
+/// than this tolerance.
 const TOLERANCE: f64 = 1e-3;
 
 fn wrong(d: &Description) -> usize {
@@ -211,7 +212,7 @@ fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
     }
 }
 
-/// In f64, over all sizes, `ray_origin` is above the surface, by less than 1e-5 of the coordinates.
+/// Evaluated in f64, `ray_origin` is above the surface for all sizes, by less than 1e-5 of the coordinates.
 #[test]
 fn ray_origins_are_slightly_above_their_surface() {
     let random = Random::new(5);

@@ -107,10 +107,10 @@ fn neighbour(x: f32, random: &Random) -> f32 {
 /// A consistent set of arguments for one call.
 struct Situation {
     primitive: Primitive,
-    /// In local space, often on the primitive; `target` is the same in world space.
+    /// A point in local space, often on the primitive; `target` is the same point in world space.
     local: DVec3,
     target: DVec3,
-    /// In world space; `local_start` is the same in local space.
+    /// The origin of the ray in world space; `local_start` is the same point in local space.
     start: DVec3,
     local_start: DVec3,
     direction: DVec3,
@@ -379,7 +379,7 @@ impl Situation {
         }
     }
 
-    /// Writes the words of an argument, by its type and, for numbers and vectors, its name.
+    /// Writes the words of an argument. The type selects the values; for numbers and vectors, the name also matters.
     fn argument(
         &self,
         (function, name): (&str, &str),
@@ -655,7 +655,7 @@ fn color(random: &Random) -> Vec3 {
     Vec3::from_array([(); 3].map(|()| random.unit() as f32))
 }
 
-/// Returns a point in local space: on a canonical shape, on an edge or corner of one, or near.
+/// Returns a point in local space on or near a canonical shape, sometimes at an edge or a corner.
 fn local_point(random: &Random) -> DVec3 {
     let coordinate = || random.between(-1.2, 1.2);
     let p = DVec3::new(coordinate(), coordinate(), coordinate());

@@ -110,7 +110,7 @@ fn some_calls(
     }
 }
 
-/// Interrupts a job every `calls` dispatches; `None` if it never completes.
+/// Interrupts a job after every `calls` dispatches. Returns `None` if the job never completes.
 fn in_pieces(
     packed: &Packed,
     store: &mut dyn CheckpointStore,
@@ -246,13 +246,13 @@ fn last_pass(bands: &mut Bands) -> Film {
     all
 }
 
-/// An interrupted pass leaves the film of the previous one.
+/// After an interrupted pass, the film of the previous pass remains.
 #[test]
 fn the_last_pass_is_a_complete_image() {
     for packed in subjects() {
         assert!(
             bits(&of_samples(&packed, 3)) != bits(&of_samples(&packed, 4)),
-            "the control"
+            "3 and 4 samples give the same film"
         );
         for way in pictures::exact_modes() {
             for cut in splits() {
@@ -319,10 +319,10 @@ fn open(
         path: path.to_owned(),
         resume: true,
         interval: Duration::ZERO,
-        // A child process inherits the file, and its lock, for a moment.
+        // A child process that another test starts inherits the file and the lock for a moment.
         wait: Box::new(move || {
             rounds += 1;
-            assert!(rounds < 200, "another process writes it");
+            assert!(rounds < 200, "another process still writes the checkpoint");
             true
         }),
         report: Box::new(move |what| sender.send(what.to_owned()).expect("a listener")),
@@ -440,7 +440,7 @@ fn replaced_pieces_do_not_accumulate() {
 type Change<'a, T> = (&'a str, &'a dyn Fn(&mut T));
 
 #[test]
-fn another_job_has_another_identity() {
+fn different_jobs_have_different_identities() {
     let scene = scenes::scene("cornell.toml");
     let of = |change: &dyn Fn(&mut wgray::Description)| {
         let mut scene = scene.clone();

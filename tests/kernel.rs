@@ -22,7 +22,7 @@ pub fn scalars(module: &Module, ty: Handle<Type>) -> Vec<ScalarKind> {
             size: naga::ArraySize::Constant(n),
             ..
         } => scalars(module, *base).repeat(n.get() as usize),
-        other => panic!("no kernel can be made for a function of {other:?}"),
+        other => panic!("no kernel can be generated for a function of {other:?}"),
     }
 }
 
@@ -31,7 +31,7 @@ pub struct Function<'a> {
     pub function: &'a naga::Function,
 }
 
-/// Returns the functions of the shared files, with the name of their file.
+/// Returns the functions of the shared files, each with the name of the file.
 pub fn functions<'a>(module: &'a Module, source: &Source) -> Vec<(String, Function<'a>)> {
     let of = |(handle, function)| {
         (
@@ -113,7 +113,7 @@ impl Function<'_> {
                 size: naga::ArraySize::Constant(n),
                 ..
             } => list((0..n.get()).map(|_| self.read(*base, next)).collect()),
-            other => panic!("no kernel can be made for an argument {other:?}"),
+            other => panic!("no kernel can be generated for an argument {other:?}"),
         }
     }
 
@@ -140,7 +140,7 @@ impl Function<'_> {
                     self.write(*base, &format!("{value}[{i}]"), next, text);
                 }
             }
-            other => panic!("no kernel can be made for a result {other:?}"),
+            other => panic!("no kernel can be generated for a result {other:?}"),
         }
     }
 
@@ -148,12 +148,12 @@ impl Function<'_> {
         self.run_in(device, &shared_source(), words)
     }
 
-    /// Like [`Function::run`], with other shared files.
+    /// Like [`Function::run`], but with other shared files.
     pub fn run_in(&self, device: &Device, shared: &Source, words: &[u32]) -> Vec<u32> {
         self.run_rounded(device, shared, words, Rounding::Device)
     }
 
-    /// Like [`Function::run_in`], with software or native division and square roots.
+    /// Like [`Function::run_in`], but selects software or native division and square roots.
     pub fn run_rounded(&self, device: &Device, shared: &Source, words: &[u32], rounding: Rounding) -> Vec<u32> {
         let mut source = shared.clone();
         source.append("probe", &self.kernel());
@@ -183,7 +183,7 @@ fn write_word(kind: ScalarKind, value: &str, next: &mut u32, text: &mut String) 
     *next += 1;
 }
 
-/// Runs the entry point `probe`, as SPIR-V where the renderer's exact kernels do.
+/// Runs the entry point `probe`, on exact devices as SPIR-V like the kernels of the renderer.
 fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], calls: usize, output: usize) -> Vec<u32> {
     let (wgpu, queue) = device.wgpu();
     let checked =

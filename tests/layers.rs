@@ -170,13 +170,13 @@ fn emission_direct_and_indirect_light_sum_to_the_image() {
         }
         assert!(
             without > 100,
-            "{name}: a layer that is left out is missed in {without} pixels"
+            "{name}: without one of the layers, only {without} pixels differ"
         );
     }
 }
 
 #[test]
-fn light_layers_are_by_path_length() {
+fn light_layers_are_split_by_path_length() {
     let sums = |depth: u32| {
         let film = reference(&parse(&with(&format!("max_depth = {depth}"))).with_layers());
         [Layer::Emission, Layer::Direct, Layer::Indirect].map(|layer| {
@@ -195,7 +195,7 @@ fn light_layers_are_by_path_length() {
     assert_eq!(once[1], often[1]);
 }
 
-/// Returns a 1 x 1 rectangle; pixels have the same size.
+/// Returns a scene with a rectangle of 1 x 1 units, the size of a pixel.
 fn facing(size: (u32, u32), place: [f64; 2], more: &str, from_behind: bool) -> String {
     let ([x, z], (width, height)) = (place, size);
     let y = if from_behind { 5 } else { -5 };
@@ -263,7 +263,10 @@ fn mean_normals_of_flat_surfaces_equal_the_first_hits() {
             _ => {}
         }
     }
-    assert!(flat > 20, "only {flat} pixels of the ground have its normal");
+    assert!(
+        flat > 20,
+        "only {flat} pixels of the ground have the normal of the first hit"
+    );
     assert!(
         bent > 20,
         "mean normals are normalized: only {bent} pixels of the sphere are shorter"
@@ -288,7 +291,7 @@ fn mean_normals_include_normal_maps() {
     assert_eq!(
         hits[1].shading_normal,
         Vec3::NEG_Y,
-        "the normal of the first hit includes the normal map"
+        "the normal map changes the normal of the first hit"
     );
 }
 
@@ -320,7 +323,11 @@ tangent = [1, 0, 0]
     let film = on_all(&parse(&text).with_layers());
     let albedo = Vec3::from(film.layer(Layer::Albedo, 0));
     assert!((albedo - Vec3::new(0.125, 0.125, 0.75)).length() < 1e-6, "{albedo}");
-    assert_eq!(film.layer(Layer::Normal, 0), [0.0, -1.0, 0.0], "the mirror's own");
+    assert_eq!(
+        film.layer(Layer::Normal, 0),
+        [0.0, -1.0, 0.0],
+        "not the normal of the mirror"
+    );
 }
 
 #[test]
@@ -336,11 +343,11 @@ fn alpha_is_the_fraction_of_samples_that_hit() {
             adaptive: false,
             layers: true,
         };
-        assert_eq!(packed.film_layout(), form, "alpha asks for layers");
+        assert_eq!(packed.film_layout(), form, "alpha does not request layers");
         let film = on_all(&packed);
         for (i, share) in shares.into_iter().enumerate() {
             assert_eq!(film.alpha(i), share, "{place:?}, pixel {i}");
-            // Premultiplied; the environment is invisible.
+            // Colors are premultiplied; the environment is invisible.
             let color = Vec3::new(0.5, 0.25, 4.0) * share;
             assert_eq!(
                 Vec3::from(wgray_render::film::mean(film.sums[i])),
@@ -349,7 +356,7 @@ fn alpha_is_the_fraction_of_samples_that_hit() {
             );
         }
     }
-    // A single pixel that is covered by a quarter.
+    // The rectangle covers a quarter of the only pixel.
     let film = on_all(&parse(&facing((1, 1), [0.5, 0.5], "alpha = true", false)));
     assert_eq!(film.alpha(0), 0.25);
 }
@@ -376,7 +383,11 @@ fn png_alpha_is_straight_and_exr_alpha_premultiplied() {
     assert_eq!(straight([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
     assert_eq!(straight([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
     assert_eq!(straight([0.0; 3], 0.0), [0; 4]);
-    assert_eq!(straight([-0.01; 3], -0.01), [0; 4], "a filter's lobes");
+    assert_eq!(
+        straight([-0.01; 3], -0.01),
+        [0; 4],
+        "negative values of a filter's lobes"
+    );
     assert_eq!(straight([1.1, 0.55, 0.0], 1.1), [255, 186, 0, 255]);
     assert_eq!(straight([f32::NAN; 3], f32::NAN), [0; 4]);
 }
@@ -407,7 +418,11 @@ fn the_library_has_layers_and_alpha() {
     assert_eq!(floats(&with_alpha, "R"), [0.0, 0.25, 0.25]);
     assert_eq!(floats(&with_alpha, "albedo.B"), [0.0, 0.375, 0.375]);
     assert_eq!(floats(&with_alpha, "shading_normal.Y"), [0.0, -0.5, -0.5]);
-    assert_eq!(with_alpha.channel("direct.R"), None, "a layer that was not asked for");
+    assert_eq!(
+        with_alpha.channel("direct.R"),
+        None,
+        "a layer that was not requested is written"
+    );
     let [off, on] = [[0; 4], [186, 136, 255, 128]];
     assert_eq!(with_alpha.rgba8(), [off, on, on].concat());
     assert_eq!(with_alpha.rgb8()[3..6], [0.25, 0.125, 2.0].map(wgray::image::encode));
@@ -432,7 +447,7 @@ fn the_library_has_layers_and_alpha() {
 }
 
 #[test]
-fn path_layers_are_rejected_under_another_integrator() {
+fn path_layers_are_rejected_with_other_integrators() {
     let text = SCENE
         .replace("\"path\"", "\"phong\"")
         .replace("\"diffuse\"", "\"phong\"");
@@ -462,7 +477,7 @@ fn path_layers_are_rejected_under_another_integrator() {
         assert_eq!(message, expected, "{name}");
     }
     let packed = wgray_render::pack::pack(&scene);
-    assert_eq!(packed.clone().with_layers(), packed, "no other film");
+    assert_eq!(packed.clone().with_layers(), packed, "layers change the film");
 }
 
 #[test]

@@ -46,15 +46,15 @@ fn pixels() -> f64 {
     f64::from(SIDE) / 2.0 / (FOV / 2.0).to_radians().tan()
 }
 
-/// Returns a pixel center in pixels from the image center, right and up.
+/// Returns the offset of a pixel center from the image center, in pixels to the right and up.
 fn place(i: usize) -> (f64, f64) {
     let side = SIDE as usize;
     let half = f64::from(SIDE) / 2.0;
     ((i % side) as f64 + 0.5 - half, half - (i / side) as f64 - 0.5)
 }
 
-/// Returns the relative errors in the image of a disk blurred to this radius at distance 1: the maximum of the mean
-/// radiance in rings, and that of the total.
+/// Returns relative errors in the image of a disk that is blurred to this radius at distance 1: the maximum error of
+/// the mean radiance in rings, and the error of the total.
 fn wrong(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
     let (circle, spot) = (radius * pixels(), 0.005 * pixels());
     let within = spot * spot / (circle * circle); // fraction of the aperture that sees the disk
@@ -83,7 +83,7 @@ fn wrong(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
 }
 
 #[test]
-fn a_disk_out_of_focus_is_its_circle_of_confusion() {
+fn an_out_of_focus_disk_blurs_to_its_circle_of_confusion() {
     // An aperture of radius r focused at f blurs a point at z to a circle of radius r |1 / f - 1 / z| at distance 1.
     let lens = "aperture = 0.4\nfocus_distance = 4";
     for way in both() {
@@ -102,7 +102,7 @@ fn a_disk_out_of_focus_is_its_circle_of_confusion() {
 
 #[test]
 fn the_aperture_may_be_an_f_number() {
-    // The default focus distance is that of `look_at`.
+    // The default focus distance is the distance to `look_at`.
     let by = |lens: &str| spot(12.0, lens, 1).camera;
     assert_eq!(
         by("focal_length = 0.8\nf_number = 2"),
@@ -146,14 +146,15 @@ fn blades_give_a_polygon_with_a_corner_at_the_top() {
             let (sin, cos) = (90.0 + degrees).to_radians().sin_cos();
             (0.8 * circle * cos, 0.8 * circle * sin)
         };
-        // Far points show the aperture upright. The middle of a side, 60 degrees from a corner, is half as far out.
+        // Far points show the aperture upright. The middle of a side, 60 degrees from a corner, is half as far from the
+        // center as a corner.
         for degrees in [0.0, 30.0, -100.0] {
             let far = spot(12.0, &format!("{lens}{degrees}"), 64);
             assert!(lit(&far, turned(degrees), way), "{way:?} {degrees}");
             assert!(!lit(&far, turned(degrees + 60.0), way), "{way:?} {degrees}");
             assert!(lit(&far, turned(degrees + 120.0), way), "{way:?} {degrees}");
         }
-        // Near points show it upside down, with nearly the same circle of confusion.
+        // Near points show the aperture upside down, with nearly the same circle of confusion.
         let near = spot(2.4, &format!("{lens}0"), 64);
         assert!(lit(&near, turned(180.0), way), "{way:?}");
         assert!(!lit(&near, turned(0.0), way), "{way:?}");
@@ -219,7 +220,7 @@ fn lens_samples_are_stratified_and_independent_of_pixel_samples() {
     for count in counts.iter().flatten() {
         assert!(
             (40..=88).contains(count),
-            "64 each, if they are independent: {counts:?}"
+            "expected about 64 samples for each pair of quarters: {counts:?}"
         );
     }
 }
@@ -319,12 +320,12 @@ fn a_path_animates_focus_and_aperture() {
     assert_eq!(
         (still.radius, still.focus),
         (0.05, 2.0),
-        "a still image uses the lens of the camera"
+        "a still image does not use the lens of the camera"
     );
     assert_eq!(
         scene.camera_at(1.0).unwrap().lens,
         None,
-        "a frame of the path uses the lens of its keys"
+        "a frame of the path does not use the lens of the keys"
     );
     let lens = scene.camera_at(2.5).unwrap().lens.unwrap();
     assert_eq!((lens.radius, lens.focus), (0.25, 3.5));

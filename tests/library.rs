@@ -91,7 +91,7 @@ fn floats(picture: &Picture, name: &str) -> Vec<f32> {
 }
 
 #[test]
-fn a_scene_made_in_code_equals_that_of_a_file() {
+fn a_scene_built_in_code_equals_one_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, FILE).unwrap();
@@ -210,7 +210,7 @@ fn the_extension_selects_the_format() {
         "{error}"
     );
     assert!(!path("a.gif").exists());
-    // With the given settings, or with those of the scene.
+    // With the given settings, or with the settings of the scene.
     let saved = SaveOptions {
         bit_depth: BitDepth::Sixteen,
         metadata: Metadata {
@@ -328,7 +328,7 @@ fn an_image_in_memory_equals_a_file() {
 }
 
 #[test]
-fn names_of_devices_are_choices() {
+fn device_names_are_valid_choices() {
     for (name, device) in [
         ("auto", Device::Auto),
         ("CPU", Device::Cpu),

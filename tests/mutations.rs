@@ -55,7 +55,7 @@ fn every_mutation_is_applicable() {
 }
 
 #[test]
-fn a_text_that_is_gone_is_found() {
+fn a_missing_text_is_found() {
     let table = "[[a]]\nboth = ['x + y', 'x - y']\n[[a]]\nwgsl = ['p', 'q']\nrust = ['r', 's']"
         .parse()
         .unwrap();

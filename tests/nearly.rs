@@ -9,13 +9,15 @@ use wgray_render::records::Packed;
 /// Maximum error of a pixel, relative to its largest channel: in dark channels, patterns subtract nearly equal
 /// integrals.
 const RELATIVE: f64 = 1e-4;
-/// `RELATIVE` for textures on other devices than software Vulkan: one digit of a coordinate spans many texels.
+/// `RELATIVE` for scenes with textures on devices other than software Vulkan: a change of a coordinate by one ulp may
+/// span many texels.
 const TEXTURED: f64 = 1e-3;
-/// Maximum share of outliers, on edges where a comparison flips.
+/// Maximum share of outliers, which occur at edges where a comparison flips.
 pub const EDGES: f64 = 1e-3;
-/// Image side in pixels below which `EDGES` is scaled up on such devices: edges grow with the side only.
+/// Image side in pixels below which `EDGES` is scaled up on such devices, because the number of pixels on edges is
+/// proportional to the side.
 const SIDE: f64 = 400.0;
-/// Maximum relative error of the mean. On such devices, images below `SIDE` leave outliers out.
+/// Maximum relative error of the mean. On such devices, images below `SIDE` ignore outliers.
 const MEAN: f64 = 1e-5;
 
 /// Accumulated differences of GPU and CPU films.

@@ -58,7 +58,7 @@ enum Form {
         from_local: DMat4,
     },
     Triangle([DVec3; 3]),
-    /// Side of a cylinder, with the unit vector to u = 0.
+    /// Lateral surface of a cylinder; `tangent` is the unit vector towards u = 0.
     Side {
         start: DVec3,
         axis: DVec3,
@@ -67,7 +67,7 @@ enum Form {
     },
     /// Blocks of 32 triangles with their bounding boxes.
     Mesh(Vec<(DVec3, DVec3, Vec<Facet>)>),
-    /// An infinite plane without `half`, the half extents. If `round`, a disk of radius `half.x`.
+    /// `half`: the half extents; `None` for an infinite plane. If `round`, a disk of radius `half.x`.
     Flat {
         center: DVec3,
         tangent: DVec3,
@@ -147,7 +147,7 @@ impl<'a> Oracle<'a> {
         (0..pixels).into_par_iter().map(|i| self.pixel(i)).collect()
     }
 
-    /// Renders pixel `i`, row by row from the top left.
+    /// Renders pixel `i` in row-major order, top row first.
     pub fn pixel(&self, i: u32) -> [f64; 3] {
         let width = self.scene.image.width;
         let places = self.grid(self.scene.render.pixel_samples.count);
@@ -172,13 +172,13 @@ impl<'a> Oracle<'a> {
 
     fn grid(&self, count: u32) -> Vec<DVec2> {
         let side = f64::from(count).sqrt().round() as u32;
-        assert_eq!(side * side, count, "the oracle samples by square grids");
+        assert_eq!(side * side, count, "the oracle only supports square sample grids");
         let offset = if self.flaw == Flaw::CornerSamples { 0.0 } else { 0.5 };
         let place = |i: u32| (DVec2::new(f64::from(i % side), f64::from(i / side)) + offset) / f64::from(side);
         (0..count).map(place).collect()
     }
 
-    /// Returns the ray through a point in pixels from the top left. The image plane is at distance 1.
+    /// Returns the ray through a point in pixels, relative to the top-left corner. The image plane is at distance 1.
     fn camera_ray(&self, at: DVec2) -> (DVec3, DVec3) {
         let (width, height) = (f64::from(self.scene.image.width), f64::from(self.scene.image.height));
         let basis = |position: DVec3, look_at: DVec3, up: DVec3| {
@@ -206,7 +206,7 @@ impl<'a> Oracle<'a> {
                 let pixel = c.height / height;
                 (c.position + right * (to_right * pixel) + up * (to_top * pixel), forward)
             }
-            other => panic!("the oracle does not know the camera {other:?}"),
+            other => panic!("the oracle does not support the camera {other:?}"),
         }
     }
 
@@ -267,7 +267,7 @@ impl<'a> Oracle<'a> {
             }
             _ if bounces == render.max_depth => render.background,
             MaterialDescription::Mirror(mirror) => {
-                assert!(mirror.normal_map.is_none(), "the oracle knows no normal maps");
+                assert!(mirror.normal_map.is_none(), "the oracle does not support normal maps");
                 // For a reflection below the surface.
                 let mirrored = direction.reflect(shading);
                 let is_usable = mirrored.dot(normal) > 0.0 && shading.dot(direction) < 0.0;
@@ -275,7 +275,7 @@ impl<'a> Oracle<'a> {
                 self.color(&mirror.tint, meeting.uv) * follow(point + offset, mirrored)
             }
             MaterialDescription::Glass(glass) => {
-                assert!(glass.normal_map.is_none(), "the oracle knows no normal maps");
+                assert!(glass.normal_map.is_none(), "the oracle does not support normal maps");
                 let outside_in = facing != (self.flaw == Flaw::InvertedIndex);
                 let (n1, n2) = if outside_in { (1.0, glass.ior) } else { (glass.ior, 1.0) };
                 let reflected = follow(point + offset, direction.reflect(normal));
@@ -294,7 +294,7 @@ impl<'a> Oracle<'a> {
                 let through = self.color(&glass.tint, meeting.uv) * follow(point - offset, refracted);
                 reflected * share + through * (1.0 - share)
             }
-            other => panic!("the oracle does not know the material {other:?}"),
+            other => panic!("the oracle does not support the material {other:?}"),
         }
     }
 
@@ -308,7 +308,7 @@ impl<'a> Oracle<'a> {
         above: DVec3,
         viewer: DVec3,
     ) -> DVec3 {
-        assert!(phong.normal_map.is_none(), "the oracle knows no normal maps");
+        assert!(phong.normal_map.is_none(), "the oracle does not support normal maps");
         let factor = |own: &Option<ColorDescription>| {
             let color = own.as_ref().or(phong.color.as_ref()).expect("a checked material");
             self.color(color, meeting.uv)
@@ -358,7 +358,7 @@ impl<'a> Oracle<'a> {
                 let on_line = (at - at.round()).abs().min_element() < texture.line_width / 2.0;
                 if on_line { texture.line } else { texture.cell }
             }
-            other => panic!("the oracle does not know the texture {other:?}"),
+            other => panic!("the oracle does not support the texture {other:?}"),
         }
     }
 
@@ -401,7 +401,7 @@ impl<'a> Oracle<'a> {
             }
             LightDescription::Point(light) => vec![way(light.position)],
             LightDescription::Directional(light) => vec![(-light.direction.normalize(), f64::INFINITY)],
-            other => panic!("the oracle does not know the light {other:?}"),
+            other => panic!("the oracle does not support the light {other:?}"),
         }
     }
 
@@ -428,7 +428,7 @@ fn light_color(light: &LightDescription) -> DVec3 {
         LightDescription::Rectangle(light) => light.color,
         LightDescription::Point(light) => light.color,
         LightDescription::Directional(light) => light.color,
-        other => panic!("the oracle does not know the light {other:?}"),
+        other => panic!("the oracle does not support the light {other:?}"),
     }
 }
 
@@ -538,14 +538,14 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
             let faces = [[v0, v2, v1], [v0, v1, v3], [v1, v2, v3], [v0, v3, v2]];
             (t.material.clone(), faces.map(Form::Triangle).into())
         }
-        other => panic!("the oracle does not know the shape {other:?}"),
+        other => panic!("the oracle does not support the shape {other:?}"),
     }
 }
 
 fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form {
     assert!(
         i.matrix.is_none() && i.materials.is_empty() && file.up == Up::Z,
-        "the oracle does not know such meshes"
+        "the oracle does not support such meshes"
     );
     let scale = match i.scale {
         None => DVec3::ONE,

@@ -1,4 +1,4 @@
-//! Renders test scenes by all backends: CPU, and GPU with the scene as constants, in buffers, and by plain WGSL.
+//! Renders test scenes on all backends: CPU, and GPU with the scene as constants, with buffers, and with plain WGSL.
 
 use glam::Vec4;
 use wgray_image::Region;
@@ -26,7 +26,7 @@ pub enum RenderMode {
     Plain,
 }
 
-/// Returns one configuration per backend; only the CPU without a device.
+/// Returns one configuration per backend: CPU, and GPU if a device is available.
 pub fn both() -> Vec<RenderMode> {
     let mut modes = vec![RenderMode::Cpu];
     modes.extend(adapter::device().map(|_| RenderMode::Baked));

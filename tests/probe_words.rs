@@ -133,7 +133,7 @@ records! {
     }
 }
 
-/// An argument of a twin, by value or by reference.
+/// An argument that a twin takes by value or by reference.
 pub trait Argument<'a>: Sized {
     type Owned: ProbeWords;
     fn of(owned: &'a Self::Owned) -> Self;

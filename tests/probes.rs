@@ -569,8 +569,8 @@ fn show(kinds: &[ScalarKind], words: &[u32]) -> String {
 
 const DENORMALS: &str = "denormal numbers";
 
-/// Compares a function with its twin. Devices with a known difference leave out calls with denormals; returns how many
-/// of them differ.
+/// Compares a function with its twin. On devices with a known difference for denormal numbers, calls with such numbers
+/// may differ; returns the number of these calls.
 fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let (name, kinds) = (function.name(), function.words_out());
     let words = inputs(function, CALLS, name.bytes().map(u64::from).sum());
@@ -672,12 +672,12 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
     }
     assert!(problems.is_empty(), "{}", problems.join("\n"));
     println!(
-        "{} functions, {CALLS} calls each: the same bits; {left_out} calls with denormal numbers left out",
+        "{} functions, {CALLS} calls each: the same bits; {left_out} calls with denormal numbers skipped",
         probed.len()
     );
 }
 
-/// Also hits and misses of each intersection.
+/// Intersection functions have both hits and misses.
 #[test]
 fn inputs_cover_both_outcomes_of_predicates() {
     let source = shared_source();
@@ -784,7 +784,7 @@ fn nan_does_not_propagate() {
     }
 }
 
-/// Exactly where a twin has them.
+/// Denormal numbers are reported for an operand, a result or an intermediate result, and in no other case.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn denormal_numbers_in_twins_are_detected() {

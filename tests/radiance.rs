@@ -35,7 +35,7 @@ normal = [0, 0, 1]
 tangent = [1, 1, 0]
 "#;
 
-/// 1.5 above (0.4, -0.3).
+/// A light at height 1.5 above (0.4, -0.3).
 const LIGHT: &str = r#"
 [[lights]]
 type = "point"
@@ -107,14 +107,14 @@ fn the_ground_occludes_light_from_below() {
     for (lit, unlit) in lit.iter().zip(&unlit) {
         assert!(
             unlit.means().all(|color| color == [0.1 * 0.5, 0.2 * 0.5, 0.3]),
-            "only ambient light"
+            "more than ambient light"
         );
         assert!(lit.means().all(|color| color[0] > 0.1));
     }
 }
 
-/// Radius 0.5, height 1: a disk of radius 0.5. The camera is below the sphere, which would cover it; its image plane,
-/// where rays start, is at 0.25.
+/// A sphere of radius 0.5 casts a shadow of radius 0.5. The camera is below the sphere, which would otherwise hide the
+/// shadow; rays start in the image plane, at height 0.25.
 #[test]
 fn a_sphere_under_directional_light_casts_a_disk() {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
@@ -134,8 +134,8 @@ fn a_sphere_under_directional_light_casts_a_disk() {
     }
 }
 
-/// Returns large shapes of every kind. `dark_or_lit` adds a small one above: shapes with nothing on one side cast no
-/// shadow.
+/// Returns large shapes of every kind. `dark_or_lit` adds a small shape above, because a shape with no other shapes on
+/// one side casts no shadow.
 fn covers(heights: [f64; 4]) -> [String; 4] {
     let [a, b, c, d] = heights;
     [
@@ -147,7 +147,7 @@ fn covers(heights: [f64; 4]) -> [String; 4] {
     .map(|text| format!("[[shapes]]\nmaterial = 'ground'\n{text}\n"))
 }
 
-/// Returns whether all is dark and whether all is lit below covers.
+/// Returns whether all pixels below the covers are dark, and whether all are lit.
 fn dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let above = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [90, 90, 5]\nradius = 0.5\n";
@@ -175,10 +175,10 @@ fn two_primitives_occlude() {
             assert_eq!(dark_or_lit(light, &format!("{first}{second}")), DARK, "{first}{second}");
         }
     }
-    assert_eq!(dark_or_lit(light, ""), LIT, "without them");
+    assert_eq!(dark_or_lit(light, ""), LIT, "covers that are absent occlude the light");
 }
 
-/// Occluded just before the light, not behind it.
+/// A shape just in front of a light occludes the light; a shape behind the light does not.
 #[test]
 fn shapes_behind_a_light_do_not_occlude_it() {
     for (before, behind) in covers([1.45; 4]).iter().zip(&covers([1.55; 4])) {

@@ -33,7 +33,8 @@ pub fn compare(mode: RenderMode, packed: &Packed, gpu: &Film, cpu: &Film) -> Res
     judge(known, "picture", differing(gpu, cpu) as f64 / cpu.sums.len() as f64)
 }
 
-/// Compares first hits; on devices other than software Vulkan only integers, away from edges.
+/// Compares first hits. On devices other than software Vulkan, compares only the shape and material indices, and
+/// tolerates differences at edges.
 pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
     let device = adapter::device().expect("the device that rendered the image");
     assert_eq!(gpu.len(), cpu.len());
@@ -145,7 +146,7 @@ fn first_hits_of_all_scenes_agree() {
     });
 }
 
-/// By one ulp in a number, or one bit in a pixel.
+/// One number in a shader differs by one ulp, or one pixel by one bit.
 #[test]
 fn a_different_image_is_found() {
     let Some(device) = adapter::device() else { return };
@@ -197,7 +198,7 @@ fn a_different_image_is_found() {
     let hits = first_hits(&packed, RenderMode::Cpu);
     let mut other = hits.clone();
     other.iter_mut().take(20).for_each(|hit| hit.shape ^= 1);
-    assert!(compare_hits(&other, &hits).is_err(), "another shape index passes");
+    assert!(compare_hits(&other, &hits).is_err(), "a different shape index passes");
 }
 
 #[test]
@@ -223,7 +224,7 @@ fn a_larger_image_agrees() {
     }
 }
 
-/// Renders tiles with ranges of samples, in order.
+/// Renders a sequence of tiles, each with a range of samples.
 fn pieces(backend: &mut dyn Backend, region: Region, pieces: &[(Region, Range<u32>)]) -> Film {
     let mut run = || {
         backend.begin(region)?;

@@ -17,7 +17,7 @@ fn transformed(description: &Description, scale: f64, offset: DVec3) -> Descript
         CameraDescription::Perspective(camera) => {
             [&mut camera.position, &mut camera.look_at].into_iter().for_each(point)
         }
-        other => panic!("not foreseen: {other:?}"),
+        other => panic!("unexpected variant: {other:?}"),
     };
     for light in &mut description.lights {
         match light {
@@ -26,7 +26,7 @@ fn transformed(description: &Description, scale: f64, offset: DVec3) -> Descript
                 lengths(&mut light.size);
             }
             LightDescription::Point(light) => point(&mut light.position),
-            other => panic!("not foreseen: {other:?}"),
+            other => panic!("unexpected variant: {other:?}"),
         }
     }
     for shape in &mut description.shapes {
@@ -40,7 +40,7 @@ fn transformed(description: &Description, scale: f64, offset: DVec3) -> Descript
                 [&mut shape.a, &mut shape.b, &mut shape.c].into_iter().for_each(vector);
             }
             ShapeDescription::Tetrahedron(shape) => shape.vertices.iter_mut().for_each(point),
-            other => panic!("not foreseen: {other:?}"),
+            other => panic!("unexpected variant: {other:?}"),
         }
     }
     description
@@ -69,8 +69,8 @@ fn visible(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
     beyond(&reference(&packed(&description)), &expected, 0.01)
 }
 
-/// Rays start 32 units of 2^-24 above a surface, with an error below 24: docs/decisions/shadow-rays.md, step 5.
-/// Coordinates are up to 1 from the look-at point.
+/// Rays start 32 units of 2^-24 above a surface, with an error below 24 units: docs/decisions/shadow-rays.md, step 5.
+/// All coordinates are within 1 of the look-at point.
 const ROUNDING: f64 = 56.0 / 16_777_216.0;
 
 /// Returns true if rounding may change a pixel: in f64, moving camera or light by `ROUNDING` moves an edge across the
@@ -94,7 +94,7 @@ fn light_moved(description: &Description, way: DVec3) -> Description {
     for light in &mut description.lights {
         match light {
             LightDescription::Rectangle(light) => light.center += way,
-            other => panic!("not foreseen: {other:?}"),
+            other => panic!("unexpected variant: {other:?}"),
         }
     }
     description
@@ -107,12 +107,13 @@ fn camera_moved(description: &Description, way: DVec3) -> Description {
             camera.position += way;
             camera.look_at += way;
         }
-        other => panic!("not foreseen: {other:?}"),
+        other => panic!("unexpected variant: {other:?}"),
     }
     description
 }
 
-/// The segment from pixel (15, 193) to the first light sample passes an edge at 4e-7: the scale decides.
+/// The segment from pixel (15, 193) to the first light sample passes an edge at a distance of 4e-7; the scale decides
+/// whether the edge occludes the segment.
 #[test]
 fn scaling_changes_pixels_only_near_edges() {
     let (scene, expected) = (cornell(), reference(&packed(&cornell())));
@@ -124,10 +125,10 @@ fn scaling_changes_pixels_only_near_edges() {
     }
     let somewhere = (0..40_000).step_by(41);
     let near = somewhere.filter(|pixel| near_an_edge(&scene, *pixel)).count();
-    assert_eq!(near, 0, "of the pixels of everywhere");
+    assert_eq!(near, 0, "pixels near edges among all pixels");
 }
 
-/// Up to 1000 times the scene's size and more: coordinates are relative to a point near the look-at point.
+/// Offsets reach a million times the size of the scene: coordinates are relative to a point near the look-at point.
 #[test]
 fn translation_does_not_change_the_image() {
     for offset in [100.0, -2000.0, 1e6] {
@@ -135,7 +136,7 @@ fn translation_does_not_change_the_image() {
         let (found, expected) = (reference(&packed(&found)), reference(&packed(&expected)));
         assert_eq!(found, expected, "moved by {offset}");
     }
-    // No multiples of the grid of possible origins.
+    // These offsets are not multiples of the grid of possible origins.
     for offset in [1999.3, -77_777.7] {
         let found = visible(offset, 0.0);
         assert!(found.is_empty(), "moved by {offset}: pixels {found:?}");
@@ -146,7 +147,7 @@ fn translation_does_not_change_the_image() {
 fn too_large_an_offset_is_found() {
     let leaks = visible(0.0, 0.05);
     assert!(leaks.len() > 400, "lost contact shadows: {} pixels", leaks.len());
-    // A small one too, away from edges.
+    // A small offset is found, too, away from edges.
     let (scene, moved) = (cornell(), visible(0.0, 1e-3));
     let far = moved.iter().filter(|pixel| !near_an_edge(&scene, **pixel)).count();
     assert!(far > 60, "{far} of {} pixels", moved.len());

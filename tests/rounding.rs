@@ -13,7 +13,7 @@ use crate::random::Random;
 use crate::render::small_scenes;
 use crate::sources::{self, edited, parse, shaders, shaders_with};
 
-/// Adds up to 3 ulp, by the bits: more than WGSL allows for a quotient.
+/// Adds -3 to 3 ulp, depending on the bits: more than the error that WGSL allows for a quotient.
 const NUDGED: &str = "
 fn nudged(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
@@ -24,7 +24,7 @@ fn nudged(x: f32) -> f32 {
 ";
 
 /// Returns the software functions over imprecise device operations.
-fn over_a_poor_device() -> String {
+fn over_imprecise_operations() -> String {
     let mut text = shaders().text(ROUNDING).to_string();
     for (from, to) in [
         (
@@ -44,7 +44,7 @@ fn over_a_poor_device() -> String {
 }
 
 /// Returns imprecise device operations instead of the functions.
-fn poor_device() -> String {
+fn imprecise_operations() -> String {
     "fn quotient(a: f32, b: f32) -> f32 { return nudged(a / b); }
     fn quotient2(a: vec2f, b: vec2f) -> vec2f { return vec2f(quotient(a.x, b.x), quotient(a.y, b.y)); }
     fn quotient3(a: vec3f, b: vec3f) -> vec3f { return vec3f(quotient2(a.xy, b.xy), quotient(a.z, b.z)); }
@@ -102,7 +102,7 @@ const CASES: [Case; 2] = [
         mistakes: [
             ("rest > half", "rest >= half"),
             ("rest >= denominator", "rest > denominator"),
-        ], // the first concerns ties
+        ], // the first mistake concerns ties
     },
     Case {
         name: "square_root",
@@ -149,7 +149,7 @@ fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
     for case in &CASES {
         for (device, text) in [
             ("this device", shaders().text(ROUNDING)),
-            ("a poor one", &over_a_poor_device()),
+            ("a poor one", &over_imprecise_operations()),
         ] {
             let (number, first) = wrong(case, text);
             println!(
@@ -161,12 +161,12 @@ fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
         }
         // Controls.
         assert!(
-            wrong(case, &poor_device()).0 > 100_000,
+            wrong(case, &imprecise_operations()).0 > 100_000,
             "{}: a poor device is found out",
             case.name
         );
         for (from, to) in case.mistakes {
-            let (number, _) = wrong(case, &edited(&over_a_poor_device(), from, to));
+            let (number, _) = wrong(case, &edited(&over_imprecise_operations(), from, to));
             assert!(number > 0, "{}: '{to}'", case.name);
         }
     }
@@ -175,7 +175,7 @@ fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
 /// Returns imprecise operations for kernels that round in software.
 pub fn poor_shaders() -> &'static Shaders {
     static POOR: OnceLock<Shaders> = OnceLock::new();
-    POOR.get_or_init(|| shaders_with(ROUNDING, &poor_device()))
+    POOR.get_or_init(|| shaders_with(ROUNDING, &imprecise_operations()))
 }
 
 /// Seeds of the camera for [`selectable_shaders`].
@@ -183,10 +183,11 @@ const DEVICE: u32 = 0;
 const CORRECTED: u32 = 1;
 const IMPRECISE: u32 = 2;
 
-/// Returns the software functions over this device's operations, over imprecise ones, or the imprecise ones alone, by
-/// the seed of the camera: a scene needs one kernel.
+/// Returns shaders in which the camera seed selects how quotients and roots are computed. `DEVICE`: software rounding
+/// over the device's operations; `CORRECTED`: software rounding over deliberately imprecise operations; `IMPRECISE`:
+/// the imprecise operations alone. One kernel per scene covers all three.
 fn selectable_shaders() -> Shaders {
-    let mut text = over_a_poor_device();
+    let mut text = over_imprecise_operations();
     for (from, to) in [
         (
             "i32(((bits * 0x9e3779b9u) >> 16u) % 7u) - 3;".to_owned(),
@@ -210,7 +211,7 @@ fn selectable_shaders() -> Shaders {
     shaders_with(ROUNDING, &text)
 }
 
-/// Within the tolerances; with the software functions bit-identical.
+/// With imprecise operations, images are within the tolerances; with software rounding, they are bit-identical.
 #[test]
 fn images_keep_their_guarantees_on_an_imprecise_device() {
     if !adapter::device().is_some_and(bit_exact) {
@@ -237,7 +238,7 @@ fn images_keep_their_guarantees_on_an_imprecise_device() {
             assert_eq!(rendered(seed).0, 0, "{name} on {device}");
         }
     }
-    // Without a selection.
+    // The shaders without a selection are bit-identical, too.
     let (name, packed) = small_scenes().swap_remove(0);
     let found = render_with(&packed, RenderMode::Rounded, sources::shaders());
     assert_eq!(differing(&found, &reference(&packed)), 0, "{name}");

@@ -28,7 +28,7 @@ pub fn scene(name: &str) -> Description {
     descriptions()
         .into_iter()
         .find(|(file, _)| file == name)
-        .unwrap_or_else(|| panic!("no scene is called {name}"))
+        .unwrap_or_else(|| panic!("no scene is named {name}"))
         .1
 }
 

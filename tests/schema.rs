@@ -329,7 +329,7 @@ file = "rock.obj"
 material = "gray"
 matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]
 "#,
-    // Only the schema accepts this one, as the file does not exist.
+    // Only the schema accepts this scene, because the file does not exist.
     r#"
 image = { width = 8, height = 6 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40, f_number = 2 }
@@ -383,7 +383,7 @@ const OF_SEVERAL: &[&str] = &[
     "must have a red and green factor",
     "texture's factor",
     "texture with uv_set",
-    // Exclude or require others.
+    // Keys that exclude or require other keys.
     "integrator = \"path\"",
     "must be from 1 to 64",
     "must not be there",
@@ -524,7 +524,7 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
     }
 }
 
-/// Checks every `step`-th change; returns their number.
+/// Checks every `step`-th change of a value; returns the number of checked changes.
 fn compare(scene: &Table, folder: &Path, step: usize) -> usize {
     let mut all = Vec::new();
     places(&Value::Table(scene.clone()), &mut Vec::new(), &mut all);
@@ -542,7 +542,7 @@ fn compare(scene: &Table, folder: &Path, step: usize) -> usize {
 }
 
 #[test]
-fn changed_values_are_rejected_by_both() {
+fn schema_and_parser_reject_the_same_changed_values() {
     let folder = any_scene::folder();
     let scenes = EVERY.map(|text| text.parse::<Table>().unwrap());
     // Leaves several changes for each value.
@@ -553,7 +553,7 @@ fn changed_values_are_rejected_by_both() {
 }
 
 #[test]
-fn missing_and_unknown_keys_are_rejected_by_both() {
+fn schema_and_parser_reject_missing_and_unknown_keys() {
     let folder = any_scene::folder();
     let key = |name: &str| Step::Key(name.to_owned());
     let path = [key("camera"), key("path")];
@@ -598,7 +598,7 @@ fn missing_and_unknown_keys_are_rejected_by_both() {
         ),
     ] {
         let mut scene = Value::Table(EVERY[number].parse().unwrap());
-        assert!(fits(scene.as_table().unwrap()), "the control");
+        assert!(fits(scene.as_table().unwrap()), "the unchanged scene is rejected");
         let place = at(&mut scene, table).as_table_mut().unwrap();
         place.insert(name.to_owned(), value);
         let scene = scene.as_table().unwrap();
@@ -607,7 +607,7 @@ fn missing_and_unknown_keys_are_rejected_by_both() {
 }
 
 #[test]
-fn random_scenes_are_valid_and_their_changes_rejected_by_both() {
+fn schema_and_parser_agree_on_random_scenes_and_mutations() {
     let (folder, strategy) = (any_scene::folder(), any_scene::description());
     let mut runner = TestRunner::deterministic();
     for i in 0..60 {
@@ -756,7 +756,7 @@ fn each_key(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
     match schema {
         Json::Object(all) => {
             for (key, property) in all.get("properties").and_then(Json::as_object).into_iter().flatten() {
-                // Described in the consequence of the condition.
+                // The `then` part of the condition describes these keys.
                 if !path.ends_with("/if") {
                     check(&format!("{path}.{key}"), property);
                 }

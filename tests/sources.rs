@@ -207,7 +207,7 @@ pub fn rust_records(file: &syn::File) -> Vec<Signature> {
     file.items.iter().filter_map(record).collect()
 }
 
-/// Returns the WGSL type. Records are by reference in Rust, by value in WGSL.
+/// Returns the WGSL type. Rust passes records by reference, WGSL by value.
 fn rust_type(ty: &Type) -> String {
     match ty {
         Type::Reference(reference) => rust_type(&reference.elem),

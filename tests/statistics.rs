@@ -84,8 +84,8 @@ fn chi_square(counts: &[u32]) -> f64 {
         .sum()
 }
 
-/// Returns a projection of independent positions that is not uniform.
-fn flaw(positions: &[Vec2]) -> Option<String> {
+/// Returns the first projection in which the positions, assumed to be independent, are not uniform.
+fn nonuniform_projection(positions: &[Vec2]) -> Option<String> {
     const CELLS: usize = 16;
     let cell = |x: f32| ((x * CELLS as f32) as usize).min(CELLS - 1);
     type TestFolder = fn(Vec2) -> f32;
@@ -137,7 +137,7 @@ fn positions_are_on_the_unit_square() {
     }
 }
 
-/// Each position, and all positions of a pixel together.
+/// Tests each position, and all positions of a pixel together.
 #[test]
 fn random_patterns_are_uniform_over_pixels() {
     let mut tested = 0;
@@ -151,7 +151,7 @@ fn random_patterns_are_uniform_over_pixels() {
                     .take(100)
                     .all(|set| set[first].distance(sets[0][first]) < 0.36);
             let list: Vec<Vec2> = sets.iter().flat_map(|set| set[first..=last].iter().copied()).collect();
-            let problem = if confined { None } else { flaw(&list) };
+            let problem = if confined { None } else { nonuniform_projection(&list) };
             assert!(problem.is_none(), "{name}, positions {first} to {last}: {problem:?}");
         }
         tested += 1;
@@ -176,7 +176,7 @@ fn all_patterns_are_centered() {
 fn a_biased_pattern_is_found() {
     let sets = positions(Pattern::Random, 16, 10_000);
     let sound: Vec<Vec2> = sets.into_iter().flatten().collect();
-    assert_eq!(flaw(&sound), None);
+    assert_eq!(nonuniform_projection(&sound), None);
     type Change = fn(usize, Vec2) -> Vec2;
     let changes: [(&str, Change); 6] = [
         ("a little to the left", |_, p| Vec2::new(p.x.powf(1.03), p.y)),
@@ -188,7 +188,7 @@ fn a_biased_pattern_is_found() {
     ];
     for (name, change) in changes {
         let biased: Vec<Vec2> = sound.iter().enumerate().map(|(i, p)| change(i, *p)).collect();
-        assert!(flaw(&biased).is_some(), "{name}");
+        assert!(nonuniform_projection(&biased).is_some(), "{name}");
     }
 }
 
@@ -202,7 +202,7 @@ fn noisy(pattern: Pattern, seed: u32, counts: (u32, u32)) -> Packed {
     scenes::packed(&d)
 }
 
-/// Returns the deviations from the reference, in standard errors over the seeds.
+/// Returns the deviation of each pixel from the reference, in standard errors over the seeds.
 fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
     let n = pictures.len() as f64;
     let pixel = |i: usize| {
@@ -216,8 +216,8 @@ fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
     (0..truth.len()).map(pixel).collect()
 }
 
-/// Checks that mean and mean square are at most those of a normal distribution.
-fn unbiased(deviations: &[f64]) -> Result<(), String> {
+/// Checks that the mean and mean square of the deviations do not exceed the values of a standard normal distribution.
+fn check_unbiased(deviations: &[f64]) -> Result<(), String> {
     let n = deviations.len() as f64;
     let mean = deviations.iter().sum::<f64>() / n;
     let square = deviations.iter().map(|z| z * z).sum::<f64>() / n;
@@ -234,18 +234,18 @@ fn images_of_random_patterns_have_the_mean_of_grids() {
     for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !fixed(*pattern)) {
         let picture = |seed| means(&reference(&noisy(pattern, seed, (4, 4))));
         let pictures: Vec<_> = (0..48).map(picture).collect();
-        let result = unbiased(&deviations(&pictures, &truth));
+        let result = check_unbiased(&deviations(&pictures, &truth));
         assert!(result.is_ok(), "{name}: {}", result.unwrap_err());
         // Control: 2% too bright, and another camera.
         let brighter: Vec<[f64; 3]> = truth.iter().map(|pixel| pixel.map(|v| v * 1.02)).collect();
         assert!(
-            unbiased(&deviations(&pictures, &brighter)).is_err(),
+            check_unbiased(&deviations(&pictures, &brighter)).is_err(),
             "{name}: a bias is not found"
         );
         let mut shifted = truth.clone();
         shifted.rotate_right(1);
         assert!(
-            unbiased(&deviations(&pictures, &shifted)).is_err(),
+            check_unbiased(&deviations(&pictures, &shifted)).is_err(),
             "{name}: a shift is not found"
         );
     }

@@ -9,7 +9,7 @@ use syn::{Attribute, File, Item, ItemMacro, ItemMod, ItemUse, Macro, UseTree, Vi
 
 use crate::sources;
 
-/// Folders of the checked modules, with the path of their parent module.
+/// Folders of the checked modules, each with the path of its parent module.
 const FOLDERS: [(&str, &[&str]); 6] = [
     ("crates/image/src", &[]),
     ("crates/scene/src", &[]),

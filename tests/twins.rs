@@ -48,7 +48,7 @@ const NO_TWIN: &[&str] = &[
     "traversal",
 ];
 
-/// One-sided or different functions and records: file, name, reason.
+/// Functions and records that exist on one side only or differ: file, name, reason.
 const ONE_SIDED: &[(&str, &str, &str)] = &[
     (
         "linear_primitives.wgsl",
@@ -145,7 +145,8 @@ fn functions_and_records_match() {
         if file.starts_with("kernels/") || WITHOUT_TWIN.iter().any(|(f, _)| *f == file) {
             continue;
         }
-        // Files with overrides or bindings are parsed in a kernel; their twins take the scene first.
+        // Files with overrides or bindings are parsed as parts of a kernel. Their twins take the scene as the first
+        // argument.
         let kernel = kernels.iter().find(|kernel| kernel.start_of(file).is_some());
         let source = if is_shared(file) {
             &shared
@@ -255,7 +256,7 @@ mod opcode {
         228..=228, // atomic store and addition: the completion of a dispatch
         234..=234,
     ];
-    /// Floats, except `!=`: naga makes it ordered, false for NaN.
+    /// Floating-point comparisons except `!=`, which naga translates to an ordered comparison (false for NaN).
     pub const COMPARISONS: &[RangeInclusive<u16>] = &[156..=157, 180..=181, 184..=191];
     /// Must be decorated: negate, add, subtract, multiply, divide, vector times scalar; conversions between floats and
     /// integers.
@@ -303,7 +304,7 @@ fn violations(module: &[u32]) -> Vec<String> {
     problems
 }
 
-/// Returns true if only conversions to integers use a result.
+/// Returns true if a result is only used by conversions to integers.
 fn only_made_integer(module: &[u32], result: u32) -> bool {
     let defines = |op: u16, words: &[u32]| op == opcode::EXTENDED && words[2] == result;
     let functions = instructions(module).skip_while(|(op, _)| *op != opcode::FUNCTION);
@@ -381,7 +382,7 @@ fn an_inexact_operation_is_found() {
     assert!(decorations.len() > 100);
     let mut without = module.clone();
     without.drain(decorations[17]..decorations[17] + 3);
-    assert_eq!(violations(&without).len(), 1, "one undecorated operation");
+    assert_eq!(violations(&without).len(), 1, "an undecorated operation was not found");
 }
 
 fn positions(module: &[u32]) -> impl Iterator<Item = usize> {

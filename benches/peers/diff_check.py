@@ -31,7 +31,7 @@ BOUNDS = {"rmse": 1e-12, "rel_mse": 1e-12, "psnr": 1e-12, "ssim": 1e-11, "flip":
 
 
 def formula(width, height, is_linear):
-    """A pair of images given by a formula, the same as in tests/compare.rs."""
+    """A pair of images defined by a formula, which tests/compare.rs also uses."""
     y, x, c = numpy.meshgrid(range(height), range(width), range(3), indexing="ij")
     smooth = (x * 5 + y * 3 + c * 40) % 256
     noise = ((x * 7919 + y * 104729 + c * 1299709 + (x * y) * 31) % 101) - 50
@@ -56,7 +56,7 @@ def write(path, image):
 
 
 def expected(a, b):
-    """The metrics of an image and its reference by the reference implementations."""
+    """The metrics of an image and its reference, computed by the reference implementations."""
     is_linear = a.dtype == numpy.float32
     scale = {numpy.dtype(numpy.uint8): 255, numpy.dtype(numpy.uint16): 65535}.get(a.dtype, 1)
     a, b = a.astype(numpy.float64) / scale, b.astype(numpy.float64) / scale

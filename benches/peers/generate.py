@@ -291,7 +291,7 @@ class Scenes:
         return path
 
     def triangles(self, name):
-        """Returns the number of triangles of a scene's mesh from the header of its file; 0 without a mesh."""
+        """Returns the number of triangles of a scene's mesh from the header of its file; 0 if it has no mesh."""
         mesh = self.parts(name)[1]
         if not mesh:
             return 0
@@ -315,7 +315,7 @@ def fetch_dragon(path):
 
 
 if __name__ == "__main__":
-    # `run` runs this in a separate process, so that its memory is not counted as that of a renderer.
+    # `run` runs this in a separate process, so that its memory is not counted as a renderer's.
     _, folder, program, *names = sys.argv
     for name in names:
         Scenes(folder, program).write(name)

@@ -52,7 +52,7 @@ def cycles(job):
         else:
             light.shadow_soft_size = 0
     # Blender's importer uses (1 - colour) / distance as the absorption coefficient instead of -ln(colour) / distance
-    # (KHR_materials_volume). This sets the latter.
+    # (KHR_materials_volume). This sets the coefficient of the extension.
     for material in bpy.data.materials:
         for node in material.node_tree.nodes if material.node_tree else ():
             if node.bl_idname == "ShaderNodeVolumeAbsorption":

@@ -63,7 +63,7 @@ class File:
         self.node(translation=list(position), rotation=list(rotation), extensions=place)
 
     def texture(self, rows):
-        """Adds a texture of 8-bit texels, row by row from the top, without filtering."""
+        """Adds an unfiltered texture of 8-bit texels in row-major order, top row first."""
         raw = b"".join(b"\0" + bytes(x for texel in row for x in texel) for row in rows)
         chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
         head = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 2, 0, 0, 0)
@@ -83,7 +83,7 @@ class File:
 
     @staticmethod
     def closed(rows):
-        """The triangles of a sphere, without the degenerate ones at the poles."""
+        """The triangles of a sphere except the degenerate triangles at the poles."""
         indices, width = [], 2 * rows + 1
         for i in range(rows):
             for j in range(2 * rows):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares one light with a thousand of the same total power in a room; prints a Markdown table.
+"""Compares one light in a room with a thousand lights of the same total power; prints a Markdown table.
 
 The columns are the time, the error, and the time at the error of one light, per kind of light and device.
 

@@ -48,7 +48,7 @@ def wgray(args, path, size):
 
 
 def mitsuba(path, size, moved=0):
-    """Like `wgray` by Mitsuba's rays, from a camera moved by `moved`; also returns the mask of visible lights."""
+    """Like `wgray`, with Mitsuba's rays and a camera moved by `moved`; also returns the mask of visible lights."""
     import mitsuba_scenes
     scene = scenes.load(path)
     scene.position = [scene.position[0] + moved, *scene.position[1:]]

@@ -46,7 +46,7 @@ BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0, 0, 0]}}
 
 
 def tint(value):
-    """A colour as a Mitsuba texture. Its checkers repeat after two squares as ours do, but over a uv interval of 1."""
+    """A colour as a Mitsuba texture. Mitsuba's two squares cover a uv interval of 1, ours an interval of 2."""
     if isinstance(value, scenes.Checker):
         u, v = value.scale
         return {"type": "checkerboard", "color0": tint(value.even), "color1": tint(value.odd),
@@ -199,7 +199,7 @@ def mesh_file(s):
     kind = os.path.splitext(s.file)[1]
     if kind not in (".ply", ".obj"):
         raise ValueError(f"{s.file}: other renderers support only PLY and OBJ files")
-    # If a file has no normals, as ours, wgray's default is flat, Mitsuba's is smooth.
+    # Our files have no normals. In this case wgray's default is flat shading, and Mitsuba's is smooth shading.
     return {"type": kind[1:], "filename": s.file, "face_normals": s.normals in (None, "flat")}
 
 
@@ -213,7 +213,7 @@ def sensor(T, scene, width, height, spp):
                       "focus_distance": float(distance)}
     if scene.height_seen is None:
         return row | {"type": "perspective", "fov": scene.fov, "fov_axis": "y", "to_world": place}
-    # Mitsuba's orthographic camera sees -1 to 1 along x, and along y the same divided by the aspect ratio.
+    # Mitsuba's orthographic camera sees -1 to 1 along x, and this range divided by the aspect ratio along y.
     half = scene.height_seen / 2 * width / height
     return row | {"type": "orthographic", "near_clip": 1e-4, "to_world": place @ T().scale([half, half, 1])}
 

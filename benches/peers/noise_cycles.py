@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares the noise of a glTF model by wgray and by Blender's Cycles at equal samples per pixel.
+"""Compares the noise of wgray and of Blender's Cycles for a glTF model, at equal samples per pixel.
 
     benches/peers/noise_cycles.py MODEL [--size N] [--wgray FILE]
 

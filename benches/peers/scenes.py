@@ -61,7 +61,7 @@ class Checker:
 
 @dataclass
 class Quad:
-    """A rectangle, `center + s u + t v` with s and t in [-1, 1]; `color` is that of a light."""
+    """A rectangle, `center + s u + t v` with s and t in [-1, 1]; `color`: the color of a light, otherwise None."""
     center: list
     u: list
     v: list

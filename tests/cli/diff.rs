@@ -97,7 +97,7 @@ fn json(ran: &Ran) -> serde_json::Value {
 }
 
 #[test]
-fn the_same_bits_pass_and_any_other_bit_fails() {
+fn identical_files_pass_and_a_single_differing_bit_fails() {
     let place = TestFolder::new();
     let (a, _) = write_two_pngs(&place);
     png(&place, "copy.png", (4, 2), &a);
@@ -119,7 +119,7 @@ fn the_same_bits_pass_and_any_other_bit_fails() {
 }
 
 #[test]
-fn json_has_the_same_names() {
+fn json_uses_the_names_of_the_text_output() {
     let place = TestFolder::new();
     write_two_pngs(&place);
     let ran = place.run(&["diff", "a.png", "b.png", "--json"]);

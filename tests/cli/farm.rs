@@ -66,7 +66,7 @@ fn whole(place: &TestFolder) -> [Vec<u8>; 2] {
 fn tasks_of_slurm_render_the_image() {
     let place = TestFolder::new();
     let [expected, other_seed] = whole(&place);
-    assert!(expected != other_seed, "the control");
+    assert!(expected != other_seed, "another seed gives the same image");
     write_slurm(
         &place,
         "job='my job' tiles=3 frames=",
@@ -132,7 +132,10 @@ fn tasks_of_slurm_render_frames() {
     }
     assert!(place.read("out.3.png") == place.read("whole.3.png"));
     assert!(place.read("out.8.png") == place.read("whole.8.png"));
-    assert!(place.read("out.3.png") != place.read("out.8.png"), "the control");
+    assert!(
+        place.read("out.3.png") != place.read("out.8.png"),
+        "frames 3 and 8 are equal"
+    );
 }
 
 fn write_program(place: &TestFolder, name: &str, script: &str) {
@@ -211,7 +214,7 @@ fn signaled_tasks_of_slurm_are_requeued() {
 }
 
 #[test]
-fn arrays_are_as_few_as_the_cluster_allows() {
+fn slurm_arrays_have_the_maximum_size_of_the_cluster() {
     let place = TestFolder::new();
     write_slurm(
         &place,
@@ -292,7 +295,7 @@ fn scripts(template: &str) -> Vec<String> {
 fn scripts_of_open_job_description_render_the_image() {
     let place = TestFolder::new();
     let [expected, other_seed] = whole(&place);
-    assert!(expected != other_seed, "the control");
+    assert!(expected != other_seed, "another seed gives the same image");
     let scripts = scripts(&template("wgray.openjd.yaml"));
     let [render, merge] = scripts.as_slice() else {
         panic!("{scripts:?}")

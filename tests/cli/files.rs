@@ -23,7 +23,7 @@ fn a_file_that_cannot_be_written_fails_with_8() {
     }
     let ran = place.run(&["render", "small.toml", "--stats", "nowhere/stats.json"]);
     assert_eq!(ran.code, 8);
-    assert_eq!(place.files(), ["folder.png"], "reported before the render");
+    assert_eq!(place.files(), ["folder.png"], "the image was rendered before the error");
     assert!(
         ran.stderr.contains("nowhere/stats.json: cannot be written"),
         "{}",
@@ -32,7 +32,7 @@ fn a_file_that_cannot_be_written_fails_with_8() {
 }
 
 #[test]
-fn a_file_is_replaced_by_the_next() {
+fn a_file_is_replaced_by_the_next_render() {
     let place = TestFolder::new();
     place.write("out.png", "old");
     place.quietly(&["render", "small.toml", "-o", "out.png"]);
@@ -50,7 +50,7 @@ mod unix {
     use super::*;
 
     #[test]
-    fn permissions_are_those_of_a_new_file() {
+    fn outputs_have_the_permissions_of_a_new_file() {
         let place = TestFolder::new();
         place.quietly(&["render", "small.toml", "--stats", "stats.json"]);
         let mode = |name: &str| fs::metadata(place.path(name)).unwrap().permissions().mode();
@@ -184,7 +184,7 @@ mod unix {
             .into_iter()
             .find(|name| name.contains(&format!("-{}@", living.id())))
             .unwrap();
-        assert!(!place.path(&left).exists(), "removed by the next render");
+        assert!(!place.path(&left).exists(), "the next render did not remove the file");
         place.quietly(&["render", "small.toml", "-o", "out.exr", "--device", "cpu"]);
         let mut expected = [other_machine, other_output, folder, living_file];
         expected.sort();

@@ -87,7 +87,10 @@ fn a_model_renders_without_a_scene() {
         "{left} {right} {top} {bottom}"
     );
     let middle = picture.get_pixel(12, 10).0;
-    assert!(middle[0] > middle[2], "the box is clay: {middle:?}");
+    assert!(
+        middle[0] > middle[2],
+        "the box does not have the color of clay: {middle:?}"
+    );
     quietly(&place, &["box.gltf"]);
     assert_eq!(read_png(&place.path("box.png")).0, 24);
 }
@@ -508,7 +511,10 @@ fn a_turntable_frames_the_model() {
                 .enumerate_pixels()
                 .any(|(x, y, p)| edge(x, y) == at_edge && p.0[3] > 0)
         };
-        assert!(covered(false) && !covered(true), "frame {frame} is complete");
+        assert!(
+            covered(false) && !covered(true),
+            "frame {frame} does not show the whole model"
+        );
         let bytes = picture.into_raw();
         assert!(!seen.contains(&bytes), "frame {frame} equals another");
         seen.push(bytes);

@@ -110,7 +110,7 @@ fn info_counts_shapes_memory_and_samples() {
     }
     assert_eq!(tube["textures"][0]["type"], "checker");
     assert!(tube["kernel"]["uses"].as_array().unwrap().contains(&"BVH".into()));
-    assert!(place.files().is_empty(), "no file is written");
+    assert!(place.files().is_empty(), "a file was written");
 }
 
 #[test]

@@ -452,7 +452,11 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
     file.write_all(&bytes[200..900]).expect("bytes");
     let ran = resume_render(&place, "cpu");
     assert!(ran.stderr.contains("dropped 700 bytes after byte"), "{}", ran.stderr);
-    assert_eq!(resume_render(&place, "cpu").stderr, "", "damaged pieces are still in the file");
+    assert_eq!(
+        resume_render(&place, "cpu").stderr,
+        "",
+        "damaged pieces are still in the file"
+    );
     assert!(place.read("out.exr") == expected);
 }
 
@@ -596,7 +600,7 @@ fn parts_merge_to_the_same_image() {
     render(&["--tile", "1/7", "--seed", "3", "-o", "seed.part"]);
     refused(
         &["seed.part", "p2.part"],
-        "p2.part: belongs to another image than seed.part: its scene or an option",
+        "p2.part: belongs to a different image than seed.part: its scene or an option",
     );
     place.quietly(&[
         "render",

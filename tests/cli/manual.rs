@@ -45,7 +45,7 @@ fn every_command_has_a_page() {
         }
         let command = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
         let arguments: Vec<&str> = std::iter::once("man").chain(command).collect();
-        assert_eq!(place.run(&arguments).stdout, page, "`wgray man` prints another page than {name}");
+        assert_eq!(place.run(&arguments).stdout, page, "`wgray man` does not print {name}");
         // The page contains every option of the help in bold, with escaped hyphens.
         let arguments: Vec<&str> = command.into_iter().chain(["--help"]).collect();
         let help = place.run(&arguments).stdout;

@@ -88,7 +88,7 @@ fn is_summary(line: &str) -> bool {
     }
 }
 
-/// 10 x 6 pixels in which all random numbers differ.
+/// A scene of 10 x 6 pixels, each with different random sample positions.
 const SCENE: &str = r#"image = { width = 10, height = 6 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
 [render]

@@ -31,7 +31,7 @@ fn large(place: &TestFolder) {
 
 /// Whichever allocation fails first, the program prints one line and leaves no file.
 #[test]
-fn the_program_ends_with_code_7() {
+fn failed_allocations_end_a_render_with_code_7() {
     let place = TestFolder::new();
     large(&place);
     let before = place.files();
@@ -68,7 +68,7 @@ fn the_program_ends_with_code_7() {
 
 /// Memory is too small for all threads.
 #[test]
-fn other_commands_end_with_code_7() {
+fn failed_allocations_end_other_commands_with_code_7() {
     let place = TestFolder::new();
     large(&place);
     let mut failed = 0;
@@ -84,7 +84,7 @@ fn other_commands_end_with_code_7() {
 
 /// An image that exceeds the memory is reported as an error, not as a failed allocation.
 #[test]
-fn handled_allocations_are_errors() {
+fn images_that_exceed_the_memory_are_errors() {
     let place = TestFolder::new();
     let options = "--spp 1 --size 30000x30000 --time-limit 1 --device cpu --threads 1 -o out.png";
     let ran = place.shell(

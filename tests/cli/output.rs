@@ -27,7 +27,7 @@ fn a_png_has_display_values_of_the_means() {
         .means()
         .flat_map(|color| color.map(encode))
         .collect();
-    assert!(expected.contains(&255), "the background's blue is clamped");
+    assert!(expected.contains(&255), "no value is clamped");
     assert_eq!(read_png(&place.path("small.png")), (10, 6, expected));
 }
 
@@ -124,7 +124,7 @@ fn aovs_are_layers_of_an_exr() {
 }
 
 #[test]
-fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
+fn adaptive_sampling_and_its_layers_equal_the_library() {
     let place = TestFolder::new();
     let options = ["--pixel-pattern", "sobol", "--spp", "8", "--adaptive", "0.02"];
     let files = [
@@ -211,7 +211,7 @@ fn path_scene(settings: &str) -> String {
 }
 
 #[test]
-fn layers_of_paths_are_those_of_the_film() {
+fn path_layers_equal_the_layers_of_the_film() {
     const NAMES: [&str; 5] = ["emission", "direct", "indirect", "albedo", "shading_normal"];
     let place = TestFolder::new();
     let inner = Region {

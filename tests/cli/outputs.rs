@@ -486,7 +486,10 @@ mod unix {
             .spawn()
             .unwrap();
         std::thread::sleep(std::time::Duration::from_millis(300));
-        assert!(child.try_wait().unwrap().is_none(), "the render does not wait for a reader");
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "the render does not wait for a reader"
+        );
         let killed = Command::new("kill")
             .args(["-INT", &child.id().to_string()])
             .status()

@@ -157,7 +157,10 @@ fn pngs_have_8_or_16_bits_and_name_their_curve() {
         };
         let expected: Vec<u16> = shown.map(to_16_bits).collect();
         assert_eq!(deep.into_raw(), expected, "{name}");
-        assert!(expected.iter().any(|value| value % 257 != 0), "all values fit in 8 bits");
+        assert!(
+            expected.iter().any(|value| value % 257 != 0),
+            "all values fit in 8 bits"
+        );
         assert_eq!(png_info(&place.path("b.normal.png")).bit_depth, png::BitDepth::Sixteen);
         let info = png_info(&place.path("a.png"));
         let (srgb, gamma) = (info.srgb.is_some(), info.gama_chunk.map(|gamma| gamma.into_scaled()));

@@ -292,7 +292,7 @@ fn partial_files_do_not_count_as_existing() {
     wait_for(&place, "1.exr");
     send("-INT", &child);
     assert_eq!(ended(child).code, 130);
-    assert_eq!(place.files(), ["1.exr", "1.png"], "no further frame starts");
+    assert_eq!(place.files(), ["1.exr", "1.png"], "another frame was started");
     let run = || {
         let arguments = [
             "render",

@@ -86,7 +86,11 @@ fn a_default_name_replaces_images_of_this_program_only() {
     place.quietly(&options);
     let ours = place.read("small.png");
     place.quietly(&[&options[..], &["--reproducible", "--bit-depth", "16"]].concat());
-    assert_ne!(place.read("small.png"), ours, "its own image is replaced");
+    assert_ne!(
+        place.read("small.png"),
+        ours,
+        "an image of this program was not replaced"
+    );
     // Rewriting the image removes the chunk that names wgray as its author.
     let picture = image::load_from_memory(&ours).expect("a PNG");
     picture.save(place.path("small.png")).expect("written");

@@ -40,7 +40,7 @@ fn invalid_pixels_of_a_shader_are_counted_and_marked() {
     let shown = |frame: &Frame| [(0, 3), (1, 3), (2, 3), (30, 20)].map(|(x, y)| pixel(&frame.pictures[0], x, y));
     let (magenta, cyan, green) = ([255, 0, 255], [0, 255, 255], [0, 255, 0]);
     assert_eq!(shown(&frame), [magenta, cyan, cyan, green]);
-    // The output file equals that of `render`, without marks.
+    // The output file equals the image that `render` writes, without marks.
     running.wait("the file", |_| {
         let picture = image::open(&out).ok()?.into_rgb8();
         (picture.get_pixel(1, 3).0 == [0, 255, 0]).then_some(())
@@ -71,6 +71,9 @@ fn negative_values_of_a_filter_with_negative_lobes_are_not_faults() {
     let running = files.start();
     running.wait_rendered(&files);
     let colors = running.colors().colors;
-    assert!(colors.iter().flatten().any(|v| *v < 0.0), "the filter makes some");
+    assert!(
+        colors.iter().flatten().any(|v| *v < 0.0),
+        "the filter gives no negative values"
+    );
     assert_eq!(running.frame().unwrap().header.faults[0].1, Default::default());
 }

@@ -48,7 +48,7 @@ fn close(a: [f32; 3], b: [f32; 3]) -> bool {
 }
 
 #[test]
-fn layers_equal_those_of_render_and_sum_to_the_image() {
+fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
     for scene in [path(), adaptive()] {
         let files = Files::new(&scene);
         let running = files.start();
@@ -73,7 +73,7 @@ fn layers_equal_those_of_render_and_sum_to_the_image() {
             assert_eq!(
                 frame.header.histogram.is_some(),
                 found.is_light(),
-                "albedo and normals are not radiance"
+                "not exactly the layers of light have a histogram"
             );
             seen.push(found.values.colors);
             // One kernel computes all layers.
@@ -110,7 +110,7 @@ fn layers_equal_those_of_render_and_sum_to_the_image() {
             assert_eq!(
                 running.state().compile_seconds,
                 compiled.unwrap(),
-                "the kernel of light knows it"
+                "the variance needed another compilation"
             );
         }
         assert_eq!(running.state().problems, []);
@@ -133,7 +133,7 @@ fn the_kernels_of_color_and_layers_are_cached() {
     let first = running.state().compile_seconds;
     show(View::Direct);
     let compiled = running.state().compile_seconds;
-    assert_ne!(compiled, first, "layers have a kernel of their own");
+    assert_ne!(compiled, first, "layers use the kernel of the color");
     let color = show(View::Color);
     assert!(matches!(&color.content, Content::Color(pixels) if *pixels == colors));
     show(View::Albedo);
@@ -157,7 +157,7 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
         notice.text
     );
     assert_eq!(running.state().view, View::Color);
-    // The shading normal of this scene is that of the first hits.
+    // In this scene the shading normals equal the normals of the first hits.
     running.session.send(Command::View(View::ShadingNormal));
     running.wait("the normals", |running| {
         let frame = running.frame()?;
@@ -187,11 +187,11 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
     assert_eq!(
         running.state().compile_seconds,
         compiled,
-        "its values are not compiled in"
+        "a changed color was compiled into the kernel"
     );
     files.edit(KERNEL, RADIANCE, "path_value(simple)");
     running.wait_problem();
-    assert!(shows(&running, &green).is_some(), "the last image stays");
+    assert!(shows(&running, &green).is_some(), "the last image was discarded");
     files.write_shaders();
     running.wait_well();
     // The direct integrator has no such layer.

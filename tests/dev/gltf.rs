@@ -36,7 +36,7 @@ fn start(folder: &Path, name: &str) -> Running {
     Running::start(sources, None)
 }
 
-/// Waits for an image in whose center, on the large box, this channel is the strongest.
+/// Waits for an image in which this channel is the strongest at the center, where the large box is.
 fn wait_for(running: &Running, strongest: [f64; 3]) {
     let wanted = strongest.map(|value| value > 0.5);
     running.wait("the image of the file", |running| {
@@ -65,7 +65,7 @@ fn saving_a_model_updates_the_image() {
     model(BLUE).write_glb(folder.path(), "new~");
     fs::rename(folder.path().join("new~"), folder.path().join("box.glb")).unwrap();
     wait_for(&running, BLUE);
-    // Incomplete: an error until the rest is written.
+    // An incomplete file is an error until the rest is written.
     let whole = model(RED).glb();
     fs::write(folder.path().join("box.glb"), &whole[..whole.len() / 2]).unwrap();
     assert!(running.wait_problem().message.contains("box.glb: "));
@@ -119,7 +119,7 @@ fn files_that_a_model_refers_to_are_watched() {
     wait_for(&running, RED);
     model(GREEN).write_gltf(folder.path(), "box");
     wait_for(&running, GREEN);
-    // Without the buffer an error, then the image again.
+    // Without the buffer an error is reported; with the buffer the image returns.
     let buffer = folder.path().join("box.bin");
     let bytes = fs::read(&buffer).unwrap();
     fs::remove_file(&buffer).unwrap();
@@ -147,7 +147,7 @@ fn the_camera_moves_but_is_not_saved_into_a_model() {
     running.wait_done(revision);
     assert_ne!(running.colors(), still);
     running.session.send(Command::SaveCamera);
-    running.wait("why not", |running| {
+    running.wait("the reason", |running| {
         let text = format!("{:?}", running.state());
         text.contains("cannot save the camera: glTF files are read-only here")
             .then_some(())

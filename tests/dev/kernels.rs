@@ -97,7 +97,7 @@ fn a_truncated_loop_is_reported_or_the_image_is_complete() {
     });
     if cut {
         assert_eq!(running.state().problems[0].kind, "shader");
-        assert_eq!(running.colors(), good, "the last good image stays");
+        assert_eq!(running.colors(), good, "the last valid image was discarded");
         let revision = running.revision();
         running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
         running.wait_done(revision);

@@ -25,23 +25,26 @@ fn rendering_pauses_without_viewers() {
     };
     running.wait("a kernel", |running| running.state().compile_seconds);
     std::thread::sleep(SETTLED);
-    assert!(running.frame().is_none(), "no viewer");
+    assert!(running.frame().is_none(), "a render runs without a viewer");
     let viewer = running.session.viewers().enter();
     running.wait("a first image", |running| running.frame());
     let other = running.session.viewers().enter();
     drop(viewer);
     let last = running.frame().unwrap();
-    running.wait("more of it for the other", |running| {
+    running.wait("more samples for the other viewer", |running| {
         (!Arc::ptr_eq(&running.frame()?, &last)).then_some(())
     });
     drop(other);
     std::thread::sleep(SETTLED);
     let last = running.frame().unwrap();
-    assert!(!last.header.done, "there is more to do");
+    assert!(!last.header.done, "the image is already complete");
     std::thread::sleep(Duration::from_secs(1));
-    assert!(Arc::ptr_eq(&running.frame().unwrap(), &last), "it rests");
+    assert!(
+        Arc::ptr_eq(&running.frame().unwrap(), &last),
+        "rendering continued without viewers"
+    );
     let _viewer = running.session.viewers().enter();
-    running.wait("more of it", |running| {
+    running.wait("more samples", |running| {
         (!Arc::ptr_eq(&running.frame()?, &last)).then_some(())
     });
 }

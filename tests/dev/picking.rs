@@ -9,7 +9,7 @@ use wgray_dev::{Command, Object, SceneView, Set, Sources};
 use super::running::{Files, Running};
 use crate::model::Model;
 
-/// From -y; the width covers nearly x = -2 to 2.
+/// The camera is at -y; the image covers about x = -2 to 2.
 const START: &str = "\
 image = { width = 40, height = 30 }
 camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
@@ -41,7 +41,7 @@ f 5 6 7 8
 ";
 const MTL: &str = "newmtl bark\nKd 0.4 0.2 0.1\nnewmtl leaf\nKd 0.1 0.5 0.1\n";
 
-fn seen(running: &Running) -> std::sync::Arc<SceneView> {
+fn wait_for_view(running: &Running) -> std::sync::Arc<SceneView> {
     running.wait("a scene", |running| running.session.seen.borrow().clone())
 }
 
@@ -102,7 +102,7 @@ translate = [1, 0, 0]
     files.write("tile.obj", TILE);
     let running = files.start();
     running.wait_rendered(&files);
-    let scene = seen(&running);
+    let scene = wait_for_view(&running);
     for (pixel, name, first, named) in [
         (LEFT, "instances[0]", "# the left one", ["materials.red", "meshes.tile"]),
         (
@@ -123,7 +123,7 @@ translate = [1, 0, 0]
     assert_eq!(scene.at([0, 0]).name, "render");
     let mesh = scene.object("meshes.tile", None);
     let file = mesh.groups[0].fields.iter().find(|field| field.name == "file").unwrap();
-    assert!(file.fixed.is_some(), "no viewer says which files are read");
+    assert!(file.fixed.is_some(), "a viewer may replace the list of read files");
     // The instance is moved away from the clicked pixel and picked at its new position.
     assert_eq!(set(&running, "instances[1].translate", json!([1, 0, 0.9])), None);
     assert_eq!(
@@ -131,7 +131,7 @@ translate = [1, 0, 0]
         text.replace("translate = [1, 0, 0]", "translate = [1, 0, 0.9]")
     );
     running.wait_rendered(&files);
-    let scene = seen(&running);
+    let scene = wait_for_view(&running);
     assert_eq!(scene.at(RIGHT).name, "render");
     assert_eq!(scene.at([30, 6]).name, "instances[1]");
     // Absent keys are added. A scale may be a number or a list.
@@ -166,7 +166,7 @@ materials = {{ leaf = 'leaf' }}
     files.write("pair.mtl", MTL);
     let running = files.start();
     running.wait_rendered(&files);
-    let scene = seen(&running);
+    let scene = wait_for_view(&running);
     let trunk = scene.at(LEFT);
     assert_eq!((trunk.name.as_str(), &trunk.gone), ("shapes[0]", &None));
     assert_eq!(trunk.groups[0].line, line(&text, "# a tree"));
@@ -222,7 +222,7 @@ fn picking_a_gltf_file_reports_that_it_is_read_only() {
     };
     let running = Running::start(sources, None);
     running.wait_done(0);
-    let scene = seen(&running);
+    let scene = wait_for_view(&running);
     let clicked = scene.at([12, 11]);
     assert_eq!((clicked.name.as_str(), clicked.groups.len()), ("shapes[0]", 0));
     let message = "glTF files are read-only here; run `wgray convert` for an editable scene";
@@ -263,7 +263,7 @@ translate = [1, 0, -0.2]
     let text = files.read("scene.toml");
     let running = files.start();
     running.wait_rendered(&files);
-    let scene = seen(&running);
+    let scene = wait_for_view(&running);
     assert_eq!(scene.at(LEFT).name, "shapes[0]");
     let clicked = scene.at(RIGHT);
     assert_eq!(
@@ -277,7 +277,7 @@ translate = [1, 0, -0.2]
     );
     assert_eq!(set(&running, "shapes[1].translate", json!([1, 0, 0.7])), None);
     running.wait_rendered(&files);
-    assert_eq!(seen(&running).at(RIGHT).name, "render");
+    assert_eq!(wait_for_view(&running).at(RIGHT).name, "render");
     assert_eq!(
         (files.read("scene.toml"), fs::read(files.path("box.glb")).unwrap()),
         (text.replace("-0.2]", "0.7]"), model)

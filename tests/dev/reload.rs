@@ -9,14 +9,14 @@ use wgray_render::gpu::compose::Shaders;
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
 
 #[test]
-fn the_first_image_equals_that_of_render() {
+fn the_first_image_equals_the_image_of_render() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
     let frame = running.frame().unwrap();
     assert_eq!((frame.header.samples, frame.header.total), (4, 4));
     let colors = running.colors().colors;
-    assert!(colors.iter().any(|color| *color != colors[0]), "the image is not empty");
+    assert!(colors.iter().any(|color| *color != colors[0]), "the image is empty");
     let (x, y) = (20, 20);
     let [r, g, b] = colors[y * 40 + x];
     let values = frame.pixel(x as u32, y as u32).unwrap();
@@ -74,7 +74,7 @@ fn a_saved_scene_is_compiled_only_if_it_needs_another_kernel() {
     files.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.8, 0.1");
     running.wait_rendered(&files);
     assert_ne!(running.colors(), before);
-    assert_eq!(running.state().compile_seconds, compiled, "nothing was compiled");
+    assert_eq!(running.state().compile_seconds, compiled, "a kernel was compiled");
     let before = running.colors();
     let more = |shape: &str| format!("[[shapes]]\nmaterial = 'red'\n{shape}\n\n[[shapes]]");
     let sphere = more("type = 'sphere'\ncenter = [1, 0, 1]\nradius = 0.3");
@@ -84,12 +84,16 @@ fn a_saved_scene_is_compiled_only_if_it_needs_another_kernel() {
     assert_eq!(
         running.state().compile_seconds,
         compiled,
-        "one more is another count alone"
+        "a second sphere needed a compilation"
     );
     let triangle = more("type = 'triangle'\nvertices = [[1, 0, 1], [1, 0, 2], [1, 1, 1]]");
     files.edit("scene.toml", "[[shapes]]", &triangle);
     running.wait_rendered(&files);
-    assert_ne!(running.state().compile_seconds, compiled, "another kernel was compiled");
+    assert_ne!(
+        running.state().compile_seconds,
+        compiled,
+        "no other kernel was compiled"
+    );
     files.edit("scene.toml", "width = 40", "width = 33");
     running.wait_rendered(&files);
 }
@@ -159,17 +163,17 @@ fn an_invalid_shader_is_reported_and_the_image_stays() {
     running.session.send(Command::ResetCamera);
     files.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.8, 0.1");
     let scene_changed = Files::new(&files.read("scene.toml")).rendered();
-    running.wait("the changed scene by the last good shaders", |running| {
+    running.wait("the changed scene with the last valid shaders", |running| {
         (running.colors() == scene_changed).then_some(())
     });
-    // Even if they need another kernel.
+    // Changes that need another kernel take effect, too.
     files.edit(
         "scene.toml",
         "radius = 0.5",
         "radius = 0.5\n\n[[shapes]]\ntype = 'sphere'\nmaterial = 'red'\ncenter = [1, 0, 1]\nradius = 0.3",
     );
     let scene_changed = Files::new(&files.read("scene.toml")).rendered();
-    running.wait("a new kernel of the last good shaders", |running| {
+    running.wait("a new kernel from the last valid shaders", |running| {
         (running.colors() == scene_changed).then_some(())
     });
     assert_eq!(running.wait_problem().kind, "shader");
@@ -189,7 +193,7 @@ fn a_type_error_in_a_shader_is_reported() {
     let problem = running.wait_problem();
     assert!(
         problem.place.unwrap().contains("camera.wgsl:"),
-        "no image, but an error"
+        "the error does not name the shader"
     );
     assert!(running.frame().is_none());
     files.edit(
@@ -299,7 +303,7 @@ fn deleted_files_are_reported_until_they_return() {
     files.write("shaders/phong.wgsl", Shaders::built_in().text("phong.wgsl"));
     running.wait_well();
 
-    // Checking out another branch does the same.
+    // A checkout of another branch also removes and restores folders.
     for name in ["shaders/kernels", "shaders"] {
         fs::rename(files.path(name), files.path("away")).unwrap();
         assert_eq!(running.wait_problem().kind, "file");

@@ -21,7 +21,7 @@ fn a_save_or_a_move_does_not_wait_for_the_image() {
     let frame = running.wait("a first image", |running| running.frame());
     assert!(
         !frame.header.done && frame.header.sent[0] < 1200,
-        "it is coarse: {:?}",
+        "the first image is not coarse: {:?}",
         frame.header
     );
     let mut worst = Duration::ZERO;

@@ -241,7 +241,7 @@ impl Running {
         })
     }
 
-    /// Waits until the complete image equals that of `render`.
+    /// Waits until the complete image equals the image that `render` makes.
     #[track_caller]
     pub fn wait_rendered(&self, files: &Files) {
         let wanted = files.rendered();

@@ -71,7 +71,7 @@ fn the_server_answers_its_own_pages_only() {
         );
         assert!(
             !text.contains("://cdn") && !text.contains("src=\"http"),
-            "nothing comes from elsewhere"
+            "the page loads from another origin"
         );
     }
     for path in [
@@ -130,7 +130,7 @@ fn the_server_answers_its_own_pages_only() {
             break head;
         }
         open.push(stream);
-        assert!(open.len() <= 16, "no bound");
+        assert!(open.len() <= 16, "the number of viewers is not limited");
     };
     assert_eq!(full, *b"HTTP/1.1 503");
     assert!(open.len() >= 15, "{}", open.len());

@@ -88,13 +88,13 @@ fn a_slider_equals_an_edit_without_a_compilation() {
     ] {
         edits.push(edit);
         let edited = rendered(&files, &edits);
-        assert_ne!(edited, last, "{name} is seen");
+        assert_ne!(edited, last, "{name} has no effect");
         slide(&running, name, value);
         wait_for(&running, &edited);
         assert_eq!(slider(&running, name).value, value, "{name}");
         last = edited;
     }
-    assert_eq!(running.state().compile_seconds, compiled, "nothing was compiled");
+    assert_eq!(running.state().compile_seconds, compiled, "a kernel was compiled");
     running
         .session
         .send(Command::ResetSlider(FILE.to_string(), "hue".to_string()));
@@ -113,7 +113,8 @@ fn a_slider_equals_an_edit_without_a_compilation() {
     });
     assert_eq!(slider(&running, "tint").slider.line, wanted.slider.line + 1);
     assert_eq!(running.state().compile_seconds, compiled);
-    // An edited value in the file replaces that of its slider; other sliders keep theirs through a compilation.
+    // An edited value in the file replaces the value of its slider; other sliders keep their values through a
+    // compilation.
     slide(&running, "tint", Value::Number(0.9));
     slide(&running, "level", Value::Number(5.0));
     files.edit(KERNEL, "tint: f32 = 0.5", "tint: f32 = 0.75");

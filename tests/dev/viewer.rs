@@ -11,7 +11,7 @@ use super::running::LONGEST;
 /// A connection of a viewer.
 pub struct Viewer {
     stream: TcpStream,
-    /// In bytes per second.
+    /// Maximum rate in bytes per second.
     rate: Option<f64>,
 }
 

@@ -55,11 +55,11 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     let notice = running.state().notice.clone().unwrap();
     assert!(!notice.bad && notice.text.contains("scene.toml"), "{}", notice.text);
     std::thread::sleep(SETTLED);
-    assert_eq!(running.revision(), revision, "nothing was rendered again");
+    assert_eq!(running.revision(), revision, "the image was rendered again");
     // Undoing restores the text, but not the view.
     assert_eq!(running.state().undo.as_deref(), Some("camera"));
     running.session.send(Command::UndoWrite);
-    running.wait("the file to be as it was", |running| {
+    running.wait("the original file", |running| {
         (running.state().camera_moved && running.state().undo.is_none()).then_some(())
     });
     assert_eq!(files.read("scene.toml"), SCENE);
@@ -90,7 +90,7 @@ fn an_edit_of_the_file_changes_only_the_edited_keys_of_a_moved_camera() {
     assert!(running.state().camera_moved);
     files.edit("scene.toml", "position = [0, -4, 1]", "position = [0, -5, 1]");
     running.wait_rendered(&files);
-    assert!(!running.state().camera_moved, "nothing of the move is left");
+    assert!(!running.state().camera_moved, "a part of the move is left");
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn another_view_shows_the_samples_of_a_paused_render() {
         running.frame().filter(|frame| frame.header.samples > 0)
     });
     running.session.send(Command::Pause(true));
-    running.wait("a rest", |running| {
+    running.wait("the end of rendering", |running| {
         let state = running.state();
         (state.paused && !state.busy).then_some(())
     });
@@ -151,7 +151,7 @@ fn another_view_shows_the_samples_of_a_paused_render() {
     assert_eq!(
         running.frame().unwrap().header.number,
         frame.header.number,
-        "nothing is rendered for it"
+        "the view was rendered again"
     );
 }
 

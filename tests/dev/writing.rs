@@ -227,7 +227,7 @@ fn changes_of_another_program_are_not_undone() {
     files.edit("scene.toml", "# a small scene", "# another scene");
     let edited = files.read("scene.toml");
     running.session.send(Command::UndoWrite); // whether or not the change was detected by then
-    running.wait("nothing to be taken back", |running| {
+    running.wait("nothing to undo", |running| {
         running.state().undo.is_none().then_some(())
     });
     assert_eq!(files.read("scene.toml"), edited);

@@ -10,7 +10,7 @@ use crate::cli::without_summary;
 use crate::sources::path as project;
 use crate::test_folder::TestFolder;
 
-/// 40 x 30 pixels in which all random numbers differ.
+/// A scene of 40 x 30 pixels, each with different random sample positions.
 pub const SCENE: &str = r#"image = { width = 40, height = 30 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
 [render]
@@ -48,7 +48,7 @@ pub struct Driver {
     lavapipe: PathBuf,
 }
 
-/// Builds the driver. Without lavapipe: `None` if `WGRAY_TEST_WITHOUT_GPU` is 1, panics otherwise.
+/// Builds the driver. If lavapipe is missing, returns `None` if `WGRAY_TEST_WITHOUT_GPU` is 1, and panics otherwise.
 pub fn driver() -> Option<&'static Driver> {
     static DRIVER: OnceLock<Option<Driver>> = OnceLock::new();
     DRIVER.get_or_init(prepare).as_ref()

@@ -46,10 +46,10 @@ const RTLD_NODELETE: c_int = 0x1000;
 static SUBMITS: AtomicU64 = AtomicU64::new(0);
 static SUBMITS_OF_DEVICE: AtomicU64 = AtomicU64::new(0);
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// A function has returned the loss; all later calls do, too.
+/// A function has returned the loss; all later calls return the loss, too.
 static LOST: AtomicBool = AtomicBool::new(false);
 /// The device is lost, but the function of `FAULTS_LOSE_IN` has not been called.
-static LOST_UNTOLD: AtomicBool = AtomicBool::new(false);
+static LOSS_PENDING: AtomicBool = AtomicBool::new(false);
 /// Number of device creations still to fail.
 static TO_REFUSE: AtomicI64 = AtomicI64::new(-1);
 
@@ -166,7 +166,7 @@ unsafe extern "system" fn create_device(physical: Handle, info: Handle, host: Ha
         log("device");
         SUBMITS_OF_DEVICE.store(0, SeqCst);
         LOST.store(false, SeqCst);
-        LOST_UNTOLD.store(false, SeqCst);
+        LOSS_PENDING.store(false, SeqCst);
     }
     code
 }
@@ -198,14 +198,14 @@ fn loses(number: u64, of_device: u64) -> bool {
 fn lose(by: &str) -> Code {
     log(&format!("lost in {by}"));
     LOST.store(true, SeqCst);
-    LOST_UNTOLD.store(false, SeqCst);
+    LOSS_PENDING.store(false, SeqCst);
     TO_REFUSE.store(variable("FAULTS_REFUSE").unwrap_or(0), SeqCst);
     DEVICE_LOST
 }
 
-/// Returns true if `by` returns the pending loss first.
-fn tells(by: &str) -> bool {
-    LOST_UNTOLD.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == by)
+/// Returns true if the function `by` is the first to return the pending loss.
+fn is_first_to_return_loss(by: &str) -> bool {
+    LOSS_PENDING.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == by)
 }
 
 unsafe fn submit(queue: Handle, forward: impl FnOnce() -> Code) -> Code {
@@ -238,7 +238,7 @@ unsafe fn submit(queue: Handle, forward: impl FnOnce() -> Code) -> Code {
     if !at_once {
         return lose("submit");
     }
-    LOST_UNTOLD.store(true, SeqCst);
+    LOSS_PENDING.store(true, SeqCst);
     code
 }
 
@@ -255,7 +255,11 @@ fn asked(by: &str, forward: impl FnOnce() -> Code) -> Code {
     if LOST.load(SeqCst) {
         return DEVICE_LOST;
     }
-    if tells(by) { lose(by) } else { forward() }
+    if is_first_to_return_loss(by) {
+        lose(by)
+    } else {
+        forward()
+    }
 }
 
 fn idle(forward: impl FnOnce() -> Code) -> Code {

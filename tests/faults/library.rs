@@ -1,4 +1,4 @@
-//! The library on a driver that loses its device. Runs in a child process, as environment variables select the driver.
+//! The library on a driver that loses its device. Environment variables select the driver, so a child process renders.
 
 use std::ops::ControlFlow;
 use std::process::Command;
@@ -20,9 +20,9 @@ fn render(scene: &Scene, device: Device) -> Picture {
     wgray::render(scene, &options).expect("an image")
 }
 
-/// Renders in the child process that [`pictures_survive`] starts.
+/// Renders in the child process that [`images_survive_device_losses`] starts.
 #[test]
-fn in_a_process_of_its_own() {
+fn render_in_the_child_process() {
     let Ok(file) = std::env::var(FILE) else { return };
     let scene = Scene::load(&file).expect("a scene");
     let expected = render(&scene, Device::Cpu);
@@ -45,7 +45,7 @@ fn in_a_process_of_its_own() {
 }
 
 #[test]
-fn pictures_survive() {
+fn images_survive_device_losses() {
     let Some(driver) = driver() else { return };
     let place = TestFolder::of(SCENE);
     // The first image loses its samples; the second, after 6 submits, samples and a readback.
@@ -53,7 +53,7 @@ fn pictures_survive() {
         let log = place.path("log");
         let _ = std::fs::remove_file(&log); // of the previous run
         let output = Command::new(std::env::current_exe().expect("this program"))
-            .args(["--exact", "--nocapture", "faults::library::in_a_process_of_its_own"])
+            .args(["--exact", "--nocapture", "faults::library::render_in_the_child_process"])
             .envs(driver.environment(&log))
             .env(FILE, place.path("scene.toml"))
             .envs([("FAULTS_LOSE", lose), ("FAULTS_LOSE_IN", "wait")])

@@ -16,8 +16,8 @@ const SUBMITS: usize = 5;
 const GPU: [&str; 2] = ["--device", "gpu"];
 const AUTO: [&str; 2] = ["--device", "auto"];
 
-/// Checks for `reopened` warnings, followed only by the lines `rest`.
-fn warned(ran: &Ran, reopened: usize, rest: &[&str]) {
+/// Checks that the messages are `reopened` warnings, followed by lines that start with `rest`.
+fn assert_reopened(ran: &Ran, reopened: usize, rest: &[&str]) {
     let lines = ran.lines();
     assert_eq!(lines.len(), reopened + rest.len(), "{}", ran.stderr);
     for line in &lines[..reopened] {
@@ -61,7 +61,7 @@ fn a_device_lost_anywhere_is_reopened() {
             let at = submit.to_string();
             let ran = place.run_on(driver, &GPU, &[("FAULTS_LOSE", &at), ("FAULTS_LOSE_IN", way)]);
             assert_eq!(ran.code, 0, "{way} {submit}: {}", ran.stderr);
-            warned(&ran, 1, &[]);
+            assert_reopened(&ran, 1, &[]);
             let happened = (
                 ran.count("lost in"),
                 ran.count(&format!("lost in {way}")),
@@ -80,7 +80,7 @@ fn a_device_lost_several_times_is_reopened_each_time() {
     let expected = place.expected(driver, &[]);
     let twice = place.run_on(driver, &GPU, &[("FAULTS_LOSE", "2,4")]);
     assert_eq!((twice.code, twice.count("lost")), (0, 2), "{}", twice.stderr);
-    warned(&twice, 2, &[]);
+    assert_reopened(&twice, 2, &[]);
     assert!(twice.picture == Some(expected.clone()));
     // Two losses in the samples, then two in the first hits: at the last submit but one and after the following
     // warm-up. Four losses in a row would exceed the limit.
@@ -90,7 +90,7 @@ fn a_device_lost_several_times_is_reopened_each_time() {
     let mut runs = (0..5).map(|_| place.run_on(driver, &GPU, &[("FAULTS_LOSE", &lose)]));
     let ran = runs.find(|ran| (ran.code, ran.count("lost")) == (0, 4));
     let ran = ran.unwrap_or_else(|| panic!("{lose}: no run of five survived four losses"));
-    warned(&ran, 4, &[]);
+    assert_reopened(&ran, 4, &[]);
     assert!(ran.picture == Some(expected));
 }
 
@@ -108,7 +108,7 @@ fn a_long_render_survives() {
             &[("FAULTS_LOSE", "4"), ("FAULTS_LOSE_IN", way)],
         );
         assert_eq!((ran.code, ran.count("lost")), (0, 1), "{way}: {}", ran.stderr);
-        warned(&ran, 1, &[]);
+        assert_reopened(&ran, 1, &[]);
         assert!(ran.picture == Some(expected.clone()), "{way}");
     }
 }
@@ -118,27 +118,27 @@ fn a_permanently_lost_device_is_an_error_or_the_cpu_renders() {
     let Some(driver) = driver() else { return };
     let place = TestFolder::of(SCENE);
     let expected = place.expected(driver, &[]);
-    // In parallel, as each run waits for some seconds.
+    // In parallel, because each run waits for some seconds.
     let never = |lose: &str, device: &str| {
         let place = TestFolder::of(SCENE);
         let faults = [("FAULTS_LOSE", lose), ("FAULTS_REFUSE", "99")];
         let ran = place.run_on(driver, &["--device", device], &faults);
         assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{lose}");
-        warned(&ran, 1, &["error: llvmpipe"]);
+        assert_reopened(&ran, 1, &["error: llvmpipe"]);
         let end = "; it could not be opened again: the driver does not open it";
         assert!(ran.stderr.trim_end().ends_with(end), "{}", ran.stderr);
         assert_eq!((ran.count("device refused"), ran.count("lost")), (3, 1));
         let requeue = ["--device", device, "--requeue-exit", "75"];
         let ran = place.run_on(driver, &requeue, &faults);
         assert_eq!((ran.code, ran.picture.is_some()), (75, false), "{lose}");
-        warned(
+        assert_reopened(
             &ran,
             1,
             &["error: llvmpipe", "note: exit code 75 requests another attempt"],
         );
         let ran = place.run_on(driver, &[&AUTO[..], &requeue[2..]].concat(), &faults);
         assert_eq!(ran.code, 0, "{lose}: {}", ran.stderr);
-        warned(&ran, 1, &["warning: rendering on the CPU: llvmpipe"]);
+        assert_reopened(&ran, 1, &["warning: rendering on the CPU: llvmpipe"]);
         assert!(ran.picture == Some(expected.clone()), "{lose}");
     };
     std::thread::scope(|scope| {
@@ -155,7 +155,7 @@ fn a_permanently_lost_device_is_an_error_or_the_cpu_renders() {
     let late = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
     let ran = place.run_on(driver, &GPU, &late);
     assert_eq!((ran.code, ran.count("device refused")), (0, 2), "{}", ran.stderr);
-    warned(&ran, 1, &[]);
+    assert_reopened(&ran, 1, &[]);
     assert!(ran.picture == Some(expected));
 }
 
@@ -175,10 +175,10 @@ fn repeated_losses_reach_a_limit() {
             "{lose}: {:?}",
             ran.log
         );
-        warned(&ran, reopened, &["error: llvmpipe"]);
+        assert_reopened(&ran, reopened, &["error: llvmpipe"]);
         let ran = place.run_on(driver, &AUTO, &[("FAULTS_LOSE", lose)]);
         assert_eq!((ran.code, ran.count("lost")), (0, 4), "{lose}: {}", ran.stderr);
-        warned(&ran, reopened, &["warning: rendering on the CPU: llvmpipe"]);
+        assert_reopened(&ran, reopened, &["warning: rendering on the CPU: llvmpipe"]);
         assert!(ran.picture == Some(expected.clone()), "{lose}");
     };
     std::thread::scope(|scope| {
@@ -189,7 +189,7 @@ fn repeated_losses_reach_a_limit() {
     });
 }
 
-/// On these codes, wgpu panics when it drops the queue.
+/// With these return codes, wgpu panics when it drops the queue.
 #[test]
 fn a_panic_on_dropping_a_lost_device_is_caught() {
     let Some(driver) = driver() else { return };
@@ -200,8 +200,8 @@ fn a_panic_on_dropping_a_lost_device_is_caught() {
             let faults = [("FAULTS_LOSE", "2"), ("FAULTS_LOSE_IN", way), ("FAULTS_IDLE", code)];
             let ran = place.run_on(driver, &GPU, &faults);
             assert_eq!((ran.code, ran.count("lost")), (0, 1), "{code} {way}: {}", ran.stderr);
-            assert!(ran.count("idle") > 0, "the driver was asked: {:?}", ran.log);
-            warned(&ran, 1, &[]);
+            assert!(ran.count("idle") > 0, "the driver was not asked: {:?}", ran.log);
+            assert_reopened(&ran, 1, &[]);
             assert!(ran.picture == Some(expected.clone()), "{code} {way}");
         }
     }
@@ -221,7 +221,7 @@ fn a_requested_device_is_opened_repeatedly() {
     assert_eq!(
         (ran.code, ran.count("device refused")),
         (0, 1),
-        "at once: {}",
+        "the program did not open another device at once: {}",
         ran.stderr
     );
     assert!(ran.picture == Some(expected));
@@ -259,7 +259,7 @@ fn waiting_for_a_device_can_be_interrupted() {
     let status = child.wait().unwrap();
     assert!(sent.elapsed() < Duration::from_millis(1500), "{:?}", sent.elapsed());
     assert_eq!(status.code(), Some(130));
-    assert_eq!(refused(), 2, "it did not stop during the pause");
+    assert_eq!(refused(), 2, "the program did not stop during the pause");
     let mut message = String::new();
     child.stderr.unwrap().read_to_string(&mut message).unwrap();
     assert!(!message.contains("panicked"), "{message}");

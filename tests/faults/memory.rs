@@ -7,7 +7,7 @@ use super::driver::{Ran, SCENE, driver};
 const ADVICE: &str = "; render a crop or a smaller image, or use the CPU \
                       (--crop, --size, --device cpu)\n";
 
-fn told(ran: &Ran, parts: &[&str]) {
+fn assert_out_of_memory(ran: &Ran, parts: &[&str]) {
     assert_eq!((ran.code, ran.picture.is_some()), (7, false), "{}", ran.stderr);
     assert!(ran.stderr.starts_with("error: llvmpipe"), "{}", ran.stderr);
     assert_eq!(ran.lines().len(), 1, "{}", ran.stderr);
@@ -27,7 +27,7 @@ fn a_film_that_does_not_fit_is_reported_with_its_size() {
         ": out of memory: the driver has no 16.0 MiB for a film of 1024 x 1024 pixels",
         ADVICE,
     ];
-    told(&ran, &parts);
+    assert_out_of_memory(&ran, &parts);
     assert!(ran.count("allocation") > 0 && ran.log.iter().any(|line| line.ends_with("of 16777216 refused")));
     // A crop fits; with a higher limit, the whole film does.
     let crop = ["--size", "1024x1024", "--crop", "0,0,1024,64", "--device", "gpu"];
@@ -67,7 +67,7 @@ fn exhausted_memory_is_reported_or_the_cpu_renders() {
         let ran = place.run_on(driver, &[large, ["--device", "gpu"]].concat(), &faults);
         // The number of allocations depends on timing.
         if ran.log.iter().any(|line| line.ends_with("refused")) {
-            told(&ran, &[": out of memory: the driver has n"]);
+            assert_out_of_memory(&ran, &[": out of memory: the driver has n"]);
             refused += 1;
         } else {
             assert_eq!(ran.code, 0, "{from}: {}", ran.stderr);
@@ -90,7 +90,7 @@ fn a_scene_that_does_not_fit_is_reported_with_its_size() {
     large.save(place.path("large.png")).expect("an image");
     let limit = [("FAULTS_LARGEST", "4194304")];
     let ran = place.run_on(driver, &["--device", "gpu"], &limit);
-    told(
+    assert_out_of_memory(
         &ran,
         &[": out of memory: the driver has no 5.3 MiB for the scene; ", ADVICE],
     );
@@ -107,12 +107,12 @@ fn a_submit_without_memory_is_not_a_device_loss() {
     for submit in ["1", "2", "3", "4", "5"] {
         let faults = [("FAULTS_NO_MEMORY_IN", submit)];
         let ran = place.run_on(driver, &["--device", "gpu"], &faults);
-        told(&ran, &[": out of memory: the driver has no "]);
+        assert_out_of_memory(&ran, &[": out of memory: the driver has no "]);
         let ran = place.run_on(driver, &["--device", "auto"], &faults);
         assert_eq!((ran.code, ran.lines().len()), (0, 1), "{submit}: {}", ran.stderr);
         assert!(ran.picture.as_ref() == Some(&expected), "{submit}");
     }
     let refused = [("FAULTS_REFUSE_FIRST", "1"), ("FAULTS_REFUSE_WITH", "-2")];
     let ran = place.run_on(driver, &["--device", "gpu"], &refused);
-    told(&ran, &[": out of memory: the driver has no memory to open it; "]);
+    assert_out_of_memory(&ran, &[": out of memory: the driver has no memory to open it; "]);
 }

@@ -84,7 +84,7 @@ fn linear_values_are_interpolated_and_clamped_beyond_their_keys() {
 }
 
 #[test]
-fn cubic_splines_are_hermites() {
+fn cubic_splines_are_hermite_splines() {
     // In-tangent, value and out-tangent of two keys 2 s apart (glTF 2.0, C.5).
     let keys = [
         [9.0; 3],
@@ -108,9 +108,9 @@ fn cubic_splines_are_hermites() {
 }
 
 #[test]
-fn turns_go_the_shortest_way_at_constant_speed() {
+fn rotations_take_the_shorter_arc_at_constant_speed() {
     let turn = |degrees: f64| DQuat::from_axis_angle(DVec3::Z, degrees.to_radians());
-    // q and -q are the same rotation: either takes the shorter arc.
+    // q and -q are the same rotation; with both, the interpolation takes the shorter arc.
     for sign in [1.0, -1.0] {
         let values = [turn(10.0).to_array(), turn(130.0).to_array().map(|x| sign * x)];
         let builder = moving("rotation", "LINEAR", &[0.0, 1.0], &values);
@@ -319,7 +319,7 @@ fn arm_corners(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
 }
 
 #[test]
-fn skinned_corners_follow_their_joints() {
+fn skinned_vertices_follow_their_joints() {
     for component in [Component::F32, Component::U8, Component::U16] {
         let mut builder = arm(component);
         assert_corners(

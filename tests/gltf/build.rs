@@ -1,4 +1,4 @@
-//! Builder of small glTF files, with the buffer in any of the permitted places.
+//! Builder of small glTF files. The buffer may be in any of the permitted places.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ impl Component {
         }
     }
 
-    fn put(self, value: f64, bytes: &mut Vec<u8>) {
+    fn write_value(self, value: f64, bytes: &mut Vec<u8>) {
         match self {
             Component::I8 => bytes.extend((value as i8).to_le_bytes()),
             Component::U8 => bytes.extend((value as u8).to_le_bytes()),
@@ -149,7 +149,9 @@ impl Builder {
                 if columns > 1 {
                     bytes.resize(bytes.len().next_multiple_of(4), 0);
                 }
-                column.iter().for_each(|value| component.put(*value, &mut bytes));
+                column
+                    .iter()
+                    .for_each(|value| component.write_value(*value, &mut bytes));
             }
         }
         bytes.resize(bytes.len().next_multiple_of(align), 0);
@@ -302,7 +304,7 @@ impl Builder {
         )
     }
 
-    /// Returns the JSON; `uri` is that of the buffer.
+    /// Returns the JSON; `uri` is the URI of the buffer.
     fn json(&self, uri: Option<String>) -> Vec<u8> {
         let mut root = self.root.clone();
         if !self.bytes.is_empty() {
@@ -367,7 +369,7 @@ impl Builder {
     }
 }
 
-/// Returns a PNG file of 8-bit RGBA texels from the top left.
+/// Returns a PNG file of 8-bit RGBA texels in row-major order, top row first.
 pub fn png(width: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, texels.len() as u32 / width);

@@ -59,7 +59,7 @@ fn a_turntable_of_a_tilted_camera_is_level() {
 }
 
 #[test]
-fn the_files_camera_is_where_its_node_is() {
+fn the_camera_of_a_file_is_placed_by_its_node() {
     let perspectives = [
         (
             "camera",

@@ -1,4 +1,4 @@
-//! Damaged glTF files: a stand-in with a warning, or an error under `strict`.
+//! Damaged glTF files are rendered with a replacement and a warning, or rejected with `strict`.
 
 use std::path::Path;
 
@@ -86,7 +86,7 @@ fn a_missing_texture_leaves_the_factor() {
 }
 
 #[test]
-fn triangles_without_a_position_are_left_out() {
+fn triangles_with_invalid_positions_are_skipped() {
     let place = TestFolder::with_file("a", "");
     for (bad, left) in [(0, 0), (1, 1), (3, 1), (4, 2)] {
         for value in [f64::NAN, f64::INFINITY, -2e9] {
@@ -101,7 +101,7 @@ fn triangles_without_a_position_are_left_out() {
             builder.root_node(json!({ "mesh": mesh }));
             let whole = builder.quad(None);
             builder.root_node(json!({ "mesh": whole }));
-            // JSON has no NaN: the bounds are those of the valid vertices.
+            // JSON has no NaN, so the bounds cover only the valid vertices.
             builder.get("accessors")[position]["min"] = json!([-1, -1, 0]);
             builder.get("accessors")[position]["max"] = json!([9, 9, 0]);
             let file = builder.write_unsound(place.folder(), "positions", Packing::Binary);

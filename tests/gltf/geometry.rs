@@ -18,7 +18,7 @@ fn quad() -> Builder {
 }
 
 #[test]
-fn a_buffer_in_the_file_beside_it_and_in_a_data_uri_is_the_same() {
+fn a_buffer_may_be_in_the_glb_file_in_its_own_file_or_in_a_data_uri() {
     let place = TestFolder::with_file("a", "");
     for packing in Packing::ALL {
         let file = quad().write(place.folder(), &format!("packing-{packing:?}"), packing);
@@ -55,7 +55,7 @@ fn rounded(component: Component, value: f64) -> f64 {
 }
 
 #[test]
-fn positions_may_be_whole_numbers_of_each_type() {
+fn positions_may_have_any_integer_type() {
     // Quantization tools scale the node in this way.
     for component in [Component::I8, Component::U8, Component::I16, Component::U16] {
         for normalized in [false, true] {
@@ -140,7 +140,7 @@ fn normals_of_integer_types_are_unit_vectors() {
 }
 
 #[test]
-fn strips_and_fans_have_their_triangles_the_right_way_round() {
+fn triangles_of_strips_and_fans_have_the_right_winding_order() {
     // A strip and a fan, counterclockwise from +z (glTF 2.0, 3.7.2.1).
     let zigzag = [
         [0.0, 1.0, 0.0],
@@ -192,7 +192,7 @@ fn strips_and_fans_have_their_triangles_the_right_way_round() {
 }
 
 #[test]
-fn points_and_lines_are_left_out_and_said() {
+fn points_and_lines_are_skipped_and_reported() {
     for (mode, word) in [(0, "point"), (1, "line"), (2, "line"), (3, "line")] {
         let mut builder = Builder::new();
         let attributes = builder.quad_attributes();
@@ -218,7 +218,7 @@ fn points_and_lines_are_left_out_and_said() {
 }
 
 #[test]
-fn sparse_accessors_replace_what_is_there_or_zeros() {
+fn sparse_accessors_replace_values_of_a_buffer_or_zeros() {
     for based in [true, false] {
         let mut builder = Builder::new();
         let places = builder.view(&[1, 0, 3, 0]);
@@ -331,7 +331,7 @@ fn vertex_colors_of_each_type_are_factors_of_the_base_color() {
         // `OPAQUE` ignores alpha.
         let four = colored(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "OPAQUE");
         assert_all(&scene(&four, &format!("colors-{component:?}-4")), [0.2, 0.2, 0.8]);
-        // Below the cutoff: the white environment.
+        // Alpha is below the cutoff, so the white environment is visible.
         let mask = colored(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "MASK");
         assert_all(&scene(&mask, &format!("colors-{component:?}-mask")), [1.0, 1.0, 1.0]);
     }
@@ -380,7 +380,7 @@ fn morph_targets_are_added_by_their_weights() {
     for normal in triangles(&by_mesh).iter().flat_map(|triangle| triangle.normals) {
         assert!(normal.distance(bent) < 1e-5, "{normal}, not {bent}");
     }
-    // Those of the node override those of the mesh.
+    // Weights of the node override weights of the mesh.
     builder.get("nodes")[node]["weights"] = json!([1.0, -0.5]);
     assert_corners(&scene(&builder, "morph-node"), &known(1.0, -0.5));
     // Instances have independent weights.

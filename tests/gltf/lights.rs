@@ -24,7 +24,7 @@ fn lit(light: Value) -> Builder {
 }
 
 #[test]
-fn candelas_are_intensity() {
+fn candelas_are_radiant_intensity() {
     let light = json!({ "type": "point", "intensity": 20, "color": [1, 0.5, 0.25] });
     match &scene(&lit(light), "light-point").lights[..] {
         [Light::Point { position, color }] => {
@@ -93,7 +93,7 @@ fn a_light_of_intensity_zero_is_accepted() {
 }
 
 #[test]
-fn a_rough_white_surface_under_lux_has_the_closed_form_radiance() {
+fn light_intensities_in_lux_and_candela_give_the_closed_form_radiance() {
     // Without specular reflection at an IOR of 1 the BRDF is albedo / pi.
     let mut builder = Builder::new();
     builder.uses("KHR_lights_punctual");

@@ -54,7 +54,7 @@ fn defaults_match_the_specification() {
 }
 
 #[test]
-fn core_parameters_are_taken() {
+fn core_parameters_are_imported() {
     let scene = scene(
         &quad_of(json!({
             "pbrMetallicRoughness": { "baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.25, "roughnessFactor": 0.75 },
@@ -79,7 +79,7 @@ fn emission_may_be_stronger_than_one() {
 }
 
 #[test]
-fn indices_of_refraction_are_taken() {
+fn indices_of_refraction_are_imported() {
     let of = |ior: f64, name: &str| scene(&quad_of(extended("KHR_materials_ior", json!({ "ior": ior }))), name);
     assert_near([principled(&of(1.33, "ior")).ior], [1.33]);
     // An IOR of 0 means a Fresnel term of 1; a high IOR approximates it.
@@ -87,7 +87,7 @@ fn indices_of_refraction_are_taken() {
 }
 
 #[test]
-fn transmission_is_that_of_a_sheet_without_a_volume() {
+fn transmission_without_a_volume_is_thin_walled() {
     let sheet = extended("KHR_materials_transmission", json!({ "transmissionFactor": 0.75 }));
     let sheet = scene(&quad_of(sheet), "transmission");
     assert_near([plain(principled(&sheet).transmission)], [0.75]);
@@ -108,7 +108,7 @@ fn transmission_is_that_of_a_sheet_without_a_volume() {
 }
 
 #[test]
-fn a_volume_swallows_nothing_without_a_distance_and_all_of_black() {
+fn a_volume_absorbs_nothing_without_a_distance_and_everything_if_black() {
     let of = |volume: Value, name: &str| {
         let mut material = extended("KHR_materials_transmission", json!({ "transmissionFactor": 1 }));
         material["extensions"]["KHR_materials_volume"] = volume;
@@ -125,7 +125,7 @@ fn a_volume_swallows_nothing_without_a_distance_and_all_of_black() {
 }
 
 #[test]
-fn extensions_of_what_reflects_are_taken() {
+fn extensions_of_reflection_are_imported() {
     let specular = json!({ "specularFactor": 0.25, "specularColorFactor": [0.5, 0.75, 1] });
     let scene_of = |extension: &str, values: Value| scene(&quad_of(extended(extension, values)), extension);
     let scene = scene_of("KHR_materials_specular", specular);
@@ -198,7 +198,7 @@ fn a_clearcoat_may_have_its_own_normal_map() {
 }
 
 #[test]
-fn what_is_unlit_has_its_base_color() {
+fn unlit_materials_emit_their_base_color() {
     for (name, factor) in [
         ("unlit", [0.25, 0.5, 0.75]),
         ("unlit-white", [1.0; 3]),
@@ -220,7 +220,7 @@ fn smooth_metal_in_a_white_environment_has_its_base_color() {
     assert_all(&scene(&quad_of(metal), "metal"), [0.25, 0.5, 0.75]);
 }
 
-fn veil(mode: &str, cutoff: Option<f64>) -> Scene {
+fn unlit_with_alpha(mode: &str, cutoff: Option<f64>) -> Scene {
     let mut builder = Builder::new();
     let material = builder.unlit(json!({ "baseColorFactor": [0.25, 0.5, 0.75, 0.4] }));
     builder.get("materials")[material]["alphaMode"] = json!(mode);
@@ -233,15 +233,15 @@ fn veil(mode: &str, cutoff: Option<f64>) -> Scene {
 }
 
 #[test]
-fn alpha_does_what_its_mode_says() {
+fn alpha_modes_are_applied() {
     let (surface, behind) = ([0.25, 0.5, 0.75], [1.0; 3]);
-    assert_all(&veil("OPAQUE", None), surface);
-    assert_all(&veil("MASK", None), behind);
-    assert_all(&veil("MASK", Some(0.375)), surface);
-    assert_all(&veil("MASK", Some(0.0)), surface);
-    assert_all(&veil("MASK", Some(2.0)), behind);
+    assert_all(&unlit_with_alpha("OPAQUE", None), surface);
+    assert_all(&unlit_with_alpha("MASK", None), behind);
+    assert_all(&unlit_with_alpha("MASK", Some(0.375)), surface);
+    assert_all(&unlit_with_alpha("MASK", Some(0.0)), surface);
+    assert_all(&unlit_with_alpha("MASK", Some(2.0)), behind);
     // `BLEND` is stochastic.
-    let mut scene = veil("BLEND", None);
+    let mut scene = unlit_with_alpha("BLEND", None);
     scene.render.pixel_samples.count = 64 * 64;
     let pixels = super::read::pixels(&scene);
     for k in 0..3 {
@@ -252,7 +252,7 @@ fn alpha_does_what_its_mode_says() {
 }
 
 #[test]
-fn the_back_of_what_is_not_double_sided_is_not_seen() {
+fn single_sided_materials_are_invisible_from_behind() {
     let seen = |double: bool, turned: bool, mirrored: bool| {
         let mut builder = Builder::new();
         let material = builder.unlit(json!({ "baseColorFactor": [0.25, 0.5, 0.75, 1] }));
@@ -277,7 +277,7 @@ fn the_back_of_what_is_not_double_sided_is_not_seen() {
 }
 
 #[test]
-fn a_variant_puts_other_materials_on_primitives() {
+fn a_variant_replaces_the_materials_of_primitives() {
     let mut builder = Builder::new();
     builder.uses("KHR_materials_variants");
     let materials =
@@ -336,7 +336,7 @@ fn a_scene_may_replace_a_material_of_the_file() {
 }
 
 #[test]
-fn what_is_required_but_unknown_is_refused_and_what_is_used_is_said() {
+fn unknown_extensions_are_rejected_if_required_and_reported_if_used() {
     for extension in ["KHR_draco_mesh_compression", "EXT_texture_avif", "EXT_of_nobody"] {
         let mut builder = quad_of(json!({}));
         builder.requires(extension);

@@ -16,7 +16,7 @@ fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
 }
 
 #[test]
-fn maps_of_nodes_are_multiplied_from_the_root_on() {
+fn transforms_of_nodes_are_multiplied_from_the_root() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
@@ -41,7 +41,7 @@ fn maps_of_nodes_are_multiplied_from_the_root_on() {
 }
 
 #[test]
-fn mirrored_things_keep_their_outside() {
+fn mirrored_meshes_keep_their_outside() {
     for (name, scale) in [
         ("one", [-1.0, 1.0, 1.0]),
         ("three", [-2.0, -2.0, -2.0]),
@@ -65,7 +65,7 @@ fn mirrored_things_keep_their_outside() {
 }
 
 #[test]
-fn nodes_of_scale_zero_are_left_out() {
+fn nodes_with_zero_scale_are_skipped() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh, "scale": [0, 0, 0] }));
@@ -91,7 +91,7 @@ fn meshes_flattened_along_their_normal_are_kept() {
             scene.notes
         );
     }
-    // Without an area, as when an animation hides the mesh.
+    // The mesh has zero area, for example because an animation hides it.
     for scale in [[1.0, 0.0, 1.0], [0.0; 3], [1e-12; 3]] {
         let scene = flattened(scale);
         assert!(scene.shapes.is_empty());

@@ -1,4 +1,4 @@
-//! `docs/gltf.md`: each row names an existing test, each known extension has a row.
+//! Each row of `docs/gltf.md` names an existing test, and each known extension has a row.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -11,7 +11,7 @@ use super::build::{Builder, Packing};
 use super::read::triangles;
 use crate::test_folder::TestFolder;
 
-/// A spike of length 3 along an axis, from the origin.
+/// Writes a model of a spike that starts at the origin and has length 3 along an axis.
 fn spike(place: &TestFolder, axis: DVec3, has_camera: bool) -> PathBuf {
     let mut builder = Builder::new();
     let side = axis.any_orthonormal_vector() * 0.25;
@@ -58,7 +58,7 @@ fn any_axis_can_point_up() {
         };
         let scene = load(&file, presentation, Some(View::Front)).unwrap();
         let triangle = triangles(&scene)[0].corners;
-        // In the coordinates of an upright file.
+        // Coordinates as if the file were upright.
         assert!(triangle[2].distance(DVec3::Y * 3.0) < 1e-6, "{name}: {triangle:?}");
         // Frames the model in its new orientation.
         let camera = scene.camera;
@@ -107,7 +107,7 @@ fn the_ground_lies_below_the_model() {
 }
 
 #[test]
-fn a_ground_that_hides_the_model_is_noted() {
+fn a_ground_that_hides_the_model_is_reported() {
     let place = TestFolder::with_file("a", "");
     let file = spike(&place, DVec3::Y, false);
     let notes = |ground, view| {

@@ -9,7 +9,8 @@ use wgray::{Device, Options};
 use super::build::{Builder, Packing};
 use crate::test_folder::TestFolder;
 
-/// A camera at +z of the file (-y of the scene), whose image [`QUAD`](super::build::QUAD) fills; white environment.
+/// A camera at +z of the file (-y of the scene), placed so that [`QUAD`](super::build::QUAD) fills the image; the
+/// environment is white.
 const SCENE: &str = r#"
 image = { width = 6, height = 6 }
 camera = { type = "orthographic", position = [0, -10, 0], look_at = [0, 0, 0], height = 2 }
@@ -26,7 +27,7 @@ type = "gltf"
 #[derive(Clone, Debug)]
 pub struct Triangle {
     pub corners: [DVec3; 3],
-    /// Zero if the mesh has none.
+    /// Zero if the mesh has no normals.
     pub normals: [DVec3; 3],
     /// In glTF convention: v points down.
     pub uvs: [DVec2; 3],
@@ -81,7 +82,7 @@ pub fn refusal(builder: &Builder, keys: &str) -> String {
     let place = TestFolder::with_file("a", "");
     let file = builder.write_unsound(place.folder(), "bad", Packing::Binary);
     match try_scene(&file, keys) {
-        Ok(_) => panic!("it was not rejected"),
+        Ok(_) => panic!("the file was not rejected"),
         Err(message) => message,
     }
 }
@@ -167,14 +168,14 @@ pub fn plain_color(color: Color) -> [f64; 3] {
     }
 }
 
-/// Asserts equality in single precision.
+/// Asserts that values are equal in single precision.
 #[track_caller]
 pub fn assert_near<const N: usize>(found: [f64; N], known: [f64; N]) {
     let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs().max(1.0);
     assert!(found.iter().zip(&known).all(near), "{found:?} is not {known:?}");
 }
 
-/// Renders on the CPU. Returns the pixels from the top left.
+/// Renders on the CPU and returns the pixels in row-major order, top row first.
 pub fn pixels(scene: &Scene) -> Vec<[f32; 3]> {
     let options = Options {
         device: Device::Cpu,

@@ -18,7 +18,7 @@ fn pictured(builder: &mut Builder, info: Value) {
     builder.root_node(json!({ "mesh": mesh }));
 }
 
-/// Asserts the colors of the four quarters from the top left.
+/// Asserts the colors of the four quarters: top left, top right, bottom left, bottom right.
 #[track_caller]
 fn assert_quarters(scene: &Scene, known: [[u8; 4]; 4]) {
     let pixels = pixels(scene);
@@ -39,7 +39,7 @@ fn the_first_texel_is_at_the_upper_left() {
 }
 
 #[test]
-fn images_may_lie_in_the_buffer_beside_the_file_or_in_a_data_uri() {
+fn images_may_be_in_the_buffer_in_their_own_files_or_in_a_data_uri() {
     let bytes = png(2, &[RED, GREEN, BLUE, WHITE]);
     let place = TestFolder::with_file("a", "");
     for uri in ["my%20image.png", "data"] {
@@ -146,7 +146,7 @@ fn ktx2_files_are_read() {
     }
     assert!(
         pictures[0] != pictures[1] && pictures[0] != pictures[2],
-        "all are the same"
+        "the textures are equal"
     );
 }
 
@@ -164,7 +164,7 @@ fn base_color_is_srgb_and_multiplied_by_its_factor() {
 }
 
 #[test]
-fn textures_go_on_as_their_sampler_says() {
+fn textures_wrap_as_their_sampler_specifies() {
     // u from -1 to 2: each third of the row is one repetition.
     let (r, g) = (RED, GREEN);
     for (mode, row) in [
@@ -187,7 +187,7 @@ fn textures_go_on_as_their_sampler_says() {
 }
 
 #[test]
-fn each_direction_may_go_on_in_its_own_way() {
+fn each_direction_may_have_its_own_wrap_mode() {
     let mut builder = Builder::new();
     let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
     builder.get("samplers")[0]["wrapS"] = json!(10497);
@@ -207,7 +207,7 @@ fn each_direction_may_go_on_in_its_own_way() {
 }
 
 #[test]
-fn a_texture_may_have_another_set_of_coordinates() {
+fn a_texture_may_use_another_set_of_coordinates() {
     for set in [1, 2] {
         let mut builder = Builder::new();
         let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
@@ -227,7 +227,7 @@ fn a_texture_may_have_another_set_of_coordinates() {
 }
 
 #[test]
-fn missing_texture_coordinates_are_noted() {
+fn missing_texture_coordinates_are_reported() {
     let mut builder = Builder::new();
     let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
     let material = builder.unlit(json!({ "baseColorTexture": { "index": texture, "texCoord": 1 } }));
@@ -253,7 +253,7 @@ fn transformed(name: &str, transform: Value) -> Scene {
 }
 
 #[test]
-fn texture_transforms_are_those_of_the_extension() {
+fn texture_transforms_follow_khr_texture_transform() {
     let quarter = std::f64::consts::FRAC_PI_2;
     assert_quarters(&transformed("transform-none", json!({})), [RED, GREEN, BLUE, WHITE]);
     assert_quarters(
@@ -270,7 +270,7 @@ fn texture_transforms_are_those_of_the_extension() {
     );
     let lower = json!({ "offset": [0.5, 0.5], "scale": [0.5, 0.5] });
     assert_quarters(&transformed("transform-lower", lower), [WHITE; 4]);
-    // Examples of the extension: a clockwise rotation, of the whole image and of a part, and a flip.
+    // Examples of the extension: a clockwise rotation of the whole image, the same for a part of it, and a flip.
     let turned = json!({ "offset": [0, 1], "rotation": quarter });
     assert_quarters(&transformed("transform-turn", turned), [BLUE, RED, WHITE, GREEN]);
     let turned = json!({ "offset": [0, 1], "rotation": quarter, "scale": [0.5, 0.5] });
@@ -494,7 +494,7 @@ fn constant_textures_equal_plain_values() {
 }
 
 #[test]
-fn occlusion_is_ignored_and_said() {
+fn occlusion_textures_are_ignored_and_reported() {
     let mut builder = Builder::new();
     let texture = builder.plain_texture([0, 0, 0, 255]);
     let material = json!({
@@ -546,7 +546,7 @@ fn bent(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -
 }
 
 #[test]
-fn normal_maps_lean_as_their_texels_say() {
+fn texels_of_normal_maps_tilt_the_normal() {
     let known = |name: &str, found: [f64; 3], known: [f64; 3]| {
         let length = known.iter().map(|x| x * x).sum::<f64>().sqrt();
         let near = (0..3).all(|k| (found[k] - known[k] / length).abs() < 0.002);
@@ -579,7 +579,7 @@ fn normal_maps_lean_as_their_texels_say() {
         None,
         [y, -x, z],
     );
-    // Those of the file take precedence.
+    // Tangents in the file take precedence.
     check(
         "normal-tangent",
         json!({}),

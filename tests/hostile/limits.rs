@@ -1,4 +1,4 @@
-//! Small files that once took minutes or gigabytes: now an error that names the limit, or an image.
+//! Small files that once took minutes or gigabytes must give an error that names the limit, or an image.
 
 use std::fs;
 use std::path::Path;
@@ -175,7 +175,7 @@ fn shapes_that_name_one_file_often_are_few() {
     assert_eq!(ran.code, 0, "{}", ran.said);
 }
 
-/// Returns a PNG of zeros, encoded by row.
+/// Returns a PNG of zeros, encoded row by row.
 fn blank(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth) -> Vec<u8> {
     use std::io::Write as _;
     let mut bytes = Vec::new();
@@ -231,7 +231,7 @@ fn images_that_grow_a_thousandfold_are_told() {
     );
 }
 
-/// 24,000 bytes that decode to 1.5 GB, and headers with more texels than the file.
+/// A file of 24,000 bytes would decode to 1.5 GB; other headers declare more texels than the file contains.
 #[test]
 fn ktx2_files_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Random mutations of every file format: an image or an error, within the limits.
+//! Random mutations of every file format must give an image or an error within the limits.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,7 +8,7 @@ use super::seeds::{How, Kind, SCENES, START, all, put};
 use super::{Ran, render, run};
 use crate::random::Random;
 
-/// Integers at the ends of ranges, and special floats.
+/// Bits of integers at the ends of ranges, and of special floats.
 const STRANGE: [u32; 8] = [
     0,
     1,
@@ -71,7 +71,7 @@ fn bytes_changed(bytes: &mut Vec<u8>, random: &Random) {
     }
 }
 
-/// Mutates a file, by its values if possible.
+/// Mutates the values of a file if its format permits that, otherwise its bytes.
 fn mutated(kind: &Kind, random: &Random) -> Vec<u8> {
     if let Some((values, written)) = kind.values.as_ref().filter(|_| !random.once_in(3)) {
         let mut values = values.clone();

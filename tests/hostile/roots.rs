@@ -1,4 +1,4 @@
-//! No file outside of the asset root is opened, by any reference.
+//! No reference in a file can open files outside of the asset root.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -19,9 +19,9 @@ pub struct Kind {
     pub ending: &'static str,
     /// A valid file.
     pub bytes: Vec<u8>,
-    /// Its values with a serializer, if it has a syntax of values.
+    /// The values of the file and their serializer, for formats that consist of values.
     pub values: Option<(Value, Written)>,
-    /// Permitted exit codes of a mutated file except 0.
+    /// Permitted exit codes for a mutated file, in addition to 0.
     pub codes: &'static [i32],
     pub how: How,
 }
@@ -30,9 +30,9 @@ pub struct Kind {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum How {
     Scene,
-    /// `wgray render`, of a scene with this text.
+    /// `wgray render` of a scene that consists of [`START`] and this text.
     Named(&'static str),
-    /// `wgray diff` in addition.
+    /// `wgray render` as for `Named`, then `wgray diff`.
     Picture(&'static str),
     Checkpoint,
     Part,

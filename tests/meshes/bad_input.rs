@@ -301,7 +301,7 @@ fn counts_without_bytes_are_refused_at_once() {
             assert!(error.contains(message), "{error}");
         }
     }
-    // A list, and a triangle count, that exceed the file.
+    // The length of a list and the number of triangles exceed the file.
     let mut list = format!(
         "ply\nformat binary_little_endian 1.0\n{}{face}end_header\n",
         vertex("3", xyz)
@@ -348,7 +348,7 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     files
 }
 
-/// Checks the invariants of a mesh or an error message. Returns true if undamaged.
+/// Checks the invariants of a mesh or of an error message. Returns true if the file is undamaged.
 fn check(name: &str, result: Result<Mesh, String>) -> bool {
     match result {
         Ok(mesh) => {

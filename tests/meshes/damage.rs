@@ -169,7 +169,7 @@ fn unknown_lines_of_ply_headers_are_ignored() {
 }
 
 #[test]
-fn facets_of_stl_files_without_a_position_are_left_out() {
+fn stl_facets_with_non_finite_vertices_are_skipped() {
     let facet = |z: &str| {
         format!("facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n")
     };

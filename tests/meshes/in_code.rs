@@ -56,13 +56,19 @@ fn an_edited_clone_is_rendered_with_its_edits() {
 
     let mut clone = Mesh::clone(&first);
     lower(&mut clone);
-    assert!((depth(&Arc::new(clone)) - 7.0).abs() < 0.1, "a clone");
+    assert!(
+        (depth(&Arc::new(clone)) - 7.0).abs() < 0.1,
+        "a clone keeps the old depth"
+    );
 
     let mut unshared = Arc::clone(&first);
     lower(Arc::make_mut(&mut unshared));
-    assert!((depth(&unshared) - 7.0).abs() < 0.1, "Arc::make_mut of what is shared");
+    assert!((depth(&unshared) - 7.0).abs() < 0.1, "Arc::make_mut of a shared mesh");
     lower(Arc::make_mut(&mut unshared));
-    assert!((depth(&unshared) - 9.0).abs() < 0.1, "Arc::make_mut of what is not");
+    assert!(
+        (depth(&unshared) - 9.0).abs() < 0.1,
+        "Arc::make_mut of an unshared mesh"
+    );
 
     let mut owned = Arc::try_unwrap(unshared).unwrap();
     lower(&mut owned);

@@ -10,7 +10,7 @@ use super::load;
 #[allow(dead_code, reason = "a test calls what the program does, but not its `main`")]
 mod make_mesh;
 
-/// Returns true if edges, by position, are used equally often in both directions.
+/// Returns true if each edge is used equally often in both directions. Vertices at the same position are the same.
 fn is_closed(mesh: &Mesh) -> bool {
     let mut edges = std::collections::HashMap::new();
     for triangle in &mesh.triangles {

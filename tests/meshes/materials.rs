@@ -1,4 +1,4 @@
-//! Materials of MTL files under the integrator `path`, including the extensions for physically based rendering.
+//! Materials of MTL files with the integrator `path`, including the extensions for physically based rendering.
 
 use std::fs;
 use std::path::Path;
@@ -96,7 +96,7 @@ fn maps_replace_values() {
     assert!(matches!(principled.metallic, Value::Texture(_, Channel::R)));
     assert!(matches!(principled.alpha, Value::Texture(_, Channel::A)));
     assert_eq!(principled.alpha_mode, AlphaMode::Blend);
-    // Linear texels share a texture; sRGB colors need another one.
+    // Maps with linear texels share a texture; sRGB colors need a separate texture.
     let Value::Texture(metallic, _) = principled.metallic else {
         unreachable!("it is a texture")
     };
@@ -105,7 +105,7 @@ fn maps_replace_values() {
 }
 
 #[test]
-fn bump_maps_are_normal_maps_or_noted() {
+fn bump_maps_are_used_as_normal_maps_or_reported() {
     let (colored, notes) = material("map_Bump color.png\n");
     assert!(colored.normal_map.is_some() && notes.is_empty(), "{notes:?}");
     let (gray, notes) = material("bump gray.png\n");
@@ -179,7 +179,7 @@ fn only_maps_that_exist_need_texture_coordinates() {
 }
 
 #[test]
-fn bad_values_and_missing_maps_are_noted() {
+fn bad_values_and_missing_maps_are_reported() {
     for (mtl, note) in [
         ("Pr 2\n", "Pr: 2 must be from 0 to 1; 1 stands in"),
         ("d 0\n", "d: 0 makes the material invisible; it is opaque at 1"),

@@ -123,7 +123,7 @@ fn the_description_of_a_mesh_is_the_same_scene() {
     assert_eq!((&again.materials, &again.camera), (&scene.materials, &scene.camera));
     assert_eq!(again.render, scene.render);
     assert_eq!(scene.material_names, ["red", "default"]);
-    // Files that the mesh refers to belong to the scene.
+    // The list of files of the scene contains files that the mesh refers to.
     let has = |name: &str| scene.files.iter().any(|file| file.ends_with(name));
     assert!(has("a.obj") && has("a.mtl"), "{:?}", scene.files);
     assert!(matches!(scene.shapes[0].geometry, Geometry::Mesh { .. }));
@@ -206,7 +206,7 @@ fn files_with_names_in_another_case_are_found_or_suggested() {
     let (scene, _) = load(&folder.path().join("a.obj")).unwrap();
     assert_eq!(scene.notes, Vec::<String>::new());
     assert_eq!(scene.material_names, ["red"]);
-    // Another case, next to a folder of the exact name.
+    // A folder has the exact name; the file differs in case.
     fs::create_dir_all(folder.path().join("Sub/M.mtl")).unwrap();
     write("Sub/m.mtl", "newmtl red\nKd 1 0 0\n");
     write(

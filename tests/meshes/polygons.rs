@@ -26,7 +26,7 @@ fn areas(mesh: &Mesh) -> Vec<DVec3> {
     corners(mesh).into_iter().map(area).collect()
 }
 
-/// Returns true if a point is inside by the even-odd rule, in x and y.
+/// Returns true if a point is inside according to the even-odd rule; z is ignored.
 fn is_inside(points: &[DVec3], [x, y]: [f64; 2]) -> bool {
     let pairs = points.iter().zip(points.iter().cycle().skip(1));
     let crossings = pairs.filter(|(a, b)| (a.y > y) != (b.y > y) && x < (b.x - a.x) * (y - a.y) / (b.y - a.y) + a.x);
@@ -90,7 +90,7 @@ fn ply_polygons_are_covered() {
     assert_covers(&load("a.ply", text, None).unwrap(), &flat(&L), "PLY");
 }
 
-/// Returns a star-shaped polygon with `count` corners at random radii from `least` to 1; it is simple.
+/// Returns a simple, star-shaped polygon with `count` corners at random radii from `least` to 1.
 fn star(random: &Random, count: usize, least: f64) -> Vec<DVec3> {
     let corner = |i: usize| {
         let (sin, cos) = (TAU * i as f64 / count as f64).sin_cos();
@@ -145,7 +145,7 @@ fn convex_polygons_are_fans() {
 }
 
 #[test]
-fn degenerate_polygons_are_noted() {
+fn degenerate_polygons_are_reported() {
     let notes = |points: &[DVec3]| match load("a.obj", polygon(points), None) {
         Ok(mesh) => mesh.notes.iter().map(ToString::to_string).collect(),
         Err(message) => vec![message],

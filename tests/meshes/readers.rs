@@ -192,7 +192,7 @@ fn polygons_are_fans() {
 
 #[test]
 fn degenerate_triangles_are_dropped_and_counted() {
-    // Equal indices or positions, collinear points; one almost so.
+    // Triangles with equal indices, equal positions or collinear points; the last triangle is only nearly degenerate.
     let text = "v 0 0 0\nv 1 1 1\nv 0.1 0.1 0.1\nv 0 0 0\nv 0.1 0.1 0.10000001\nv -0 0 0\n\
                 g a\nf 1 1 2\nf 1 4 2\nf 1 2 3\nf 6 2 1\ng b\nf 1 2 5\n";
     let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
@@ -205,7 +205,7 @@ fn degenerate_triangles_are_dropped_and_counted() {
     assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-6));
     let error = load("a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", None).unwrap_err();
     assert_eq!(error, "a.obj: has no triangles but 1 without an area");
-    // The last point is collinear only in decimal.
+    // The last point is collinear in decimal, but not in binary.
     let mesh = load(
         "a.obj",
         "v 0 0 0\nv 0.1 0.3 0\nv 0.2 0.6 0\nv 0.3 0.9 0\nf 1 2 3\nf 1 2 4\n",
@@ -439,7 +439,7 @@ fn smooth_normals_are_weighted_by_angles() {
 }
 
 #[test]
-fn normals_that_cancel_are_replaced_by_those_of_the_triangles() {
+fn canceling_vertex_normals_are_replaced_by_triangle_normals() {
     let text = format!("{SQUARE}vt 0.5 0.5\nf 1/1 2/1 3/1\nf 3/1 2/1 1/1\n");
     let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
     assert_eq!(mesh.positions.len(), 6);
@@ -456,7 +456,7 @@ fn normals_that_cancel_are_replaced_by_those_of_the_triangles() {
 }
 
 #[test]
-fn normals_of_a_file_without_any_are_an_error() {
+fn requesting_normals_of_a_file_without_normals_is_an_error() {
     for (name, bytes) in in_all_formats() {
         let result = load(name, bytes, Some(Normals::File));
         if name.to_lowercase().ends_with("stl") {
@@ -484,7 +484,7 @@ fn a_mesh_far_from_the_origin_keeps_its_precision() {
 }
 
 #[test]
-fn inconsistent_surfaces_are_noted() {
+fn non_manifold_edges_and_inconsistent_winding_are_reported() {
     let text = format!("{SQUARE}v 0 0 1\nf 1 2 3\nf 1 4 3\nf 1 5 3\n");
     let mesh = load("a.obj", text, None).unwrap();
     assert_eq!(

@@ -54,7 +54,7 @@ fn entry(origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
         .filter(|t| *t > 0.0)
 }
 
-/// Pixel counts, with contradictions of the bounds.
+/// Numbers of pixels; `wrong_` means that a pixel contradicts the bounds.
 #[derive(Debug, Default, PartialEq)]
 struct Found {
     wrong_hits: usize,
@@ -93,7 +93,7 @@ fn found(form: &Form, inner: f64, normals: &str) -> Found {
                 && hit.normal.as_dvec3().angle_between(radial) < 1.01 * lean + 1e-4;
             found.wrong_hits += usize::from(!(between && normals));
             let cosine = radial.dot(to_light);
-            // The terminator is that of the sphere.
+            // The terminator of the mesh is the terminator of the sphere.
             found.wrong_light += usize::from(cosine > 1e-3 && !is_lit || cosine < -1e-5 && is_lit);
         } else {
             found.wrong_hits += usize::from(inner_t.is_some());
@@ -132,7 +132,7 @@ fn a_fine_triangle_mesh_approximates_a_sphere() {
         (0, 0, 0),
         "{result:?}"
     );
-    // Control: a coarse mesh fails these bounds, and with normals satisfies its own.
+    // Control: a coarse mesh violates these bounds; with vertex normals it satisfies the bounds for its own size.
     let coarse = Form::icosphere(2);
     let wrong = found(&coarse, fine_inner, "flat");
     assert!(
@@ -147,7 +147,7 @@ fn a_fine_triangle_mesh_approximates_a_sphere() {
     );
 }
 
-/// From behind, at any angle.
+/// The light is behind the surface, at any angle.
 #[test]
 fn no_light_enters_a_closed_mesh() {
     for detail in [1, 2, 4] {

@@ -1,4 +1,4 @@
-//! Tangents of smooth meshes for normal maps: those of the surface, continuous across edges.
+//! Tangents of smooth meshes for normal maps match the surface and are continuous across edges.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -71,7 +71,7 @@ const PLACES: [Vec2; 7] = [
     Vec2::new(0.0, 0.4),
 ];
 
-/// Returns the maximum errors in degrees: interpolated tangents, per triangle.
+/// Returns the maximum errors in degrees: with interpolated tangents, and with tangents per triangle.
 fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> [f64; 2] {
     let i = &packed.bvh.instances[0];
     let to_world = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
@@ -132,7 +132,7 @@ fn tangents_match_the_surface() {
     }
 }
 
-/// Returns the mapped normals: interpolated tangents, per triangle.
+/// Returns the mapped normals: with interpolated tangents, and with tangents per triangle.
 fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     let hit = hit(packed, slot, b);
     let prim = fetch_hit_primitive(packed, hit);
@@ -154,8 +154,8 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     [found, mapped_normal(by_triangle, texture, LEAN)]
 }
 
-/// Returns the maximum angles in degrees between normals across edges and seams (interpolated tangents, per triangle),
-/// and the number of edges.
+/// Returns the maximum angles in degrees between normals across edges and seams (with interpolated tangents, and with
+/// tangents per triangle), and the number of edges.
 fn jumps(packed: &Packed, is_looked_at: impl Fn(Vec3) -> bool) -> ([f32; 2], usize) {
     let mesh = &packed.bvh.meshes[0];
     let mut sides: HashMap<_, Vec<[Vec3; 2]>> = HashMap::new();
@@ -273,7 +273,7 @@ fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
 
 #[test]
 fn tangents_are_averaged_only_across_continuous_textures() {
-    // Two sheets that meet at x = 1; the right one has another texture transform.
+    // Two sheets that meet at x = 1; the right sheet has a different texture transform.
     let directions = |turn: f64, shift: f64| {
         let sheet = |left: f64| Sheet::of(2, 2, |u, v| [DVec3::new(left + u, v, 0.0), DVec3::Z]);
         let (mut whole, right) = (sheet(0.0), sheet(1.0));
@@ -325,7 +325,7 @@ fn only_smooth_meshes_with_normal_maps_have_tangents() {
     }
 }
 
-/// Also canceling and extreme ones.
+/// The texture coordinates are constant, discontinuous or extreme, or the tangents of adjacent triangles cancel.
 #[test]
 fn degenerate_texture_coordinates_give_unit_normals() {
     let size = |factor: f64| move |[u, v]: [f64; 2]| [u * factor, v * factor];

@@ -233,7 +233,7 @@ impl<'a> Aims<'a> {
             light.center = start + (end - start) * self.random.pick(&[0.5, 1.0, 2.0]);
             (light.finite, light.t_max) = (1.0, 1.0 - 1e-5);
         }
-        let mut surface = nothing();
+        let mut surface = unused_surface();
         surface.ray_origin = start;
         (surface.exclude_front, surface.exclude_back) = (own, own);
         let key = UVec2::new(self.random.bits() as u32, self.random.bits() as u32);
@@ -250,7 +250,7 @@ impl<'a> Aims<'a> {
     }
 }
 
-fn nothing() -> Surface {
+fn unused_surface() -> Surface {
     let zero = Vec3::ZERO;
     Surface {
         position: zero,
@@ -296,7 +296,7 @@ fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
     [hits, shadows, met, dark]
 }
 
-/// From boxes to nodes and the order of the boxes.
+/// Builds the nodes of a BVH over boxes; also returns the order of the boxes.
 type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<bvh::Node>, Vec<u32>);
 
 fn with_trees(scene: &Packed, tree: Builder) -> Packed {
@@ -510,7 +510,7 @@ fn any_other_bvh_gives_the_same_bits() {
 }
 
 #[test]
-fn a_tree_whose_boxes_are_too_small_is_found() {
+fn a_bvh_with_too_small_boxes_is_found() {
     let scene = soups();
     let [hits, shadows] = differing_between(&scene, &with_trees(&scene, &too_small), 20_000);
     println!("{hits} hits and {shadows} shadows of 20000 are lost");

@@ -189,7 +189,7 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
 
 #[test]
 fn emission_from_vertex_colors_lights_like_plain_emission() {
-    // Constant emission, or equal vertex colors; equal samples.
+    // Constant emission and vertex colors of the same value give the same samples.
     let folder = tempfile::tempdir().unwrap();
     let text = |keys: &str| {
         format!(
@@ -274,7 +274,7 @@ fn textures_use_their_set_of_coordinates() {
             .map(|set| scene(folder.path(), 4, &text(set, filter, keys), with_sets))
             .collect();
         for set in 0..4 {
-            // Only these coordinates; without roughness, whose coordinates would differ.
+            // Compared with a mesh that has only this set. Roughness is omitted, because its texture coordinates would differ.
             let without = |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
             let first = |mesh: &mut Mesh| {
                 with_sets(mesh);
@@ -285,7 +285,7 @@ fn textures_use_their_set_of_coordinates() {
             };
             let expected = reference(&scene(folder.path(), 4, &without(text(0, filter, keys)), first));
             let found = scene(folder.path(), 4, &without(text(set as u32, filter, keys)), with_sets);
-            // Not bit-identical: the microfacet frame is that of the first set.
+            // Not bit-identical: the microfacet frame is derived from the first set.
             let found = reference(&found);
             let near = means(&found)
                 .iter()
@@ -454,7 +454,7 @@ fn invalid_factors_and_sets_are_reported() {
 #[test]
 fn only_camera_rays_skip_back_faces() {
     let folder = tempfile::tempdir().unwrap();
-    // Occludes an area light behind the camera, whichever side faces it.
+    // The wall occludes an area light behind the camera, whichever side faces the light.
     let text = |height: f64, side: &str, transform: &str| {
         format!(
             "camera = {{ type = 'orthographic', position = [0, 0, {height}], look_at = [0, 0, 0], up = [0, 1, 0], height = 1.5 }}\n\
@@ -506,7 +506,7 @@ fn only_camera_rays_skip_back_faces() {
 
 #[test]
 fn a_mesh_keeps_its_own_tangents() {
-    // Tilted along u; the tangents contradict the coordinates.
+    // The map tilts the normal along u; the tangents of the mesh contradict the texture coordinates.
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| [0.8, 0.6, 0.9]);
     let text = format!(

@@ -87,8 +87,9 @@ impl Solid {
     }
 }
 
-/// Returns the number of rays that pass a convex mesh. From outside, one through the inscribed ball must hit before it
-/// is nearest to the center; from inside, at its target, within the precision of slivers.
+/// Returns the number of rays that pass through a convex mesh. From outside, a ray towards the inscribed ball must hit
+/// the mesh before the point nearest to the center. From inside, a ray must hit the mesh at its target, up to the
+/// precision of slivers.
 fn passing(scene: &Packed, rays: u32, inside: bool) -> u32 {
     let solid = Solid::new(scene);
     let chunks = (0..64u64).into_par_iter().map(|seed| {
@@ -119,7 +120,7 @@ fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -
         },
     };
     let d = ray.direction.as_dvec3();
-    // Nearest to the center and to the target. Rounding may move the hit behind the target.
+    // Ray parameters nearest to the center and to the target. Rounding may move the hit behind the target.
     let to_center = (solid.center - origin.as_dvec3()).dot(d) / d.length_squared();
     let to_target = (target - origin.as_dvec3()).dot(d) / d.length_squared();
     let slack = 30.0 * solid.rounding / d.length();
@@ -130,7 +131,7 @@ fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -
     !(f64::from(hit.t) <= limit) || casts && !is_occluded(scene, origin, direction, times)
 }
 
-/// Returns true if a point light at `times` the direction is occluded.
+/// Returns true if a point light at `origin + times * direction` is occluded.
 fn is_occluded(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool {
     let zero = Vec3::ZERO;
     let surface = Surface {
@@ -235,7 +236,8 @@ fn standalone_triangles_are_not_watertight() {
     assert_eq!([false, true].map(|inside| passing(&mesh, 64_000, inside)), [0, 0]);
 }
 
-/// Not convex: rays at an edge whose triangles face them must hit there or before, rays from inside anywhere.
+/// The knot is not convex: rays towards an edge whose triangles face the ray must hit there or before; rays from inside
+/// may hit anywhere.
 #[test]
 fn no_ray_passes_through_the_knot() {
     let knot = std::fs::read_to_string(sources::path("scenes/meshes/knot.obj")).expect("the knot");
@@ -262,7 +264,7 @@ fn no_ray_passes_through_the_knot() {
     assert!(outside.1 > 10 && inside.1 > 10, "{outside:?} {inside:?}");
 }
 
-/// Returns the numbers of rays and of those that pass, from outside and inside.
+/// Returns the numbers of all rays and of rays that pass through the knot: from outside, and from inside.
 fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
     let side = f64::from(scene.bvh.instances[0].side);
     let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize() * side;

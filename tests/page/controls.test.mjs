@@ -1,4 +1,4 @@
-// Controls of the page: they never write by accident, and disabled ones show the reason.
+// Controls of the page never write by accident, and disabled controls show the reason.
 
 import assert from "node:assert/strict";
 import fs from "node:fs";
@@ -76,7 +76,7 @@ test("a required key has no button that removes it", async () => {
   assert.deepEqual(page.faults, []);
 });
 
-test("a scene that cannot be edited disables saving with the reason, and offers to copy the camera", async () => {
+test("a scene that cannot be edited disables saving, shows the reason, and offers to copy the camera", async () => {
   const triangle = Buffer.alloc(44);
   [0, 0, 0, 1, 0, 0, 0, 1, 0].forEach((x, i) => triangle.writeFloatLE(x, 4 * i));
   studio.write("box.gltf", JSON.stringify({
@@ -124,7 +124,7 @@ test("without a connection nothing can be downloaded, and the zoom bar stays opa
   for (const id of ["#reset-look", "#undo-write", "#reset-sliders", "#save"]) assert.ok(await page.locator(id).isDisabled(), id);
 });
 
-test("undo says why it is not possible after another program has changed the file", async () => {
+test("undo shows why it is not possible after another program has changed the file", async () => {
   await studio.start();
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
@@ -173,7 +173,7 @@ test("exposure out of range is reported, and its slider and box agree", async ()
   assert.ok(room >= 0, `${room} px for the digits`);
 });
 
-test("the camera's values say that they are the file's once the view has moved", async () => {
+test("once the view has moved, the camera's values are labeled as values of the file", async () => {
   await studio.start();
   const page = await open(browser, studio);
   await choose(page, "camera");

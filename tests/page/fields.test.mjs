@@ -79,7 +79,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   assert.equal(await page.locator('[data-name="materials.red"]').count(), 0);
   assert.equal(await z.inputValue(), "0.7");
   assert.ok(await isFocused(z));
-  assert.ok(studio.read("scene.toml").includes("center = [0, 0, 0.5]"), "nothing is written yet");
+  assert.ok(studio.read("scene.toml").includes("center = [0, 0, 0.5]"), "a half-typed number was written");
   await page.keyboard.type("5");
   await page.keyboard.press("Enter");
   await written("center = [0, 0, 0.75]");
@@ -104,7 +104,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await there.waitFor();
   assert.ok(await isFocused(there));
   assert.ok(await absent.evaluate((node) => node.open));
-  // Removed by keys, it moves back with the focus.
+  // Removing the value with a key moves the field back, with the focus.
   await page.locator('[data-path="render.seed"]').getByRole("button", { name: "default" }).focus();
   await page.keyboard.press("Enter");
   await there.waitFor({ state: "detached" });
@@ -155,7 +155,7 @@ test("a half-typed number of a shader stays while sliders come and go, and slide
   assert.deepEqual(page.faults, []);
 });
 
-test("a finger that scrolls changes nothing, one that drags or taps does", async () => {
+test("touch scrolling changes no values; dragging and tapping do", async () => {
   const page = await open(browser, studio, PHONE);
   const client = await page.context().newCDPSession(page);
   await choose(page, "shapes[0]");
@@ -186,10 +186,10 @@ test("a finger that scrolls changes nothing, one that drags or taps does", async
   const boxes = [box(page, "shapes[0].radius", 1), number(page, "level"), page.locator("#exposure-number")];
   for (const control of [...sliders, ...boxes]) {
     const value = await control.inputValue();
-    assert.ok((await swipe(control, 5, -96)) > 20, "it scrolls");
+    assert.ok((await swipe(control, 5, -96)) > 20, "a vertical swipe does not scroll");
     assert.equal(await control.inputValue(), value);
     assert.deepEqual(await sent(), []);
-    assert.ok(Math.abs(await swipe(control, 60, 3)) < 10, "it does not scroll");
+    assert.ok(Math.abs(await swipe(control, 60, 3)) < 10, "a horizontal drag scrolls");
     assert.ok((await sent()).length > 0);
     await settled(page);
     await sent();
@@ -315,7 +315,7 @@ test("forced colours show the progress", async () => {
     return new Set(bytes.match(/\d+,\d+,\d+/g)).size;
   };
   await page.evaluate(() => (document.getElementById("bar").value = 0.5));
-  assert.ok((await colors()) >= 3, "an edge, what is done and what is not");
+  assert.ok((await colors()) >= 3, "fewer than three colors: edge, finished part, remaining part");
 });
 
 test("a count of cells steps from square to square", async () => {
@@ -385,7 +385,7 @@ test("the focus of a control that is disabled or removed stays near, and returns
   await page.locator("#undo-write:disabled").waitFor();
   assert.ok(await isAround("undo-write"));
   await page.keyboard.press("Tab");
-  assert.ok(await isFocused(page.locator("#redo-write")), "what is beside it is the next");
+  assert.ok(await isFocused(page.locator("#redo-write")), "the focus did not move to the neighboring button");
   // Hidden with the focus: the button beside a field, the canvas of another view.
   await slider(page, "level").focus();
   await page.keyboard.press("ArrowRight");
@@ -399,7 +399,7 @@ test("the focus of a control that is disabled or removed stays near, and returns
   await page.keyboard.press("1");
   await page.locator("[data-part=second] canvas").waitFor({ state: "hidden" });
   assert.ok(await isFocused(canvas(page)));
-  // Removed with the focus.
+  // Deleting a view that has the focus.
   await page.keyboard.press("b");
   await page.getByRole("button", { name: "Delete view 1" }).focus();
   await page.keyboard.press("Enter");

@@ -1,4 +1,5 @@
-// Film layers on the page equal those of `wgray render --aov`; layers that a scene lacks are disabled with the reason.
+// Film layers on the page equal the layers of `wgray render --aov`. A layer that a scene lacks is disabled, and the page
+// shows the reason.
 
 import assert from "node:assert/strict";
 import fs from "node:fs";
@@ -42,19 +43,19 @@ test("film layers are views with the images and files of a render", async () => 
     seen.add(String(picture));
     const saved = await page.evaluate(async () => [...new Uint8Array(await (await fetch("/picture.exr")).arrayBuffer())]);
     const header = Buffer.from(saved.slice(0, 1000)).toString("latin1");
-    assert.match(header, new RegExp(`\\0chlist\\0....${name}\\.B\\0`, "s"), "its first channel");
+    assert.match(header, new RegExp(`\\0chlist\\0....${name}\\.B\\0`, "s"), "the channel is missing in the EXR header");
   }
-  assert.equal(seen.size, 5, "all differ");
+  assert.equal(seen.size, 5, "two layers have the same image");
   assert.equal(await page.locator("#samples").innerText(), "4 of 4");
   await canvas(page).hover();
   await page.locator("#values", { hasText: /albedo [\d.]+ +[\d.]+ +[\d.]+.*bits.*shown/ }).waitFor();
   const one = await compiled();
-  assert.notEqual(one, first, "they take a kernel");
+  assert.notEqual(one, first, "the layers did not compile another kernel");
   await page.keyboard.press("1");
   await page.waitForFunction(() => document.getElementById("panels").dataset.view === "color");
   await settled(page);
   same(await shown(page), light);
-  assert.equal(await compiled(), one, "that of light is still there");
+  assert.equal(await compiled(), one, "the kernel of the light layers was compiled again");
   assert.deepEqual(page.faults, []);
 });
 

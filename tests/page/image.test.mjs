@@ -59,7 +59,7 @@ test("the divider of a wipe is dragged in the image", async () => {
   await page.mouse.up();
   await settled(page);
   assert.ok(Math.abs(Number(await page.locator("#wipe").inputValue()) - 0.25) < 0.01, await page.locator("#wipe").inputValue());
-  assert.equal(await camera(page), before, "the camera stays");
+  assert.equal(await camera(page), before, "dragging the divider moved the camera");
   // Beside the divider a drag orbits.
   await page.mouse.move(x, y);
   assert.notEqual(await canvas(page, "first").evaluate((canvas) => getComputedStyle(canvas).cursor), "ew-resize");
@@ -84,7 +84,7 @@ test("a badge on the image counts invalid pixels and leads to their numbers", as
   spoil("if pixel.y == 3u && pixel.x == 0u { sum.x = zero / zero; }");
   await badge.filter({ hasText: /^1 NaN pixel$/ }).waitFor();
   const [area, panels] = [await badge.boundingBox(), await page.locator("#panels").boundingBox()];
-  assert.ok(area.x >= panels.x && area.x + area.width <= panels.x + panels.width && area.y >= panels.y, "it is on the image");
+  assert.ok(area.x >= panels.x && area.x + area.width <= panels.x + panels.width && area.y >= panels.y, "the badge is outside of the image");
   // A ring leads to a single pixel.
   await settled(page);
   const at = (image, x, y) => image[2].split(",").slice(3 * (y * 120 + x), 3 * (y * 120 + x) + 3).join();

@@ -48,7 +48,7 @@ test("a click shows the object, and its controls write to the scene file", async
   const lines = page.locator("#object-groups > details").first().locator("pre");
   const number = SCENE.split("\n").indexOf("[[shapes]]") + 1;
   assert.match(await lines.innerText(), new RegExp(`^ *${number}  \\[\\[shapes\\]\\]\\n`));
-  // By keys: the box, the file and the shown lines follow.
+  // If a key changes the value, the box, the file and the shown lines follow.
   await box(page, "shapes[0].radius").focus();
   await page.keyboard.press("ArrowLeft");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
@@ -168,7 +168,7 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
     await settled(page);
   }
   assert.equal(studio.read("scene.toml"), SCENE);
-  // Also right after a click.
+  // A held key is also one undo step right after a click.
   await x.evaluate(async (box) => {
     const fire = (Kind, type, more) => box.dispatchEvent(new Kind(type, { bubbles: true, ...more }));
     fire(PointerEvent, "pointerdown", { button: 1 });
@@ -246,7 +246,7 @@ test("one slider scales a light and keeps its tint", async () => {
   await choose(page, "lights[0]");
   const [slider, strength] = [4, 5].map((nth) => box(page, "lights[0].color", nth));
   assert.equal(await strength.inputValue(), "2");
-  assert.ok(Number(await slider.getAttribute("max")) >= 4, "it extends well above the value");
+  assert.ok(Number(await slider.getAttribute("max")) >= 4, "the range ends too close to the value");
   assert.equal(await slider.getAttribute("min"), "0");
   await slider.fill("4");
   await holds("color = [4, 2, 1]");
@@ -291,7 +291,7 @@ test("other viewers' changes of a vector survive a drag of one of its numbers", 
   await page.mouse.move(at[0] + 40, at[1]);
   await page.mouse.up();
   await holds("center = [0.04, 0.25, 0.75]");
-  // They survive a cancelled drag, too.
+  // The changes of other viewers survive a cancelled drag, too.
   await settled(page);
   await drag(20);
   await holds("center = [0.06, 0.25, 0.75]");

@@ -33,7 +33,7 @@ async function drag(page, dx, dy, modifier) {
   if (modifier) await page.keyboard.up(modifier);
 }
 
-test("the image equals that of wgray render", async () => {
+test("the image equals the image of wgray render", async () => {
   const page = await open(browser, studio);
   await showsRendered(page, studio);
   assert.equal(await text(page, "#samples"), "4 of 4");
@@ -53,7 +53,7 @@ test("a saved shader changes the image", async () => {
   await finished(page, old);
   const [, , reddened] = await shown(page);
   const bytes = reddened.split(",").map(Number);
-  assert.ok(bytes.every((value, i) => i % 3 === 0 || value === 0), "only red is left");
+  assert.ok(bytes.every((value, i) => i % 3 === 0 || value === 0), "green or blue is not zero");
   const red = (data) => data.split(",").filter((_, i) => i % 3 === 0);
   assert.deepEqual(red(reddened), red(seen[2]));
 });
@@ -73,7 +73,7 @@ test("a broken shader shows file and line and keeps the image, a fixed one recov
   await page.locator("#problems h2").waitFor({ state: "detached" });
   await showsRendered(page, studio);
   assert.match(studio.said, new RegExp(`error: ${place.replaceAll(".", "\\.")}\\d+: .*simple`));
-  assert.doesNotMatch(studio.said, /\x1b/, "a pipe gets no colours");
+  assert.doesNotMatch(studio.said, /\x1b/, "a pipe received color codes");
 });
 
 test("a broken scene shows its line", async () => {
@@ -98,7 +98,7 @@ test("all errors of a scene are shown", async () => {
   await page.locator("#problems h2").first().waitFor({ state: "detached" });
 });
 
-test("while a file is being written the page says that files are read", async () => {
+test("while a file is being written, the page reports that files are being read", async () => {
   const page = await open(browser, studio);
   studio.write("box.obj", "v 0 0 0\n");
   studio.write("scene.toml", `${SCENE}\n[[shapes]]\ntype = "mesh"\nfile = "box.obj"\nmaterial = "red"\n`);
@@ -191,7 +191,7 @@ test("all views differ, and the GPU agrees with the CPU", async () => {
     assert.ok(await page.locator(`input[value=${view}]`).isChecked());
     seen.add(String(await shown(page)));
   }
-  assert.equal(seen.size, 6, "all views differ");
+  assert.equal(seen.size, 6, "two views are equal");
   for (const layer of ["shading_normal", "instance"]) {
     await page.selectOption("#layers", layer);
     await page.waitForFunction((view) => document.getElementById("panels").dataset.view === view, layer);
@@ -289,7 +289,7 @@ test("the wheel with Ctrl zooms about the pointer, and the hand tool pans the im
   const camera = await text(page, "#camera-text");
   await drag(page, 50, 0);
   await page.waitForFunction((old) => Number(document.querySelector("#panels canvas").dataset.left) > old + 40, newLeft);
-  assert.equal(await text(page, "#camera-text"), camera, "the camera stays");
+  assert.equal(await text(page, "#camera-text"), camera, "the camera moved");
 });
 
 test("the page fits 360 pixels, in light and dark", async () => {
@@ -342,7 +342,7 @@ test("pages of other origins are rejected", async () => {
   }
 });
 
-test("all errors are shown at once, including those in unused kernels", async () => {
+test("all errors are shown at once, including errors in unused kernels", async () => {
   const page = await open(browser, studio);
   const seen = await shown(page);
   studio.breakShader();
@@ -399,7 +399,7 @@ test("invalid pixels are marked and counted", async () => {
   const plain = await shown(page);
   assert.equal(at(plain, 8, 3), at(seen, 8, 3));
   assert.equal(at(plain, 60, 45), at(seen, 60, 45));
-  assert.match(await counts.innerText(), /1 NaN/, "they are counted all the same");
+  assert.match(await counts.innerText(), /1 NaN/, "invalid pixels are not counted");
   await page.check("#marks");
   await page.getByLabel("Compare", { exact: true }).check();
   await page.locator("#fault-counts", { hasText: /pixels: GPU: 1 NaN, 2 infinite, 120 negative$/ }).waitFor();
@@ -424,8 +424,8 @@ test("a save is undone, and keeps line ends and a byte-order mark", async () => 
   await page.locator("#undo").waitFor({ state: "hidden" });
   assert.equal(studio.read("scene.toml"), text_of(SCENE));
   await page.locator("#save:enabled").waitFor();
-  assert.equal(await text(page, "#camera-text"), camera, "the view stays");
-  // Edited since: cannot be undone.
+  assert.equal(await text(page, "#camera-text"), camera, "undoing a save moved the view");
+  // If the file is edited after a save, the save cannot be undone.
   await page.click("#save");
   await page.locator("#undo").waitFor();
   studio.edit("scene.toml", "fov = 40", "fov = 41");

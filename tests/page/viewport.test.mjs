@@ -52,12 +52,12 @@ test("the wheel dollies, the middle button pans, the right button opens the brow
   assert.ok(Math.abs(distance(near) / distance(start) - Math.exp(-0.3)) < 1e-3, near);
   await dragged(page, "middle");
   const panned = await moved(page, near);
-  assert.ok(Math.abs(distance(panned) - distance(near)) < 1e-3, "a pan keeps the distance");
+  assert.ok(Math.abs(distance(panned) - distance(near)) < 1e-3, "a pan changed the distance");
   const menu = page.evaluate(() => new Promise((resolve) => document.addEventListener("contextmenu", (event) => resolve(event.defaultPrevented), { once: true })));
   await dragged(page, "right");
-  assert.equal(await menu, false, "its own menu comes");
+  assert.equal(await menu, false, "the page suppressed the menu of the browser");
   await settled(page);
-  assert.equal(await camera(page), panned, "the right button moves nothing");
+  assert.equal(await camera(page), panned, "the right button moved the camera");
 });
 
 test("camera steps are undone and redone", async () => {
@@ -70,7 +70,7 @@ test("camera steps are undone and redone", async () => {
   const second = await moved(page, first);
   await canvas(page).focus();
   await page.keyboard.press("z");
-  assert.equal(await moved(page, second), first, "a drag is one step");
+  assert.equal(await moved(page, second), first, "a drag is not one undo step");
   await page.keyboard.press("z");
   assert.equal(await moved(page, first), start);
   assert.ok(await page.locator("#back").isDisabled());
@@ -82,7 +82,7 @@ test("camera steps are undone and redone", async () => {
   await page.keyboard.press("r");
   assert.equal(await moved(page, second), start);
   await page.click("#back");
-  assert.equal(await moved(page, start), second, "a reset is a step too");
+  assert.equal(await moved(page, start), second, "a reset is not an undo step");
 });
 
 test("keys fly, and drags look around", async () => {
@@ -97,7 +97,7 @@ test("keys fly, and drags look around", async () => {
   await page.keyboard.up("w");
   await settled(page);
   const there = await camera(page);
-  assert.ok(point(there, "position")[1] > point(start, "position")[1], "forwards");
+  assert.ok(point(there, "position")[1] > point(start, "position")[1], "the camera did not fly forwards");
   await dragged(page);
   const looked = await moved(page, there);
   assert.deepEqual(point(looked, "position"), point(there, "position"));
@@ -145,7 +145,7 @@ test("two fingers pan and dolly, a tap reads a pixel", async () => {
   const [x, y] = await at(page, 0.5, 0.5);
   await page.touchscreen.tap(x, y);
   await page.locator("#values", { hasText: /pixel \d+ \d+ .*linear RGB/ }).waitFor();
-  assert.equal(await camera(page), start, "a tap moves nothing");
+  assert.equal(await camera(page), start, "a tap moved the camera");
   const client = await page.context().newCDPSession(page);
   const touch = (type, apart) => client.send("Input.dispatchTouchEvent", {
     type, touchPoints: type === "touchEnd" ? [] : [{ x: x - apart, y, id: 1 }, { x: x + apart, y, id: 2 }],
@@ -163,7 +163,7 @@ test("two fingers pan and dolly, a tap reads a pixel", async () => {
   assert.deepEqual(small, []);
   await page.evaluate(() => scrollTo(0, document.scrollingElement.scrollHeight));
   const box = await canvas(page).boundingBox();
-  assert.ok(box.y >= 0 && box.y + box.height < 844, "the image stays while the controls scroll");
+  assert.ok(box.y >= 0 && box.y + box.height < 844, "the image scrolled out of view");
 });
 
 test("exposure, transform and false colours change the display, not the values", async () => {
@@ -192,7 +192,7 @@ test("exposure, transform and false colours change the display, not the values",
   await look(() => page.selectOption("#transform", "agx"));
   await look(() => page.check("#false-color"));
   assert.ok(await page.locator("#legend").isVisible());
-  assert.equal(new Set(seen.map(String)).size, 4, "all differ");
+  assert.equal(new Set(seen.map(String)).size, 4, "two displays are equal");
   await page.click("#zoom-fit");
   await page.mouse.move(x, y);
   await page.locator("#values", { hasText: "linear RGB" }).waitFor();
@@ -356,12 +356,12 @@ test("texts have contrast in both themes, controls have names, forced colours sh
     await page.locator("#problems h2").waitFor();
     assert.deepEqual(await page.evaluate(CONTRASTS), [], colorScheme);
     await page.evaluate(() => document.documentElement.style.setProperty("--quiet", "#777"));
-    assert.notDeepEqual(await page.evaluate(CONTRASTS), [], "the measure can fail");
+    assert.notDeepEqual(await page.evaluate(CONTRASTS), [], "the contrast check finds no violation");
     studio.mendShader();
     await page.locator("#problems").waitFor({ state: "hidden" });
     const snapshot = await page.locator("body").ariaSnapshot();
     assert.match(snapshot, /application "Viewport: colour of scene\.toml"/);
-    assert.doesNotMatch(snapshot, /- (button|textbox|slider|spinbutton|combobox|checkbox|radio|application)( \[|:|$)/m, "all have names");
+    assert.doesNotMatch(snapshot, /- (button|textbox|slider|spinbutton|combobox|checkbox|radio|application)( \[|:|$)/m, "a control has no name");
     await page.context().close();
   }
   const page = await open(browser, studio, { forcedColors: "active" });

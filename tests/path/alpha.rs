@@ -46,7 +46,7 @@ fn blended_layers_transmit_one_minus_alpha() {
 
 #[test]
 fn a_blended_sphere_is_crossed_twice() {
-    // Entry and exit decide independently.
+    // Entry and exit are blended independently.
     let text = format!(
         "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.surface = {}\n[[shapes]]\ntype = 'sphere'\nmaterial = 'surface'\n\
          center = [0, 0, 0]\nradius = 3\n",
@@ -88,7 +88,7 @@ fn shadows_scale_with_alpha() {
 
 #[test]
 fn transparent_surfaces_do_not_change_mis_weights() {
-    // Found by NEE and BSDF sampling, with and without a fully transparent surface.
+    // NEE and BSDF sampling find the light, with and without a fully transparent surface.
     let with = |has_surface: bool| {
         let shape = if has_surface {
             square(0.5, 4.0, "surface")
@@ -151,7 +151,7 @@ fn a_mask_casts_its_shadow() {
                 let [x, y] = [i % 40, i / 40].map(|i| (i as f64 + 0.5) / 20.0 - 1.0);
                 let r = x.hypot(y);
                 if (r - 0.5).abs() > 0.08 {
-                    // Below is interreflection of leaf and floor.
+                    // The limit is above 0 because leaf and floor reflect light onto each other.
                     let is_dark = pixel[0] < 0.05;
                     assert_eq!(
                         is_dark,

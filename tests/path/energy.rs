@@ -39,7 +39,7 @@ fn direction(cosine: f64, longitude: f64) -> Vec3 {
     DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
 }
 
-/// Returns wo from normal to grazing, in several azimuths.
+/// Returns outgoing directions from normal to grazing incidence, at several azimuths.
 fn viewers() -> Vec<Vec3> {
     let mut all = vec![Vec3::Z];
     for cosine in [0.8, 0.4, 0.04] {
@@ -50,7 +50,7 @@ fn viewers() -> Vec<Vec3> {
     all
 }
 
-fn seen(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Material {
+fn evaluated_for(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Material {
     let surface = Surface {
         position: Vec3::ZERO,
         normal: Vec3::Z,
@@ -125,7 +125,7 @@ fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3)
 /// Returns the total albedo: reflection and transmission.
 fn given(packed: &Packed, material: &Material, wo: Vec3, side: f32, compensated: bool) -> f64 {
     let alpha = facet_alpha(material);
-    let mut known = seen(packed, material, wo, side);
+    let mut known = evaluated_for(packed, material, wo, side);
     if !compensated {
         known.loss = 0.0;
     }
@@ -236,7 +236,7 @@ fn fully_transmissive_principled_equals_dielectric() {
                     for side in [1.0, -1.0] {
                         let name = format!("{options}, thin {thin}, {wo}, {side}");
                         let m = mixture(&packed, material, wo, side);
-                        let other = seen(&glass, &glass.materials[0], wo, side);
+                        let other = evaluated_for(&glass, &glass.materials[0], wo, side);
                         for k in 0..64 {
                             let u = sobol_sample(k, glam::UVec2::new(1, 2));
                             let found = principled_sample(&m, wo, u, sobol_sample(k, glam::UVec2::new(3, 4)).x, ALL);
@@ -361,7 +361,10 @@ fn glass_around_the_camera_absorbs_over_the_whole_path() {
             );
             // Control: only absorption behind the first surface.
             let part = (1.0 - 0.04) * (-a * 0.7).exp() * 1.5 * 1.5;
-            assert!((found / part - 1.0).abs() > 0.1, "the control");
+            assert!(
+                (found / part - 1.0).abs() > 0.1,
+                "absorption in front of the first surface has no effect"
+            );
         }
     }
 }

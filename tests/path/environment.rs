@@ -143,7 +143,7 @@ fn irradiance_matches_a_sum_over_all_directions() {
             for mode in both() {
                 let found = DVec3::from_array(mean(&render(&around(image, turn, (256, 1), GROUND), mode)));
                 if expected == DVec3::ZERO {
-                    assert_eq!(found, expected, "the bright texel is below the ground");
+                    assert_eq!(found, expected, "a texel below the ground lights it");
                     continue;
                 }
                 let ratio = found / expected;
@@ -262,9 +262,12 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
         let [light, materials, wrong] = [&light_alone, &material_alone, &wrong].map(found);
         for i in 0..3 {
             let near = |x: f64| (x - both[i]).abs() < 1e-2 * both[i];
-            assert!(near(light[i]), "light sampling only: {light:?} for {both:?}");
-            assert!(near(materials[i]), "BSDF sampling only: {materials:?} for {both:?}");
-            assert!(!near(wrong[i]), "the control: {wrong:?} for {both:?}");
+            assert!(near(light[i]), "light sampling alone differs: {light:?} for {both:?}");
+            assert!(
+                near(materials[i]),
+                "BSDF sampling alone differs: {materials:?} for {both:?}"
+            );
+            assert!(!near(wrong[i]), "a wrong weight passes: {wrong:?} for {both:?}");
         }
     }
 }
@@ -279,7 +282,7 @@ fn the_light_of_map_and_lights_adds_up() {
     let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for mode in both() {
         let sum = |packed: Packed| mean(&render(&packed, mode));
-        // The rectangle light occludes in all three.
+        // The rectangle of the light occludes in all three scenes.
         let hidden = lights.split("[[lights]]").last().unwrap_or_default();
         let plate = format!("[[lights]]{}", hidden.replace("color = [3, 3, 3]", "color = [0, 0, 0]"));
         let of_image = sum(around(&image, "", (1024, 3), &format!("{dark}{plate}")));
@@ -297,8 +300,8 @@ fn the_light_of_map_and_lights_adds_up() {
 
 #[test]
 fn the_floor_occludes_light_from_below() {
-    // The floor has nothing below it: it would cast no shadow of area lights. The lower half of the ball is lit from
-    // below only.
+    // Area lights would skip the floor as an occluder, because no shape is below the floor. The lower half of the ball
+    // is lit only from below.
     let below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
     let floors = [
         "type = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
@@ -318,7 +321,7 @@ fn the_floor_occludes_light_from_below() {
         for floor in floors {
             assert!(seen(&format!("[[shapes]]\n{floor}\n"))[0] < 1e-3, "{floor}, {mode:?}");
         }
-        assert!(seen("")[0] > 0.1, "the control, {mode:?}");
+        assert!(seen("")[0] > 0.1, "the ball is dark without a floor, {mode:?}");
     }
 }
 
@@ -365,7 +368,7 @@ fn only_the_camera_sees_the_background() {
                 let [x, ..] = at(8 * 16 + 8);
                 assert!(
                     (x - lit).abs() < 1e-5,
-                    "the mirror shows the environment map: {environment}, {mode:?}: {x}"
+                    "the mirror does not show the environment map: {environment}, {mode:?}: {x}"
                 );
                 film
             })
@@ -376,7 +379,7 @@ fn only_the_camera_sees_the_background() {
 }
 
 #[test]
-fn a_factor_of_two_doubles_every_bit() {
+fn a_scale_of_two_doubles_every_pixel_exactly() {
     for mode in both() {
         let film = |scale: f64| {
             render(
@@ -424,7 +427,7 @@ fn samples(packed: &Packed, normal: Vec3, count: u32) -> impl Iterator<Item = Ve
 }
 
 #[test]
-fn directions_are_as_frequent_as_their_density_says() {
+fn sampled_directions_follow_their_pdf() {
     const COLUMNS: usize = 24;
     const ROWS: usize = 13;
     const COUNT: u32 = 1 << 18;
@@ -449,7 +452,7 @@ fn directions_are_as_frequent_as_their_density_says() {
         let packed = around(image, "", (1, 1), GROUND);
         let mut counts = vec![0.0; COLUMNS * ROWS];
         samples(&packed, normal, COUNT).for_each(|direction| counts[bin(direction)] += 1.0);
-        // Expected counts, on a grid much finer than the texels, whose borders are not those of the bins.
+        // Expected counts, integrated on a grid much finer than the texels, because the bins do not align with texels.
         let mut expected = [0.0, 0.08].map(|_| vec![0.0; COLUMNS * ROWS]);
         let fine = image.width.max(image.height).max(24) * 24;
         for row in 0..fine {
@@ -528,7 +531,7 @@ fn an_unoccluded_wall_has_little_noise() {
 }
 
 #[test]
-fn cells_of_directions_invert() {
+fn directions_in_a_cell_map_back_to_the_cell() {
     use wgray_render::cpu::equirect::{cell_towards, direction_in_cell};
     for (width, height) in [(1, 1), (2, 1), (3, 2), (16, 8), (8192, 4096)] {
         for column in [0, width / 3, width / 2, width - 1] {

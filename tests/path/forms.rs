@@ -58,7 +58,7 @@ fn a_convex_body_in_a_furnace_shows_its_albedo() {
                 let found = mean(&render(&packed, way));
                 for (found, expected) in found.into_iter().zip(albedo) {
                     assert!(near(found, expected, tolerance), "{material}, {way:?}: {found}");
-                    assert!(!near(found, expected * 1.04, tolerance), "the control");
+                    assert!(!near(found, expected * 1.04, tolerance), "a wrong value passes");
                 }
             }
         }
@@ -103,7 +103,7 @@ fn bounces_in_a_closed_emitter_are_a_geometric_series() {
                     near(found, expected, 4e-3),
                     "{way:?}, {depth}: {found} for {expected}\n{body}"
                 );
-                assert!(!near(found, expected * 1.02, 4e-3), "the control");
+                assert!(!near(found, expected * 1.02, 4e-3), "a wrong value passes");
             }
         }
     }
@@ -151,7 +151,7 @@ fn a_rectangle_lights_the_floor_by_its_form_factor() {
                         near(found, expected * radiance, 2e-3),
                         "{way:?}, {x} {y}: {found} for {expected}"
                     );
-                    assert!(!near(found, expected * radiance * 1.01, 2e-3), "the control");
+                    assert!(!near(found, expected * radiance * 1.01, 2e-3), "a wrong value passes");
                 }
             }
         }
@@ -160,7 +160,7 @@ fn a_rectangle_lights_the_floor_by_its_form_factor() {
 
 #[test]
 fn spheres_and_disks_light_the_floor_by_their_form_factors() {
-    // Straight above: sphere (r / d)^2 cos, disk r^2 / (r^2 + h^2).
+    // Form factors straight above the floor: sphere (r / d)^2 cos, disk r^2 / (r^2 + h^2).
     for scale in [1e-3, 1.0, 1e3] {
         for r in [1e-3, 0.3, 0.999] {
             let h = 1.0;
@@ -223,11 +223,11 @@ fn cylinder_factor(height: f64, radius: f64, length: f64) -> f64 {
 
 #[test]
 fn cylinders_light_the_floor_by_their_form_factors() {
-    // A long one has radius / height (Siegel and Howell, "Thermal Radiation Heat Transfer").
+    // The form factor of a long cylinder is radius / height (Siegel and Howell, "Thermal Radiation Heat Transfer").
     assert!(near(cylinder_factor(1.0, 0.3, 60.0), 0.3, 2e-3));
     for scale in [1e-3, 1.0, 1e3] {
         let shapes = [
-            // Upright: the cap.
+            // An upright cylinder, of which only the cap is visible.
             ([0.0, 0.0, 1.0], [0.0, 0.0, 4.0], 0.5, 0.25 / 1.25),
             ([-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], 0.3, cylinder_factor(1.0, 0.3, 2.0)),
             ([-0.05, 0.0, 1.0], [0.05, 0.0, 1.0], 0.7, cylinder_factor(1.0, 0.7, 0.1)),
@@ -258,7 +258,7 @@ fn cylinders_light_the_floor_by_their_form_factors() {
                     near(found, expected, 5e-3),
                     "{way:?}, {start:?} {end:?} {radius}: {found} for {expected}"
                 );
-                assert!(!near(found, expected * 1.02, 5e-3), "the control");
+                assert!(!near(found, expected * 1.02, 5e-3), "a wrong value passes");
             }
         }
     }
@@ -313,7 +313,7 @@ fn a_glass_slab_transmits_by_fresnel_and_beer() {
         for way in both() {
             let found = mean(&render(&packed, way))[2];
             assert!(near(found, passed, 1e-3), "{way:?}, {absorption}: {found} for {passed}");
-            assert!(!near(found, passed * 1.01, 1e-3), "the control");
+            assert!(!near(found, passed * 1.01, 1e-3), "a wrong value passes");
         }
     }
 }

@@ -65,7 +65,10 @@ fn only_mirrors_show_camera_invisible_emitters() {
                 "{way:?}: {:?}",
                 hidden[middle]
             );
-            assert!(seen[middle] != hidden[middle], "{way:?}: the control");
+            assert!(
+                seen[middle] != hidden[middle],
+                "{way:?}: hiding the emitter has no effect"
+            );
         }
         for i in 0..24 * 24 {
             let pixel = UVec2::new(i % 24, i / 24);

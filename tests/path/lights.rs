@@ -16,7 +16,7 @@ const FLOOR: &str =
 
 #[test]
 fn selection_is_by_power_and_one_quarter_uniform() {
-    // Powers 1 to 16 and a black one: too few for a light tree.
+    // Lights of powers 1 to 16 and a black light: too few for a light tree.
     let mut text = format!("{CAMERA}{FLOOR}");
     for i in 0..=16 {
         let _ = write!(
@@ -39,7 +39,7 @@ fn selection_is_by_power_and_one_quarter_uniform() {
             let share = 0.75 * f64::from(light.color.x) / total + 0.25 / 16.0;
             assert!(
                 (f64::from(light.density) - share).abs() < 1e-6,
-                "the PDF is not the share of the power"
+                "the PDF is not the documented share of the power"
             );
             let expected = share * f64::from(calls);
             (count - expected) * (count - expected) / expected
@@ -48,7 +48,7 @@ fn selection_is_by_power_and_one_quarter_uniform() {
     assert!(chi_square < 15.0 + 6.0 * (2.0_f64 * 15.0).sqrt(), "{chi_square}");
 }
 
-/// A weak directional light, or a spot light a million times as strong that faces away.
+/// The other light is weak and directional, or a spot light that is a million times as strong but faces away.
 #[test]
 fn lights_without_local_effect_do_not_starve_others() {
     let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 1]\ncolor = [1, 1, 1]\n";
@@ -102,7 +102,7 @@ fn a_rectangle_light_is_one_sided_and_occludes() {
     let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [2, 2, 2]\n";
     let camera = "camera = { type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
                   materials.m = { type = 'diffuse', color = [0.5, 0.5, 0.5] }\n";
-    // Facing away, it only casts a shadow.
+    // A rectangle light that faces away only casts a shadow.
     let packed = scene(1024, 1, &format!("{camera}{}{sun}{FLOOR}", light.replace("NZ", "1")));
     for way in both() {
         let found = means(&render(&packed, way));

@@ -120,7 +120,7 @@ fn selection_frequencies_and_hit_pdfs_match_the_tree() {
                     kinds += 1.0;
                 }
             }
-            // 64 stratified samples: well below independent ones.
+            // Samples are stratified in groups of 64, so chi-square is well below its value for independent samples.
             assert!(
                 kinds > 5.0 && chi_square < kinds + 6.0 * (2.0_f64 * kinds).sqrt(),
                 "{chi_square} of {kinds}"
@@ -180,7 +180,7 @@ fn limits_of_the_ranges_give_finite_values() {
     let mut text =
         format!("{CAMERA}materials.dark = {{ type = 'diffuse', color = [0, 0, 0], emission = [0, 0, 0] }}\n{FLOOR}");
     for i in 0..12 {
-        // Two coincident lights each: tiny and huge, minimum, maximum and zero color.
+        // Pairs of coincident lights: tiny and huge, with minimum, maximum and zero color.
         let radius = if i % 2 == 0 { 1e-6 } else { 1e6 };
         let color = [1e-30, 1e6, 0.0, 1.0][i % 4];
         for _ in 0..2 {

@@ -34,9 +34,9 @@ impl Lobes {
     fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let angles = angles_at(Vec3::Z, wo, wi);
         match self.material.kind {
-            METAL => metal_eval(&self.seen(wo), wo, wi),
+            METAL => metal_eval(&self.with_energy_loss(wo), wo, wi),
             ROUGH_GLASS => rough_dielectric_eval(&self.material, wo, wi),
-            THIN => thin_eval(&self.seen(wo), wo, wi),
+            THIN => thin_eval(&self.with_energy_loss(wo), wo, wi),
             PHONG => modified_phong_eval(&self.material, angles),
             _ if self.material.roughness > 0.0 => rough_diffuse_eval(&self.material, angles),
             _ => diffuse_eval(&self.material, angles),
@@ -55,7 +55,7 @@ impl Lobes {
     }
 
     /// Returns the material with its energy loss for wo.
-    fn seen(&self, wo: Vec3) -> Material {
+    fn with_energy_loss(&self, wo: Vec3) -> Material {
         let loss = if self.whole {
             facet_loss(facet_alpha(&self.material), wo)
         } else {
@@ -66,9 +66,9 @@ impl Lobes {
 
     fn facet_sample(&self, wo: Vec3, u: Vec2, random: f32) -> Option<LobeSample> {
         match self.material.kind {
-            METAL => Some(metal_sample(&self.seen(wo), wo, u)),
+            METAL => Some(metal_sample(&self.with_energy_loss(wo), wo, u)),
             ROUGH_GLASS => Some(rough_dielectric_sample(&self.material, wo, u, random)),
-            THIN => Some(thin_sample(&self.seen(wo), wo, u, random)),
+            THIN => Some(thin_sample(&self.with_energy_loss(wo), wo, u, random)),
             _ => None,
         }
     }
@@ -186,7 +186,7 @@ fn direction(cosine: f64, longitude: f64) -> Vec3 {
     DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
 }
 
-/// Returns wo from normal to grazing.
+/// Returns outgoing directions from normal to grazing incidence.
 fn viewers() -> Vec<Vec3> {
     [1.0, 0.9, 0.5, 0.1, 0.01].map(|cosine| direction(cosine, 0.7)).to_vec()
 }
@@ -214,7 +214,7 @@ fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
 }
 
 #[test]
-fn white_furnaces_stay_white_or_get_darker_for_every_bsdf() {
+fn no_bsdf_gains_energy_in_a_white_furnace() {
     for lobes in all() {
         for wo in viewers() {
             let reflected = lobes.albedo(wo);
@@ -262,7 +262,7 @@ fn reflection_is_reciprocal() {
     }
 }
 
-/// Refracted radiance scales with the squared index: Veach's thesis, equation 5.14.
+/// Refraction scales radiance by the squared index: Veach's thesis, equation 5.14.
 #[test]
 fn refraction_is_reciprocal_up_to_the_squared_index() {
     for lobes in all().iter().filter(|lobes| lobes.material.kind == ROUGH_GLASS) {
@@ -272,7 +272,7 @@ fn refraction_is_reciprocal_up_to_the_squared_index() {
             ..lobes.material
         };
         let turned = |v: Vec3| Vec3::new(v.x, v.y, -v.z);
-        let mut seen = 0;
+        let mut compared = 0;
         for wo in viewers() {
             for wi in [direction(0.9, 3.6), direction(0.5, 4.0), direction(0.3, 2.0)].map(turned) {
                 let forward = rough_dielectric_eval(&lobes.material, wo, wi).x / -wi.z;
@@ -283,10 +283,10 @@ fn refraction_is_reciprocal_up_to_the_squared_index() {
                     "{}, {wo} {wi}: {forward} {backward}",
                     lobes.name
                 );
-                seen += u32::from(forward > 1e-3);
+                compared += u32::from(forward > 1e-3);
             }
         }
-        assert!(seen > 3, "{}: {seen}", lobes.name);
+        assert!(compared > 3, "{}: only {compared} values were compared", lobes.name);
     }
 }
 
@@ -312,7 +312,7 @@ fn pdfs_integrate_to_one() {
     }
 }
 
-/// Returns Pearson's chi-square of sampled directions, with small cells merged, and its degrees of freedom.
+/// Returns Pearson's chi-square of sampled directions and its degrees of freedom; small cells are merged.
 fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 200_000;
     const HEIGHTS: usize = 40;
@@ -329,7 +329,7 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
     };
     let mut counts = vec![0.0; HEIGHTS * LONGITUDES];
     for i in 0..SAMPLES {
-        // Independent, as low-discrepancy sequences are too even.
+        // Independent samples, because low-discrepancy sequences are too even.
         let bits = wgray_render::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
         let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray_render::cpu::rng::unit_float);
         let Some(wi) = lobes.sample(wo, Vec2::new(a, b), c) else {
@@ -369,7 +369,7 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
 }
 
 #[test]
-fn directions_are_as_frequent_as_their_density_says() {
+fn sampled_directions_follow_their_pdf() {
     for lobes in all() {
         for wo in [direction(0.95, 0.4), direction(0.3, 2.5)] {
             let (sum, freedom) = chi_square(&lobes, wo, |wi| f64::from(lobes.pdf(wo, wi)));
@@ -379,11 +379,7 @@ fn directions_are_as_frequent_as_their_density_says() {
             let (wrong, _) = chi_square(&lobes, wo, |wi| {
                 f64::from(lobes.pdf(wo, wi)) * if wi.x > 0.0 { 1.08 } else { 0.92 }
             });
-            assert!(
-                wrong > most,
-                "{}: a wrong density is not seen: {wrong} of {freedom}",
-                lobes.name
-            );
+            assert!(wrong > most, "{}: a wrong PDF passes: {wrong} of {freedom}", lobes.name);
         }
     }
 }
@@ -430,7 +426,7 @@ fn mean_sample_weights_equal_the_albedo() {
 }
 
 #[test]
-fn the_ends_of_all_ranges_are_numbers() {
+fn limits_of_all_ranges_give_finite_values() {
     let tiny = f32::from_bits(1);
     let directions = [
         Vec3::Z,

@@ -125,7 +125,7 @@ fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
 }
 
 #[test]
-fn white_furnaces_stay_white_or_get_darker() {
+fn principled_lobes_gain_no_energy_in_a_white_furnace() {
     for (name, material) in grid() {
         // Transmitted radiance is not scaled by the squared index.
         for wo in viewers() {
@@ -209,7 +209,7 @@ fn mean_sample_weights_equal_the_principled_albedo() {
     }
 }
 
-/// Returns Pearson's chi-square of sampled directions, over cells of equal solid angle.
+/// Returns Pearson's chi-square of sampled directions in cells of equal solid angle.
 fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 100_000;
     const HEIGHTS: usize = 24;
@@ -249,7 +249,7 @@ fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64,
 }
 
 #[test]
-fn directions_are_as_frequent_as_their_density_says() {
+fn sampled_directions_follow_their_pdf() {
     // Only lobes that the cells resolve.
     for (name, material) in grid().into_iter().filter(|(_, material)| material.roughness >= 0.4) {
         for wo in [direction(0.9, 0.4), direction(0.4, 2.5)] {
@@ -346,7 +346,7 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
             passed += sample.weight / count as f32;
         }
     }
-    // Fresnel transmittance by sines and tangents, as radiance in glass.
+    // Fresnel transmittance from sines and tangents, converted to radiance in glass.
     let (i, t) = (0.6f32.acos(), (0.8f32 / 1.5).asin());
     let share = |part: f32| 0.5 * part * part;
     let mirrored = share((i - t).sin() / (i + t).sin()) + share((i - t).tan() / (i + t).tan());

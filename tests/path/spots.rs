@@ -6,7 +6,7 @@ use super::mean;
 use crate::pictures::{both, means, render};
 use crate::scenes;
 
-/// Returns a white floor of 3 x 3 units in 16 x 16 pixels, from above.
+/// Returns a scene with a white floor of 3 x 3 units, seen from above in 16 x 16 pixels.
 fn floor(integrator: &str, light: &str) -> Packed {
     let material = match integrator {
         "path" => "type = 'diffuse', color = [1, 1, 1]",
@@ -75,7 +75,7 @@ fn a_spot_lights_a_floor_as_documented() {
 }
 
 #[test]
-fn the_widest_spot_is_a_point_and_the_narrowest_a_dot() {
+fn a_180_degree_spot_equals_a_point_light_and_a_tiny_cone_lights_almost_nothing() {
     for integrator in ["path", "phong"] {
         let of = |light: &str| {
             floor(

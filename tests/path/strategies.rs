@@ -8,11 +8,11 @@ use crate::{adapter, sources};
 
 const FILE: &str = "integrators/path.wgsl";
 
-/// Strategies by the seed of the camera: a scene needs one kernel.
+/// The seed of the camera selects the strategy, so that each scene needs only one kernel.
 const MIS: u32 = 0;
 const LIGHT: u32 = 1;
 const BSDF: u32 = 2;
-/// MIS with a wrong weight of light samples.
+/// MIS with a wrong weight for light samples.
 const WRONG: u32 = 3;
 /// Emission that the camera sees directly.
 const DIRECT: u32 = 4;
@@ -117,7 +117,7 @@ fn light_and_bsdf_sampling_agree() {
             assert_eq!(
                 packed.specialization.light_tree != 0,
                 i == number_of_many,
-                "a light tree is built over many lights"
+                "a light tree is missing or was built over few lights"
             );
             let rendered = |strategy: u32| {
                 let mut packed = packed.clone();
@@ -134,15 +134,15 @@ fn light_and_bsdf_sampling_agree() {
                 let near = |x: f64, relative: f64| (x - both[i]).abs() < relative * both[i];
                 assert!(
                     near(light[i], 1e-2),
-                    "light sampling alone: {light:?} for {both:?}\n{shape}{material}"
+                    "light sampling alone differs: {light:?} for {both:?}\n{shape}{material}"
                 );
                 assert!(
                     near(bsdf[i], 1e-2),
-                    "BSDF sampling alone: {bsdf:?} for {both:?}\n{shape}{material}"
+                    "BSDF sampling alone differs: {bsdf:?} for {both:?}\n{shape}{material}"
                 );
                 assert!(
                     !near(wrong[i], 1e-2),
-                    "the control: {wrong:?} for {both:?}\n{shape}{material}"
+                    "a wrong weight passes: {wrong:?} for {both:?}\n{shape}{material}"
                 );
             }
         }

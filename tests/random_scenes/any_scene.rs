@@ -38,7 +38,7 @@ struct OfPaths {
     alpha: bool,
 }
 
-fn surroundings() -> BoxedStrategy<EnvironmentDescription> {
+fn environment_map_or_color() -> BoxedStrategy<EnvironmentDescription> {
     let image = (
         select(AROUND),
         select(&[1.0, 0.3, 0.0][..]),
@@ -58,7 +58,7 @@ fn surroundings() -> BoxedStrategy<EnvironmentDescription> {
 
 fn of_paths() -> BoxedStrategy<OfPaths> {
     let materials = [material_of_paths(), material_of_paths(), material_of_paths()];
-    let environment = prop::option::of(surroundings());
+    let environment = prop::option::of(environment_map_or_color());
     let depths = (
         select(&[0, 1, 2, 5, 12][..]),
         prop::option::of(select(&[0, 1, 3, 1024][..])),

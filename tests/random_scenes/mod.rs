@@ -116,8 +116,8 @@ fn random_scenes_of_many_samples_are_the_same() {
     }
 }
 
-/// All scenes together are within the tolerances: plain WGSL, devices other than software Vulkan, imprecise quotients
-/// and square roots. Direct light only: after a bounce, one ulp may change the path.
+/// All scenes together are within the tolerances with plain WGSL, on devices other than software Vulkan, and with
+/// imprecise quotients and square roots. Direct light only: after a bounce, one ulp may change the path.
 #[test]
 fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     let Some(device) = adapter::device() else { return };
@@ -160,11 +160,15 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     }
     println!("random scenes: by plain WGSL {plain}; with poor quotients {poor}");
     assert!(plain.judge().is_ok(), "plain WGSL: {}", plain.judge().unwrap_err());
-    assert!(poor.judge().is_ok(), "poor quotients: {}", poor.judge().unwrap_err());
+    assert!(
+        poor.judge().is_ok(),
+        "imprecise quotients: {}",
+        poor.judge().unwrap_err()
+    );
     assert!(shifted.judge().is_err(), "the comparison cannot fail");
 }
 
-/// In a constant; the reported scene is valid.
+/// One constant in a shader is changed by one ulp. The reported scene is valid.
 #[test]
 fn random_scenes_detect_a_difference_of_one_ulp() {
     if !adapter::device().is_some_and(bit_exact) {

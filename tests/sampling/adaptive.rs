@@ -97,7 +97,8 @@ fn a_crop_is_a_part_of_the_whole() {
     }
 }
 
-/// Returns the sample count from the neighbors' pilot samples in double precision; `None` if rounding decides.
+/// Returns the sample count from the neighbors' pilot samples in double precision, or `None` if the count depends on
+/// rounding.
 fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> Option<u32> {
     let (mut squares, mut neighbors, mut deviations, mut fourth) = (0.0, 0.0, 0.0, 0.0);
     for (dx, dy) in [(0, -1), (-1, 0), (1, 0), (0, 1)] {
@@ -209,7 +210,8 @@ fn minimum_image_and_pilot_sizes() {
     assert!(counts(5, 5, 1, 17).iter().all(|n| [16, 17].contains(n)));
 }
 
-/// The arguments sum the variance, squared deviations, their squares, and pixels.
+/// The first argument holds sums over pixels: the variance, the squared deviations, their squares, and the number of
+/// pixels.
 #[test]
 fn effective_samples_limit_the_doublings() {
     let wanted = |looks: [f32; 4], error: f32, most| samples_wanted(Vec4::from(looks), 16, error * error, most);
@@ -257,7 +259,7 @@ fn moments_are_the_variance_of_the_samples() {
     }
 }
 
-/// The target error is that of the displayed value v^(1 / 2.2).
+/// The target error applies to the displayed value v^(1 / 2.2).
 #[test]
 fn errors_are_scaled_by_the_slope_of_the_displayed_value() {
     let displayed = |v: f64| v.powf(1.0 / 2.2);

@@ -34,7 +34,7 @@ fn checked(kind: PixelFilterKind, radius: f64) -> wgray::scene::PixelFilter {
     description.validate().expect("a sound scene").render.filter
 }
 
-/// Returns the integral of |x|^power times a filter of radius 1, by the midpoint rule.
+/// Returns the integral of |x|^power times a filter of radius 1, computed with the midpoint rule.
 fn moment(kind: PixelFilterKind, power: i32) -> f64 {
     let steps = 200_000;
     let filter = checked(kind, 1.0);

@@ -41,7 +41,7 @@ const SOBOL_POINTS: [[u32; 2]; 32] = [
     [17, 1],
     [1, 17],
 ];
-/// Returns the Sobol' index of scipy's point `i`, in Gray code order.
+/// Returns the Sobol' index of scipy's point `i`; scipy generates points in Gray code order.
 fn gray(i: u32) -> u32 {
     i ^ (i >> 1)
 }
@@ -159,11 +159,11 @@ fn shuffling_maps_aligned_runs_to_aligned_runs() {
 }
 
 #[test]
-fn halton_points_have_one_in_each_third_of_a_third() {
+fn aligned_runs_of_halton_points_have_one_in_each_interval() {
     for key in keys(20) {
         for digits in 1..=5u32 {
             let count = 3u32.pow(digits);
-            // An aligned run of 256 indices is shuffled to another one; takes 3^digits consecutive ones.
+            // An aligned run of 256 indices is shuffled to another run, of which 3^digits consecutive indices are used.
             let mut run: Vec<u32> = (512..768).map(|i| shuffled_index(i, key.x ^ key.y)).collect();
             run.sort_unstable();
             let mut parts: Vec<u32> = (run[..count as usize].iter())
@@ -231,7 +231,7 @@ fn star_discrepancies_keep_their_bounds() {
     let most = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
     let n = 32.0;
-    // Cell centers: 1/n - 1/(4 n^2), by the box without the last column and row.
+    // Cell centers: 1/n - 1/(4 n^2), attained by the box without the last column and row.
     let grid = star_discrepancy(
         &(0..1024)
             .map(|i| sample_square(GRID, 32, i, 0, UVec2::ZERO))
@@ -295,7 +295,7 @@ fn samples_of_pixels_and_lights_are_independent() {
             let key = sample_key(UVec2::new(pixel % 64, pixel / 64), 1, purpose);
             sample_square(pattern, 16, sample % 16, sample / 16, key)
         };
-        // Over pixels, over samples, and of adjacent pixels.
+        // Pairs of coordinates over pixels and over samples, and pairs of adjacent pixels.
         let pixels = dependence((0..4096).map(|i| (at(i, 0, 5).x, at(i, 1, 5).x)));
         let samples = dependence((0..4096).map(|i| (at(7, 0, i).x, at(7, 1, i).x)));
         let crossed = dependence((0..4096).map(|i| (at(7, 0, i).y, at(7, 2, i).x)));

@@ -202,7 +202,7 @@ fn uniform(round: u32) -> Sampling {
     Sampling { round, error: None }
 }
 
-/// Returns the RMS error of uniform sampling, by a power law between powers of two.
+/// Returns the RMS error of uniform sampling, interpolated between powers of two with a power law.
 fn error_of_uniform(make: &dyn Fn(Sampling) -> Packed, truth: &[f64], seeds: u32, samples: f64) -> f64 {
     let below = samples.log2().floor().min(8.0);
     let square = |count: f64| {
@@ -215,7 +215,7 @@ fn error_of_uniform(make: &dyn Fn(Sampling) -> Packed, truth: &[f64], seeds: u32
 }
 
 #[test]
-fn errors_are_at_most_those_of_uniform_sampling() {
+fn adaptive_errors_do_not_exceed_errors_of_uniform_sampling() {
     let seeds = 4;
     type Make = Box<dyn Fn(Sampling) -> Packed>;
     let cases: [(&str, Make); 5] = [

@@ -198,7 +198,10 @@ fn texels_in_several_buffers_give_the_same_image() {
     let (_, scene) = scenes.iter().find(|(name, _)| name == "ewa repeat").unwrap();
     let mut small = device.clone();
     small.info.largest_binding = 4096;
-    assert!(scene.textures.texels.len() > 3 * 1024, "they fit fewer buffers");
+    assert!(
+        scene.textures.texels.len() > 3 * 1024,
+        "the texels fit in fewer buffers"
+    );
     let new = |small: &Device, baked: bool| {
         let exact = device.info.exact.then_some(Rounding::Device);
         Gpu::new(small, scene, sources::shaders(), Options { exact, baked })

@@ -448,7 +448,7 @@ fn the_command_line_ends_with_exit_code_3() {
     assert_eq!(good.status.code(), Some(0), "{good:?}");
 }
 
-/// In every documented key for a texture channel.
+/// Applies to every documented key for a texture channel.
 #[test]
 fn only_images_have_an_alpha_channel() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Damaged images: a stand-in with a warning, or an error under `strict`.
+//! Damaged images are replaced with a warning, or rejected with `strict`.
 
 use std::path::Path;
 
@@ -55,7 +55,7 @@ fn an_unreadable_image_is_replaced_by_its_factor() {
     ] {
         let text = MATERIAL.replace("FILE", file);
         let scene = load(folder.path(), &text, false).unwrap();
-        assert_eq!(scene.notes.len(), 1, "once for each file: {:?}", scene.notes);
+        assert_eq!(scene.notes.len(), 1, "not one message for each file: {:?}", scene.notes);
         let note = &scene.notes[0];
         assert!(note.message.starts_with(&format!("{file:?} {why}")), "{note}");
         assert!(

@@ -86,7 +86,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
 }
 
 #[test]
-fn cached_weights_equal_those_of_the_reference() {
+fn cached_weights_equal_the_reference_weights() {
     let bits = |color: Vec3| color.to_array().map(f32::to_bits);
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -277,7 +277,8 @@ fn ewa_keeps_detail_across_a_long_footprint() {
     assert!(contrast("trilinear") < 0.3, "{}", contrast("trilinear"));
 }
 
-/// Returns 128 x 128 gray texels for EWA and trilinear, and as a list, bottom row first.
+/// Returns a scene with 128 x 128 gray texels and EWA filtering, the scene with trilinear filtering, and the texels as
+/// a list, bottom row first.
 fn gray(folder: &Path, name: &str, texel: impl Fn(usize, usize) -> f32) -> (Packed, Packed, Vec<f64>) {
     write_exr(&folder.join(name), 128, 128, |x, y| {
         [texel(x as usize, 127 - y as usize); 3]
@@ -291,7 +292,7 @@ fn texel_at(texels: &[f64], x: i64, y: i64) -> f64 {
     texels[(y.rem_euclid(128) * 128 + x.rem_euclid(128)) as usize]
 }
 
-/// Integrates the bilinear interpolation over a parallelogram, in texels.
+/// Integrates the bilinear interpolation over a parallelogram with coordinates in texels.
 fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     let points = |edge: DVec2| (edge.length() * 1.5).ceil().max(16.0);
     let (columns, rows) = (points(dx), points(dy));
@@ -324,10 +325,10 @@ fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     sum / total
 }
 
-/// Documented: at most 1.4 times the error of EWA over the finest level, at any aspect and angle. Control: trilinear is
-/// nearly always worse.
+/// The documented bound is 1.4 times the error of EWA over the finest level, at any aspect and angle. Control: trilinear
+/// filtering is nearly always worse.
 #[test]
-fn ewa_over_the_pyramid_is_nearly_that_of_the_finest_level() {
+fn ewa_over_the_pyramid_nearly_equals_ewa_over_the_finest_level() {
     let folder = tempfile::tempdir().unwrap();
     let numbers = Random::new(21);
     let noise: Vec<f32> = (0..128 * 128).map(|_| numbers.unit() as f32).collect();
@@ -429,7 +430,7 @@ fn ewa_is_bounded_for_flat_images() {
     assert!(seconds < 20.0, "{seconds} s"); // minutes without the bound
 }
 
-/// 8-bit texels are exact: a white texel in the dark is never lost.
+/// Texels of 8-bit images are exact, and mip levels keep the mean: a white texel among dark texels is never lost.
 #[test]
 fn mip_levels_of_8_bit_images_keep_the_mean() {
     let folder = tempfile::tempdir().unwrap();
@@ -498,7 +499,7 @@ fn the_ellipse_of_a_footprint_has_its_conjugate_diameters() {
     assert!(clamped > 100);
 }
 
-/// At any distance and footprint size.
+/// The distance to the edge and the size of the footprint do not matter.
 #[test]
 fn beyond_a_clamped_edge_only_its_color_is_visible() {
     let folder = tempfile::tempdir().unwrap();
@@ -517,7 +518,10 @@ fn beyond_a_clamped_edge_only_its_color_is_visible() {
                 if wrap == "clamp" {
                     assert_eq!(far, inside, "{filter}, {size}");
                 } else {
-                    assert!(far > 0.5, "{filter}, {size}: the control is {far}");
+                    assert!(
+                        far > 0.5,
+                        "{filter}, {size}: a repeated texture is as dark as a clamped one: {far}"
+                    );
                 }
             }
         }

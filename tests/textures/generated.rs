@@ -7,7 +7,7 @@ use super::write_png;
 
 const SIDE: u32 = 512;
 
-/// Returns a texel of tiles: 64 texels wide, with dark joints and fine lines, some colored.
+/// Returns a texel of an image of tiles, which are 64 texels wide and have dark joints and fine lines, some colored.
 fn grid(x: u32, y: u32) -> [u8; 3] {
     if x % 64 < 4 || y % 64 < 4 {
         return [30, 30, 40];

@@ -47,9 +47,9 @@ fn one_channel_is_gray_whatever_its_name_and_type() {
     write(&path, &["Y"], |values| {
         FlatSamples::F16(values.into_iter().map(f16::from_f32).collect())
     });
-    assert_eq!(load(folder.path()), gray(0.0), "half precision");
+    assert_eq!(load(folder.path()), gray(0.0), "half-precision values differ");
     write(&path, &["A", "Y"], FlatSamples::F32);
-    assert_eq!(load(folder.path()), gray(2.5), "opacity is used");
+    assert_eq!(load(folder.path()), gray(2.5), "opacity has no effect");
 }
 
 #[test]

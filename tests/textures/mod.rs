@@ -31,7 +31,7 @@ pub fn scene(text: &str, folder: &Path) -> Packed {
     )
 }
 
-/// Returns the mean radiance of every pixel, row by row.
+/// Returns the mean radiance of every pixel in row-major order.
 pub fn cpu_picture(scene: &Packed) -> Vec<[f32; 3]> {
     reference(scene).means().collect()
 }

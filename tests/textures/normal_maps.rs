@@ -160,7 +160,7 @@ fn mirrors_reject_normals_that_reflect_into_the_surface() {
 /// A shading normal tilted towards a light behind the surface receives no light. Shadow rays cannot detect this, as a
 /// flat surface does not occlude its own points.
 #[test]
-fn a_bent_normal_sees_no_light_from_behind() {
+fn tilted_shading_normals_receive_no_light_from_behind() {
     let map = shapes(Vec3::new(0.9, 0.0, 0.3).normalize(), "", 1.0);
     let q = &map.primitives[0];
     let ray = Ray {

@@ -120,7 +120,7 @@ fn slanted(size: f64, aspects: &[f64], numbers: &Random) -> Footprint {
     }
 }
 
-/// Documented: 0.001 for long edges below 64 squares or 32 cells, 0.01 above.
+/// The documented error is 0.001 if the long edge is below 64 squares or 32 cells, otherwise 0.01.
 #[test]
 fn footprints_of_any_size_and_angle_have_the_exact_mean() {
     let numbers = Random::new(11);

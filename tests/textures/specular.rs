@@ -232,7 +232,7 @@ fn glass_casts_a_shadow_unless_it_is_transparent() {
     assert_eq!(floor("transparent", "type = 'mirror'"), 0.0);
 }
 
-/// After the splits, as if both were followed.
+/// After the last split, one branch is chosen at random; the mean is as if both branches were followed.
 #[test]
 fn branches_chosen_at_random_have_the_right_mean() {
     // A geometric series of reflections between the plates.

@@ -7,7 +7,7 @@ use std::mem::ManuallyDrop;
 
 use wgray::{Device, Error, Options, Scene};
 
-/// Returns the linear RGB of a scene's pixels, row by row from the top.
+/// Returns the linear RGB of a scene's pixels in row-major order, top row first.
 fn pixels(scene: &str) -> Result<Vec<f32>, Error> {
     let scene = Scene::parse(scene, "scene.toml")?;
     let options = Options {

@@ -9,14 +9,14 @@ const here = (name) => readFileSync(new URL(name, import.meta.url));
 const module = new WebAssembly.Module(readFileSync(process.env.WGRAY_WASM));
 
 // The module only imports the clock (crate web-time through wasm-bindgen). On web pages `wasm-bindgen` generates these
-// imports. A JavaScript object is a handle; those from 128 to `statics_end` are never dropped, and all stand for
+// imports. A JavaScript object is a handle. Handles from 128 to `statics_end` are never dropped; all represent
 // `performance`.
 const intrinsics = [
     [/_now_/, () => performance.now()],
     [/static_accessor|performance/, () => 1024],
     [/is_undefined/, () => 0],
     [/statics_end$/, () => 2048],
-    [/describe|_ref$|table_|spawn_poll|throw/, () => assert.fail("nothing here uses it")],
+    [/describe|_ref$|table_|spawn_poll|throw/, () => assert.fail("an unexpected import was called")],
 ];
 const imports = {};
 for (const { module: from, name } of WebAssembly.Module.imports(module)) {
@@ -36,7 +36,7 @@ function render(text) {
     return Buffer.from(exports.memory.buffer.slice(result + 4, result + 4 + 4 * count));
 }
 
-test("a scene from bytes has the pixels of the other machines", () => {
+test("a scene from bytes has the same pixels as on other machines", () => {
     const pixels = render(here("scene.toml").toString());
     assert.equal(pixels.length, 8 * 8 * 3 * 4);
     assert.ok(pixels.equals(here("pixels.f32")));
