@@ -43,8 +43,8 @@ fn display_slope_squared(value: f32) -> f32 {
     return slope * slope;
 }
 
-// Adds a sample to the pilot statistics: y sums squared deviations over samples and channels, z their squares over
-// samples.
+// Adds a sample to the pilot statistics: y sums squared deviations over samples and channels, z the squares of each
+// sample's sum.
 fn pilot_add(pilot: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     let deviation = squared_deviation(sum, sample);
     let total = deviation.x + deviation.y + deviation.z;
@@ -56,9 +56,9 @@ fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
     return vec4f(display_variance(sum, moments), pilot.y, pilot.z, 1.0);
 }
 
-// Returns a sample count from neighbors' pilot statistics over `first` samples each. Doubles it until the mean squared
-// error is small enough, as long as the variance is reliable: its effective sample size y^2 / z is 1 if a single sample
-// deviates, and the full count if half of them do.
+// Returns a sample count from neighbors' pilot statistics over `first` samples each. Doubles the count until the mean
+// squared error is small enough, as long as the variance is reliable. The effective sample size of the variance, y^2 /
+// z, is 1 if a single sample deviates, and the full count if half of the samples do.
 fn samples_wanted(pilot_sum: vec4f, first: u32, squared_error: f32, most: u32) -> u32 {
     if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
         return most;

@@ -1,6 +1,6 @@
 // Surfaces with alpha. Acceptance depends on pixel, sample, bounce and hit, not on traversal order.
 
-// Purposes of rays, with separate decisions at a surface.
+// Purposes of rays. Rays of different purposes make separate decisions at a surface.
 const RAY_BSDF: u32 = 0u;
 const RAY_SHADOW: u32 = 1u;
 
@@ -70,8 +70,8 @@ fn is_occluded_alpha(before: bool, surface: Surface, to: vec3f, t_max: f32, targ
     return true;
 }
 
-// Returns the first hit from `first` on that is opaque or whose opacity is at least its cutoff (MASK) or 0.5 (BLEND);
-// the next hit after MAX_ALPHA_SKIPS others. t is measured from the origin of `ray`.
+// Returns the first hit, starting at `first`, that is opaque or whose opacity is at least its cutoff (MASK) or 0.5
+// (BLEND). Skips at most MAX_ALPHA_SKIPS hits. t is measured from the origin of `ray`.
 fn skip_transparent(ray: Ray, first: Hit) -> Hit {
     var hit = first;
     var continued = ray;

@@ -5,7 +5,7 @@ fn load_primitive(i: u32) -> Primitive {
     return primitives[i];
 }
 
-// Returns the number of area lights, which come first (x), and of all (y).
+// Returns the number of area lights, which come first (x), and of all lights (y).
 fn light_counts() -> vec2u {
     return counts.lights;
 }
@@ -19,7 +19,7 @@ fn closest_of(kind: u32, before: Hit, ray: Ray, origin_prim: u32, inside_prim: u
     return hit;
 }
 
-// Returns true if `before`, or if a primitive except `target_prim` occludes the segment to `t_max * to`.
+// Returns true if `before` is true, or if a primitive except `target_prim` occludes the segment to `t_max * to`.
 fn is_occluded_by(kind: u32, before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let range = counts.primitives[kind];
     var occluded = before;

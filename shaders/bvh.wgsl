@@ -1,8 +1,8 @@
 // Traversal of the BVHs over items (mesh instances and standalone primitives) and over mesh triangles. Hits do not
 // depend on the BVHs (docs/decisions/trees.md).
 
-// Pending children of a node, per level. x: first child node; y: bits 0 to 7 mark slots of nodes, bits 8 to 15 pending
-// ones, in visiting order.
+// Pending children of a node, per level. x: first child node; y: bits 0 to 7 mark slots of nodes, bits 8 to 15 mark
+// pending slots, in visiting order.
 struct TraversalStack {
     octant: u32,
     depth: u32,
@@ -92,7 +92,7 @@ fn standalone_hit(kind: u32, i: u32, ray: Ray, near: f32, origin_prim: vec2u, in
     return Hit(select(INFINITE_T, t, i != standalone_prim(origin_prim)), 0u, i, 0u, vec2f(0.0));
 }
 
-// Returns an upper bound of the distance beyond `start` of hits nearer than t.
+// Returns an upper bound of the distance from `start` to hits nearer than t.
 fn remaining_t_max(start: f32, t: f32) -> f32 {
     return (t - start) + t * 4.7683716e-7;
 }
@@ -144,7 +144,7 @@ fn children_hit_by_pair(node: Node, pair: RayPair, occluded: u32, t_max: f32) ->
         | children_hit(node, pair.s[1], select(t_max, -1.0, (occluded & 2u) != 0u));
 }
 
-// Returns the mask of a block's samples that items occlude, or with bits in `before`.
+// Returns the mask of a block's samples that items occlude, or that are set in `before`.
 fn occluded_by_bvh(before: u32, surface: Surface, light: Light, block: SampleBlock) -> u32 {
     let all = select((1u << block.count) - 1u, 0xffffffffu, block.count >= 32u);
     var bits = before & all;
@@ -218,8 +218,8 @@ fn occluded_by_item(item: BvhItem, may: u32, surface: Surface, light: Light, blo
     return bits;
 }
 
-// Returns the samples in the mask `may` that instance `number` occludes, except the surface's own triangle. Other bits
-// are set too.
+// Returns the samples in the mask `may` that instance `number` occludes, except the surface's own triangle. Bits
+// outside of `may` are set, too.
 fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: SampleBlock, samples: vec2u) -> u32 {
     let i = load_instance(number);
     let origin = point_to_mesh(i, surface.ray_origin);
@@ -255,7 +255,7 @@ fn occluded_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block
     return occluded;
 }
 
-// Returns true if `before`, or if any item except `target_prim` occludes the segment to `t_max` times `to`.
+// Returns true if `before` is true, or if any item except `target_prim` occludes the segment to `t_max` times `to`.
 fn is_occluded_by_bvh(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     var occluded = before;
     let s = slabs(surface.ray_origin, to, item_pad(surface.ray_origin));

@@ -75,14 +75,14 @@ fn four_in_interval(node: Node, low: vec3u, high: vec3u, f: RayInterval, limit: 
     return hit_bits(larger(larger(near_x, near_y), near_z), smaller(smaller(far_x, far_y), far_z), limit);
 }
 
-// Returns the largest t of leaving a box along an axis.
+// Returns the largest t at which a ray leaves a box along an axis.
 fn far_side(low: vec4f, high: vec4f, far_low: f32, far_high: f32) -> vec4f {
     let none = (far_low == 0.0) & (far_high == 0.0);
     return select(low * far_low + high * far_high, vec4f(INFINITE_T), none);
 }
 
-// Permutes the bits of slots to visiting order: bit i becomes that of slot i ^ octant. Bit k is set in an octant for a
-// negative direction along axis k, in a slot for a box on the upper side.
+// Permutes the bits of slots to visiting order: bit i becomes the bit of slot i ^ octant. Bit k is set in an octant for
+// a negative direction along axis k, in a slot for a box on the upper side.
 fn in_order(bits: u32, octant: u32) -> u32 {
     let by_x = select(bits, ((bits & 0x55u) << 1u) | ((bits >> 1u) & 0x55u), (octant & 1u) != 0u);
     let by_y = select(by_x, ((by_x & 0x33u) << 2u) | ((by_x >> 2u) & 0x33u), (octant & 2u) != 0u);
@@ -93,7 +93,7 @@ fn octant_of(direction: vec3f) -> u32 {
     return select(0u, 1u, direction.x < 0.0) | select(0u, 2u, direction.y < 0.0) | select(0u, 4u, direction.z < 0.0);
 }
 
-// Returns the first item and their number, 0 for an empty slot.
+// Returns the first item and the number of items, which is 0 for an empty slot.
 fn leaf_items(node: Node, slot: u32) -> vec2u {
     let word = select(node.leaves.x, node.leaves.y, slot >= 4u);
     let leaf = (word >> (8u * (slot & 3u))) & 0xffu;

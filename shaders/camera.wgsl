@@ -1,6 +1,6 @@
 // Camera rays (perspective, orthographic) and their differentials.
 
-// Returns the ray through `at`, in pixels from the top left.
+// Returns the ray through `at`, in pixels from the top left corner.
 fn camera_ray(camera: Camera, at: vec2f) -> Ray {
     let offset = image_plane_offset(camera, at);
     if camera.projection == ORTHOGRAPHIC {

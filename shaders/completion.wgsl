@@ -1,14 +1,15 @@
 // Detection of truncated loops. Mesa 22.3's lavapipe ends every loop of an invocation after its first iteration once
-// all have run 65,535 iterations, without an error. A final loop of unpredictable length detects this. The host repeats
-// a truncated dispatch with fewer samples.
+// all loops together have run 65,535 iterations, without an error. A final loop of unpredictable length detects this.
+// The host repeats a truncated dispatch with fewer samples.
 
 struct Completion {
     groups_done: atomic<u32>, // number of workgroups that ended
     truncated: atomic<u32>,   // 1 if a loop of any pixel was truncated
 }
 
-// Reports the end of a pixel, after all loops of a kernel. `index` is the pixel's in its workgroup, for which the first
-// invocation reports, since an atomic addition per pixel takes 3 % of a render on lavapipe.
+// Reports the end of a pixel, after all loops of a kernel. `index` is the index of the pixel in its workgroup. The
+// first invocation reports for the whole workgroup, since an atomic addition per pixel takes 3 % of a render on
+// lavapipe.
 fn report_completion(index: u32) {
     var rounds = 0u;
     for (var i = params.loop_probe.x; i < params.loop_probe.y; i++) {

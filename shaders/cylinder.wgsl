@@ -1,5 +1,5 @@
-// The capped cylinder: the surface of x^2 + y^2 <= 1, |z| <= 1 in local space, whose axes are perpendicular, those of x
-// and y of equal lengths.
+// The capped cylinder: the surface of x^2 + y^2 <= 1, |z| <= 1 in local space. The axes are perpendicular, and the x
+// and y axes have equal lengths.
 
 // Returns the levels of a local point, x^2 + y^2 - 1 and |z| - 1, both negative inside; `from_anchor` as in
 // `ellipsoid_level`.
@@ -16,7 +16,7 @@ fn levels_on_surface(levels: vec2f, on: f32) -> vec2f {
     return vec2f(select(min(levels.x, on), on, on_side), select(on, min(levels.y, on), on_side));
 }
 
-// Returns the interval of s, from x to y, where o + s d is inside; empty unless x < y. `levels` are those of o.
+// Returns the interval of s, from x to y, where o + s d is inside; empty unless x < y. `levels` are the levels of o.
 fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
     // Side, with `ellipsoid_discriminant` in two dimensions.
     let a = d.x * d.x + d.y * d.y;

@@ -6,13 +6,13 @@ fn transmittance(absorption: vec3f, distance: f32) -> vec3f {
     return vec3f(exp2(d.x), exp2(d.y), exp2(d.z));
 }
 
-// Returns the index of refraction on the viewer's side relative to that behind.
+// Returns the index of refraction on the viewer's side relative to the index behind the surface.
 fn eta_of(surface: Surface, material: Material) -> f32 {
     return select(material.ior, 1.0 / material.ior, surface.side > 0.0);
 }
 
 // Returns true if refraction leads through the surface, or on total internal reflection. Mapped and interpolated
-// normals can bend it back to the viewer's side, where the path would count as inside.
+// normals can bend the refracted ray back to the viewer's side, where the path would count as inside.
 fn refracts_inwards(surface: Surface, material: Material, normal: vec3f) -> bool {
     let eta = eta_of(surface, material);
     let cosine_i = max(dot(surface.wo, normal), 1e-6);

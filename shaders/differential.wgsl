@@ -1,5 +1,5 @@
-// Ray differentials: derivatives by image coordinates. Igehy, "Tracing Ray Differentials", SIGGRAPH 1999; sections are
-// those of that paper.
+// Ray differentials: derivatives by image coordinates. Igehy, "Tracing Ray Differentials", SIGGRAPH 1999; section
+// numbers refer to that paper.
 
 // Derivative by one image coordinate, times the sample spacing.
 struct Derivative {
@@ -19,7 +19,8 @@ fn transferred(derivative: Derivative, ray: Ray, t: f32, normal: vec3f) -> Deriv
     return Derivative(moved - ray.direction * dt, derivative.direction);
 }
 
-// Returns the derivative of the outward unit normal for that of the position, `dp` (section 3.2). The gradient of |M (P
+// Returns the derivative of the outward unit normal, given the derivative of the position, `dp` (section 3.2). The
+// gradient of |M (P
 // - c)|^2 / 2 is g = M^T M (P - c), on a cylinder's side without the third row of M; with N = g / |g|, dN = (dg - N (N
 // . dg)) / |g|.
 fn normal_derivative(q: Primitive, local: vec3f, dp: vec3f) -> vec3f {

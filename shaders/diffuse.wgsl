@@ -34,7 +34,7 @@ fn rough_diffuse_eval(material: Material, angles: Angles) -> vec3f {
     return (color * single + multiple) * (wi * 0.31830988618379067);
 }
 
-// Returns G / pi there: the growth of the single-scattering albedo with roughness.
+// Returns G / pi of that paper: the growth of the single-scattering albedo with roughness.
 fn rough_share(cosine: f32) -> f32 {
     let s = sqrt(max(1.0 - cosine * cosine, 0.0));
     let angle = atan2(s, cosine);

@@ -6,8 +6,8 @@ fn ellipsoid_level(q: Primitive, from_anchor: vec3f) -> f32 {
     return dot(from_anchor, from_anchor - q.middle * 2.0) + q.level;
 }
 
-// Returns the quarter discriminant of |o + s d|^2 = 1, in two equal forms (Lagrange): (o.d)^2 - d.d start with start =
-// |o|^2 - 1, precise near the surface, and d.d - |o x d|^2, precise far from it.
+// Returns the quarter discriminant of |o + s d|^2 = 1, from two equal forms (Lagrange's identity). (o.d)^2 - d.d start,
+// where start = |o|^2 - 1, is precise near the surface; d.d - |o x d|^2 is precise far from the surface.
 fn ellipsoid_discriminant(o: vec3f, d: vec3f, start: f32) -> f32 {
     let a = dot(d, d);
     let b = dot(o, d);

@@ -148,7 +148,8 @@ fn emission_at(material: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> v
     return emission;
 }
 
-// Returns the pdf of `sample_emitter` for a hit, per solid angle; `density` is per area. Both include the selection.
+// Returns the pdf of `sample_emitter` for a hit, per solid angle; `density` is per area. Both pdfs include the
+// selection probability.
 fn emitter_pdf(prim: HitPrimitive, hit: Hit, density: f32, ray: Ray, normal: vec3f) -> f32 {
     if (EMITTER_KINDS & (1u << ELLIPSOID)) != 0u {
         if prim.primitive.kind == ELLIPSOID {

@@ -1,8 +1,8 @@
 // The environment map and its importance sampling by radiance and clamped cosine.
 //
-// The map is divided into at most 32 x 32 blocks of cells. A block is chosen by its irradiance on a surface, from
-// cumulative distributions for 290 bins of normals; a cell in it by radiance. So pdfs are exact, and a pixel's samples
-// stay stratified over blocks.
+// The map is divided into at most 32 x 32 blocks of cells. A block is chosen in proportion to its irradiance on a
+// surface, from cumulative distributions for 290 bins of normals; a cell of the block is chosen in proportion to its
+// radiance. Thus pdfs are exact, and a pixel's samples stay stratified over blocks.
 
 struct EnvironmentEval {
     radiance: vec3f,
@@ -25,13 +25,14 @@ fn environment_float(at: u32) -> f32 {
     return bitcast<f32>(texel_word(at));
 }
 
-// Returns the offset of the rows' distribution for a normal; the blocks' follow.
+// Returns the offset of the distribution of rows for a normal; the distributions of blocks follow.
 fn block_distributions(normal: vec3f) -> u32 {
     let rows = (environment.height >> (environment.shifts >> 8u)) + 1u;
     return environment.blocks + rows * ENVIRONMENT_BLOCKS + normal_bin(normal) * (rows + 1u) * (ENVIRONMENT_BLOCKS + 1u);
 }
 
-// Finds the interval that holds u among 32, empty ones last. `digits` extends u's 24 binary digits.
+// Finds the interval that contains u among 32 intervals, of which empty ones come last. `digits` extends u's 24 binary
+// digits.
 fn interval_at(distribution: u32, u: f32, digits: f32) -> Interval {
     var at = distribution;
     at += select(0u, 16u, u >= environment_float(at + 16u));
@@ -71,7 +72,8 @@ fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     return EnvironmentEval(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
 }
 
-// Returns the weighted radiance of a ray that leaves the scene; `pdf` is the ray's, `normal` its surface's.
+// Returns the weighted radiance of a ray that leaves the scene; `pdf` is the pdf of the ray, `normal` the normal of the
+// surface that it left.
 fn environment_mis(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
     let eval = environment_eval(direction, normal);
     return eval.radiance * select(1.0, power_heuristic(pdf, eval.pdf), pdf > 0.0);

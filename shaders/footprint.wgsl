@@ -39,8 +39,8 @@ struct Ellipse {
     minor: f32,
 }
 
-// Returns the ellipse with conjugate semi-axes dx and dy, the minor one at least 1 / `anisotropy` of the major one. The
-// eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
+// Returns the ellipse with conjugate semi-axes dx and dy. Its minor semi-axis is at least 1 / `anisotropy` of the major
+// semi-axis. The eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
 fn footprint_ellipse(dx: vec2f, dy: vec2f, anisotropy: f32) -> Ellipse {
     let p = dx.x * dx.x + dy.x * dy.x;
     let q = dx.x * dx.y + dy.x * dy.y;

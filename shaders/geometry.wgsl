@@ -10,7 +10,7 @@ fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
 }
 
 // Returns the mask of occluded samples. The surface's own primitive does not occlude samples above it, unless it is a
-// solid seen from inside. Samples in `unlit` are not tested against the BVH; their bits have no meaning.
+// solid seen from inside. Samples in `unlit` are not tested against the BVH; the bits of these samples have no meaning.
 fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u32) -> u32 {
     let bits = occluded_by_primitives(surface, light, block);
     if TLAS_KINDS == 0u {
@@ -19,8 +19,8 @@ fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u
     return occluded_by_bvh(bits | unlit, surface, light, block);
 }
 
-// Returns true if `before`, or if a primitive except `target_prim` occludes the segment to `t_max * to`. The surface's
-// own primitive counts as in `occluded_samples`.
+// Returns true if `before` is true, or if a primitive except `target_prim` occludes the segment to `t_max * to`. The
+// surface's own primitive counts as in `occluded_samples`.
 fn is_occluded(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let occluded = is_occluded_by_primitives(before, surface, to, t_max, target_prim);
     if TLAS_KINDS == 0u {

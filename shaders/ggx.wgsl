@@ -25,7 +25,7 @@ fn ggx_g1(alpha: vec2f, w: vec3f) -> f32 {
     return 2.0 * cosine / max(cosine + ggx_length(alpha, w), 1e-30);
 }
 
-// Returns height-correlated masking-shadowing: equation 99 there.
+// Returns height-correlated masking-shadowing: equation 99 of the same paper.
 fn ggx_g2(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     let o = abs(wo.z);
     let i = abs(wi.z);
@@ -53,8 +53,8 @@ fn ggx_albedo(alpha: f32, mu: f32) -> vec2f {
     return ggx_albedo_fit(alpha, mu / length, length);
 }
 
-// Approximates the albedo for two alpha: masking by that along w, shadowing by the root mean square. Within 7 % where
-// one is 1 and the other small, else within 2 %.
+// Approximates the albedo for two different alphas: masking uses the alpha along w, shadowing the root mean square.
+// Within 7 % where one is 1 and the other small, else within 2 %.
 fn ggx_albedo_along(alpha: vec2f, w: vec3f) -> vec2f {
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
     let length = sqrt(square * (1.0 - w.z * w.z) + w.z * w.z);

@@ -90,7 +90,7 @@ pub static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
 pub static TEXELS: &[File] = files!["texels.wgsl"];
 /// Accumulates samples.
 pub static RENDER_FILE: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
-/// Accumulates samples under adaptive sampling.
+/// Accumulates samples with adaptive sampling.
 pub static ADAPTIVE_FILE: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
 /// Writes first hits.
 pub static FIRST_HITS_FILE: &[File] = files!["kernels/first_hits.wgsl"];
@@ -116,7 +116,7 @@ pub fn hash() -> String {
     hash_of(built_in())
 }
 
-/// Lengths precede names and texts, so that no two lists of files have the same bytes.
+/// Lengths precede names and texts, so that different lists of files never hash the same bytes.
 fn hash_of<T: AsRef<str>>(files: impl Iterator<Item = (&'static str, T)>) -> String {
     let mut hasher = blake3::Hasher::new();
     for (name, text) in files {
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_hash_is_that_of_the_files_on_disk() {
+    fn the_hash_matches_the_files_on_disk() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
         let hash_with = |suffix: &str| {
             let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap() + suffix;

@@ -20,8 +20,8 @@ fn segment(to: LightSegments, at: vec2f) -> vec3f {
     return to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0);
 }
 
-// Returns a spot light's relative intensity, `to` being the vector to it: a squared ramp in the cosine, as in glTF's
-// KHR_lights_punctual. The difference of unit vectors gives 1 - cosine with the digits of small angles.
+// Returns a spot light's relative intensity: a squared ramp in the cosine, as in glTF's KHR_lights_punctual. `to` is
+// the vector to the light. The difference of unit vectors gives 1 - cosine with the digits of small angles.
 fn spot_falloff(light: Light, to: vec3f) -> f32 {
     let away = normalize(to) + light.normal;
     let ramp = (light.cone - 0.5 * dot(away, away)) * light.falloff;

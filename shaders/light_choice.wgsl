@@ -5,8 +5,8 @@ struct EmitterSelection {
     density: f32,          // pdf per area, including the selection; 0 if the light tree did not select
 }
 
-// Returns `emitter`, or what the light tree selects at p if that stands for the tree. n is as in `light_importances`.
-// Each pair of levels uses a two-dimensional point set over the pixel's samples.
+// Returns `emitter`; if it stands for the light tree, the emitter that the tree selects at p. n is as in
+// `light_importances`. Each pair of levels uses a two-dimensional point set over the pixel's samples.
 fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -> EmitterSelection {
     var chosen = EmitterSelection(emitter, 0.0);
     if emitter.index != NO_INDEX {
@@ -37,7 +37,8 @@ fn light_tree_select(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u
     return chosen;
 }
 
-// Returns the pdf per area of sampling a hit by `light_tree_select` at p; 0 if not `wanted` or not in the tree.
+// Returns the pdf per area of sampling a hit by `light_tree_select` at p; 0 if `wanted` is false or the hit is not in
+// the tree.
 fn light_tree_pdf(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     var at = NO_INDEX;
     if wanted {

@@ -6,7 +6,8 @@ fn solid_angle_pdf(density: f32, to: vec3f, normal: vec3f) -> f32 {
     return density * d2 * sqrt(d2) / abs(dot(normal, to));
 }
 
-// Returns an ellipsoid's area within a sixth, exact for spheres: the root mean square of the local area scale.
+// Returns an ellipsoid's area with a relative error of at most a sixth, exact for spheres: the root mean square of the
+// local area scale.
 fn ellipsoid_area(q: Primitive) -> f32 {
     return 7.255197456936871 * sqrt(dot(q.x, q.x) + dot(q.y, q.y) + dot(q.z, q.z)) / abs(q.determinant);
 }
@@ -47,7 +48,7 @@ struct CylinderPart {
     middle: vec2f,         // unit vector to the arc's middle
     side: f32,             // area
     end: f32,              // 1 if the end cap faces the point, else 0
-    start: f32,            // the same for the start cap
+    start: f32,            // 1 if the start cap faces the point, else 0
 }
 
 // A vector to a cylinder, and the normal there.
@@ -56,7 +57,8 @@ struct CylinderPoint {
     normal: vec3f,
 }
 
-// Returns the part that faces a point: an arc of the side from beside, a cap from beyond it, everything from inside.
+// Returns the part that faces a point: an arc of the side if the point is beside the cylinder, a cap if the point is
+// beyond the cap, everything if the point is inside.
 fn cylinder_part(q: Primitive, o: vec3f, levels: vec2f) -> CylinderPart {
     let inside = (levels.x <= 0.0) & (levels.y <= 0.0);
     let r2 = o.x * o.x + o.y * o.y;

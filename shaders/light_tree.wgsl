@@ -6,11 +6,11 @@ fn mean_above(m: vec4f, r: vec4f) -> vec4f {
     return select(max4(m, vec4f(0.0)), 0.25 * (m + r) * ((m + r) / r), abs(m) < r);
 }
 
-// Returns the importances of the children for p, up to a factor: section 4.1, where each cosine is the mean height,
-// over the bounding sphere, above the plane of emitter or surface, divided by the distance. It is at least 0.03 of the
-// radius, since spheres are wider than their contents. A tenth of the squared radius is added to the squared distance.
-// n is the surface normal, or 0 if light may arrive from both sides. Importances are positive where light can arrive,
-// with a margin for rounding.
+// Returns the importances of the children for p, up to a factor: section 4.1, where each cosine is the mean height of
+// the bounding sphere above the plane of emitter or surface, divided by the distance. The mean height is at least 0.03
+// of the radius, since spheres are wider than their contents. A tenth of the squared radius is added to the squared
+// distance. n is the surface normal, or 0 if light may arrive from both sides. Importances are positive where light can
+// arrive, with a margin for rounding.
 fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
     let x = node.x - p.x;
     let y = node.y - p.y;
@@ -34,8 +34,8 @@ fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
     return select(vec4f(0.0), max4(value, vec4f(1e-36)), arrives);
 }
 
-// Returns probabilities proportional to the importances; (1, 0, 0, 0) if all are 0. Positive ones count as at least
-// 2^-12 of the sum, well above the resolution of random numbers.
+// Returns probabilities proportional to the importances; (1, 0, 0, 0) if all are 0. Positive importances count as at
+// least 2^-12 of the sum, well above the resolution of random numbers.
 fn light_shares(importances: vec4f) -> vec4f {
     let sum = (importances.x + importances.y) + (importances.z + importances.w);
     let least = select(vec4f(0.0), max4(importances, vec4f(sum * 0.00024414063)), importances > vec4f(0.0));

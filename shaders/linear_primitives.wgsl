@@ -1,7 +1,7 @@
 // Shadow rays against primitives outside of the BVH. Only candidates of a cheap test are intersected, in a loop:
 // software Vulkan cannot skip a branch, but leaves a loop once no lane needs it.
 
-// Returns the mask of samples that primitives of a kind, `range.x` to before `range.y`, occlude.
+// Returns the mask of samples that primitives of a kind, from `range.x` up to but not including `range.y`, occlude.
 fn occluded_by(kind: u32, range: vec2u, surface: Surface, frustum: ShadowFrustum, light: Light, block: SampleBlock) -> u32 {
     var bits = 0u;
     for (var first = range.x; first < range.y; first += 32u) {
@@ -17,7 +17,7 @@ fn occluded_by(kind: u32, range: vec2u, surface: Surface, frustum: ShadowFrustum
     return bits;
 }
 
-// Returns true if primitive i, q, occludes the segment to `t_max` times `to`.
+// Returns true if primitive q, with index i, occludes the segment to `t_max` times `to`.
 fn is_occluded_by_primitive(kind: u32, q: Primitive, i: u32, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
     let is_inside = i == standalone_prim(surface.exclude_back);
     return (i != standalone_prim(surface.exclude_front)) & (i != target_prim) & occludes_segment(kind, q, surface.ray_origin, is_inside, to, t_max);

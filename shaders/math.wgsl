@@ -26,7 +26,7 @@ fn min(a: f32, b: f32) -> f32 {
     return select(b, a, a < b);
 }
 
-// Returns x, but 0 for -0. Operates on bits, since Mesa ignores the sign of zero: it simplifies x + 0 to x, and a
+// Returns x, but 0 for -0. Operates on bits, since Mesa ignores the sign of zero: Mesa simplifies x + 0 to x, and a
 // selection of -1 or 0 to a negated boolean.
 fn positive_zero(x: f32) -> f32 {
     let bits = bitcast<u32>(x);

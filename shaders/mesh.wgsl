@@ -127,7 +127,8 @@ fn face_surface(face: HitPrimitive, prim_id: vec2u, b: vec2f, d: vec3f, epsilon:
     let normal = q.z * side;
     let edge = max(max(largest(face.edge_1), largest(face.edge_2)), largest(face.edge_2 - face.edge_1));
     let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition_number);
-    // The part towards the viewer moves the origin of a hit on an edge in front of the other faces there, too.
+    // The component towards the viewer moves the origin of a hit on an edge in front of the other faces at that edge,
+    // too.
     let start = position + (normal - d) * (epsilon * size);
     let tangents = face_frame(face, b);
     let smooth_normal = face_normal(face, b) * side;
@@ -144,7 +145,8 @@ fn color_between(c0: vec4f, c1: vec4f, c2: vec4f, b: vec2f) -> vec4f {
     return max4(c0 + (c1 - c0) * b.x + (c2 - c0) * b.y, vec4f(0.0));
 }
 
-// Returns the interpolated unit normal on the triangle's outer side; the geometric normal without vertex normals.
+// Returns the interpolated unit normal on the triangle's outer side; the geometric normal if the mesh has no vertex
+// normals.
 fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let length2 = dot(n, n);
@@ -152,7 +154,7 @@ fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     return select(face.primitive.z, flipped_to(unit, face.primitive.z), length2 > 1e-12);
 }
 
-// Returns v or -v, towards `side`: normals in files may be on either side.
+// Returns v or -v, whichever points towards `side`: normals in files may be on either side.
 fn flipped_to(v: vec3f, side: vec3f) -> vec3f {
     return v * select(1.0, -1.0, dot(v, side) < 0.0);
 }
@@ -175,8 +177,8 @@ fn lift(n: vec3f, from_vertex: vec3f, up: vec3f) -> vec3f {
     return n * select(0.0, max(-dot(n, from_vertex), 0.0), dot(n, up) > 0.8);
 }
 
-// Returns true unless the triangle itself occludes the origin of shadow rays from `to`. Light from behind may pass its
-// edges, up to the terminator offset.
+// Returns false if the triangle itself occludes light from `to` at the origin of shadow rays. Light from behind may
+// pass the triangle's edges, up to the terminator offset.
 fn face_direction_allowed(face: HitPrimitive, surface: Surface, to: vec3f) -> bool {
     let fall = -dot(surface.normal, to);
     let height = dot(surface.normal, surface.terminator_offset);
@@ -185,7 +187,8 @@ fn face_direction_allowed(face: HitPrimitive, surface: Surface, to: vec3f) -> bo
     return (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0);
 }
 
-// Returns the derivatives by u and v; other vectors in the triangle's plane if its texture coordinates are degenerate.
+// Returns the derivatives by u and v; arbitrary vectors in the triangle's plane if the texture coordinates are
+// degenerate.
 fn face_tangents(face: HitPrimitive) -> Tangents {
     let a = face.uv_1 - face.uv_0;
     let b = face.uv_2 - face.uv_0;
@@ -197,7 +200,8 @@ fn face_tangents(face: HitPrimitive) -> Tangents {
     return Tangents(select(face.edge_1, u, whole), select(cross(face.primitive.z, face.edge_1), v, whole));
 }
 
-// Returns the interpolated vertex tangents, continuous across edges; `face_tangents` without them.
+// Returns the interpolated vertex tangents, continuous across edges; `face_tangents` if the mesh has no vertex
+// tangents.
 fn face_frame(face: HitPrimitive, b: vec2f) -> Tangents {
     let a = 1.0 - b.x - b.y;
     let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;

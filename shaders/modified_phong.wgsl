@@ -1,4 +1,4 @@
-// The material `phong` under the integrator `path`: the modified model of Lafortune and Willems, "Using the Modified
+// The material `phong` with the integrator `path`: the modified model of Lafortune and Willems, "Using the Modified
 // Phong Reflectance Model for Physically Based Rendering", report CW 197, Leuven, 1994.
 
 // Reflectances, scaled down to a sum of at most 1.
@@ -37,7 +37,7 @@ fn modified_phong_pdf(material: Material, angles: Angles) -> f32 {
     return diffuse_pdf(angles) * share + specular * (1.0 - share);
 }
 
-// Samples a direction, maybe below the surface. `random` in [0, 1) selects the term.
+// Samples a direction, which may be below the surface. `random` in [0, 1) selects the term.
 fn modified_phong_sample(material: Material, normal: vec3f, wo: vec3f, u: vec2f, random: f32) -> vec3f {
     if random < phong_factors(material).diffuse_share {
         return diffuse_sample(normal, u);

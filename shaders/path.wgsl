@@ -7,7 +7,7 @@ struct Path {
     depth: u32,            // number of bounces
     branch: u32,           // bit i is set for the reflection at the split of bounce i
     origin_prim: vec2u,    // instance and primitive that the ray cannot hit again, else NO_PRIMITIVE
-    inside_prim: vec2u,    // solid that it starts on and passes through, likewise
+    inside_prim: vec2u,    // solid that the ray starts on and passes through, else NO_PRIMITIVE
 }
 
 struct SpecularSplit {
@@ -31,13 +31,13 @@ fn usable_normal(surface: Surface, normal: vec3f) -> vec3f {
     return select(own, normal, is_usable(surface, normal));
 }
 
-// Returns true if a normal faces the viewer and reflects to that side of the surface.
+// Returns true if a normal faces the viewer and reflects to the viewer's side of the surface.
 fn is_usable(surface: Surface, normal: vec3f) -> bool {
     let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
     return outward & (dot(surface.wo, normal) > 0.0);
 }
 
-// Returns both branches at first, later the one that `random` in [0, 1) selects.
+// Returns both branches at the first bounces, later the branch that `random` in [0, 1) selects.
 fn glass_path(path: Path, surface: Surface, at: HitDifferential, material: Material, random: f32) -> SpecularSplit {
     let eta = select(material.ior, 1.0 / material.ior, surface.side > 0.0);
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);

@@ -17,8 +17,8 @@ fn phong_lobes(surface: Surface, material: Material, to: vec3f, exponent_bits: u
     return Lobes(select(0.0, n_l * inverse_length, lit), select(0.0, r_v_power, lit));
 }
 
-// Returns true if `to` is in front of both the shading normal and the smooth normal. A mesh's geometric normal does not
-// count: its triangles would show at the terminator.
+// Returns true if `to` is in front of both the shading normal and the smooth normal. The geometric normal of a mesh is
+// ignored: with it, the triangles would be visible at the terminator.
 fn is_lit(surface: Surface, to: vec3f) -> bool {
     return (dot(surface.shading_normal, to) > 0.0) & (dot(surface.smooth_normal, to) > 0.0);
 }

@@ -40,7 +40,7 @@ struct Layers {
     normal: vec4f,         // outward shading normal of the first hit
 }
 
-// Returns the differential through the lens center, by image position.
+// Returns the differential of the ray through the lens center with respect to the image position.
 fn differential_at(raster: vec2f) -> Differential {
     if DIFFERENTIALS == 0u {
         return Differential();

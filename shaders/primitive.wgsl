@@ -62,7 +62,7 @@ fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, inside_prim: bool) 
 }
 
 // Returns the world-space gradient, at a local point, of a function that is 0 on the primitive: z, (x^2 + y^2 + z^2 -
-// 1) / 2, or that of a cylinder.
+// 1) / 2, or the function of a cylinder.
 fn primitive_gradient(q: Primitive, local: vec3f) -> vec3f {
     let solid = solid_gradient(q.kind, local);
     let gradient = q.x * solid.x + q.y * solid.y + q.z * solid.z;
@@ -130,7 +130,7 @@ struct Tangents {
     v: vec3f,
 }
 
-// Returns a local point's tangents, at the poles of an ellipsoid along the nearest meridian.
+// Returns the tangents at a local point. At the poles of an ellipsoid, they follow the nearest meridian.
 fn local_tangents(q: Primitive, local: vec3f) -> Tangents {
     if q.kind == ELLIPSOID {
         let r = sqrt(max(local.x * local.x + local.y * local.y, 1e-12));

@@ -2,33 +2,33 @@
 // Specification", 2021, appendix B; KHR_materials_anisotropy, _clearcoat, _ior, _sheen, _specular, _transmission,
 // _volume). Clearcoat lies over sheen, and sheen over metal or a dielectric, diffuse or transmissive. Metal and the
 // diffuse base are two-sided. A layer attenuates those below by its albedo towards the viewer, which conserves energy.
-// Transmission is that of `dielectric`. In the local frame, z is the shading normal on the viewer's side, x the
+// Transmission works as in `dielectric`. In the local frame, z is the shading normal on the viewer's side, x the
 // tangent.
 
 // The lobes as seen from one direction.
 struct PrincipledLobes {
     diffuse: vec3f,        // albedo of the diffuse base
     alpha: vec2f,          // of the specular lobe, along x and y
-    f0: vec3f,             // its reflectance at normal incidence, with multiple scattering
-    f90: vec3f,            // the same at grazing angles
+    f0: vec3f,             // reflectance of the specular lobe at normal incidence, with multiple scattering
+    f90: vec3f,            // reflectance of the specular lobe at grazing angles, with multiple scattering
     glass: f32,            // weight of glass, with multiple scattering
-    transmission_tint: vec3f, // the same for transmitted light
+    transmission_tint: vec3f, // weight of glass for transmitted light, with multiple scattering
     glass_f0: vec3f,       // reflectance of glass at normal incidence
-    glass_f90: f32,        // the same at grazing angles
+    glass_f90: f32,        // reflectance of glass at grazing angles
     f0_ior: f32,           // reflectance by the index alone, at normal incidence
-    ratio: f32,            // of the indices before and behind the surface, thin or not
-    eta: f32,              // the same for refraction: 1 if thin
+    ratio: f32,            // ratio of the indices before and behind the surface, thin or not
+    eta: f32,              // ratio of the indices for refraction: 1 if thin
     thin: bool,            // transmission keeps the direction
     coat: f32,             // weight of the clearcoat lobe
     coat_alpha: f32,
     coat_normal: vec3f,
     sheen: vec3f,          // weight of the sheen lobe
     sheen_alpha: f32,
-    lobe_probs: vec4f,     // probabilities of diffuse, specular, glass and coat; the rest is that of sheen
+    lobe_probs: vec4f,     // probabilities of diffuse, specular, glass and coat; sheen has the rest
 }
 
-// Returns the lobes seen from wo, only those with a bit in `lobes`. `energy` holds tabulated albedos: x and y as in
-// `ggx_albedo` for anisotropic lobes, z for rough glass.
+// Returns the lobes seen from wo. Lobes without a bit in `lobes` are omitted. `energy` holds tabulated albedos: x and y
+// as in `ggx_albedo` for anisotropic lobes, z for rough glass.
 fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal: vec3f, lobes: u32, energy: vec3f) -> PrincipledLobes {
     var m = PrincipledLobes();
     let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);
@@ -148,7 +148,7 @@ fn glass_probability(m: PrincipledLobes, cosine: f32) -> f32 {
     return min(luminance(glass_fresnel(m, cosine)), 1.0);
 }
 
-// Returns true for delta transmission: smooth, or without a change of the index.
+// Returns true if transmission is a delta: the surface is smooth, or the index does not change.
 fn transmits_straight(m: PrincipledLobes) -> bool {
     return is_flat(m.alpha) | (!m.thin & (abs(m.eta - 1.0) < 1e-3));
 }
@@ -175,7 +175,8 @@ fn refracting_half(wo: vec3f, wi: vec3f, eta: f32) -> vec3f {
     return select(-unit, unit, unit.z > 0.0);
 }
 
-// Returns the Jacobian from transmitted directions to normals, equation 17 there; 0 if no normal refracts wi to wo.
+// Returns the Jacobian from transmitted directions to normals, equation 17 of that paper; 0 if no normal refracts wi to
+// wo.
 fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
     let o = dot(wo, half);
     let i = dot(wi, half);
@@ -283,7 +284,7 @@ fn principled_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
     return pdf;
 }
 
-// Returns a reflected direction's PDF from that of its normal.
+// Returns the PDF of a reflected direction, given the PDF of its normal.
 fn mirrored_pdf(alpha: vec2f, wo: vec3f, half: vec3f) -> f32 {
     let cosine = dot(wo, half);
     return select(0.0, ggx_pdf(alpha, wo, half) / (4.0 * max(cosine, 1e-6)), cosine > 0.0);
@@ -375,8 +376,8 @@ fn sheen_lobe(alpha: f32, wo: vec3f, wi: vec3f) -> f32 {
     return d / (4.0 * max(wi.z + wo.z - wi.z * wo.z, 1e-4));
 }
 
-// Returns the directional albedo of sheen, above 1 at grazing angles for low roughness: its logarithm is fitted by the
-// square root of the cosine, within 2 % above quadrature.
+// Returns the directional albedo of sheen, which is above 1 at grazing angles for low roughness. Fits its logarithm as
+// a function of the square root of the cosine; at most 2 % above the value by numerical quadrature.
 fn sheen_albedo(roughness: f32, cosine: f32) -> f32 {
     let r = roughness;
     let q = 1.0 / r;

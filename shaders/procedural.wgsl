@@ -1,6 +1,6 @@
-// Checker and line textures, filtered analytically. They combine a pulse in u and one in v: 1 on a part `on` of each
-// period of 1, else 0. A wave is a pulse less its mean. Its integrals, and the mean of the product of two over a
-// parallelogram, have closed forms.
+// Checker and line textures, filtered analytically. They combine a pulse in u and a pulse in v. A pulse is 1 on a
+// fraction `on` of each period of 1, else 0. A wave is a pulse minus its mean. The integrals of a wave, and the mean of
+// the product of two waves over a parallelogram, have closed forms.
 
 // Returns the mean fraction of the second color.
 fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
@@ -18,7 +18,8 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let t_max = vec2f(abs(long.x) + abs(short.x), abs(long.y) + abs(short.y));
     let at = vec2f(phase(f.uv.x * scale + shift), phase(f.uv.y * scale + shift));
 
-    // With at most one step in the footprint, everything is relative to it, to keep the precision of small ones.
+    // With at most one step in the footprint, positions are relative to the step, to keep the precision of small
+    // footprints.
     let least = min(on, 1.0 - on);
     let near_x = t_max.x < least;
     let near_y = t_max.y < least;
@@ -51,7 +52,7 @@ fn phase(x: f32) -> f32 {
     return small - floor(small);
 }
 
-// Returns the shorter edge, off the line of the longer one: a footprint has an area, or is a point.
+// Returns the shorter edge, moved off the line of the longer edge: then a footprint either has an area or is a point.
 fn widened_edge(long: vec2f, short: vec2f) -> vec2f {
     let length = sqrt(long.x * long.x + long.y * long.y);
     let across = vec2f(-long.y, long.x) / max(length, 1e-30);
@@ -68,12 +69,12 @@ fn nearest_step(x: f32, on: f32) -> f32 {
     return select(outer, inner, abs(inner) < abs(outer));
 }
 
-// Returns the wave; if `near`, the sign of x, an offset from a step.
+// Returns the wave; if `near` is true, the sign of x, which is an offset from a step.
 fn wave_value(x: f32, on: f32, near: bool) -> f32 {
     return select(select(-on, 1.0 - on, x - floor(x) < on), select(1.0, -1.0, x < 0.0), near);
 }
 
-// Returns the integral of the wave, of mean 0.
+// Returns the integral of the wave, shifted to a mean of 0.
 fn wave_integral(x: f32, on: f32, near: bool) -> f32 {
     let r = x - floor(x);
     return select(min(r * (1.0 - on), (1.0 - r) * on) - 0.5 * on * (1.0 - on), abs(x), near);
@@ -99,8 +100,9 @@ fn wave_mean(x: f32, a: f32, b: f32, on: f32, near: bool) -> f32 {
     return select(mean, wave_value(x, on, near), (long < 1e-6) | (near & (abs(x) >= outer)));
 }
 
-// Returns the integral of the product of both waves over the footprint around `at` with the edges a and b: by Green's
-// theorem, that of W(x) w(y) dy along its boundary, with W the integral of the wave w.
+// Returns the integral of the product of both waves over the footprint around `at` with the edges a and b. By Green's
+// theorem, this is the integral of W(x) w(y) dy along the boundary of the footprint, where W is the integral of the
+// wave w.
 fn around_footprint(at: vec2f, a: vec2f, b: vec2f, on: f32, near: bool) -> f32 {
     let half = (a + b) * 0.5;
     let other = (a - b) * 0.5;
@@ -114,9 +116,9 @@ fn around_footprint(at: vec2f, a: vec2f, b: vec2f, on: f32, near: bool) -> f32 {
     return sum;
 }
 
-// Returns the integral of W(x) w(y) dy along an edge: if flat, the slope times that of W(x) w(y) dx by parts, from the
-// second integral at the ends and at the steps of w(y). If steep, x and y are swapped: the integrals of W(x) w(y) dy
-// and W(y) w(x) dx add up to the difference of W(x) W(y) at the ends.
+// Returns the integral of W(x) w(y) dy along an edge: if flat, the slope times the integral of W(x) w(y) dx by parts,
+// from the second integral at the ends and at the steps of w(y). If steep, x and y are swapped: the integrals of W(x)
+// w(y) dy and W(y) w(x) dx add up to the difference of W(x) W(y) at the ends.
 fn along_edge(tail: vec2f, head: vec2f, on: f32, near: bool) -> f32 {
     let steep = abs(head.x - tail.x) < abs(head.y - tail.y);
     let start = select(tail, tail.yx, steep);
@@ -173,11 +175,11 @@ fn sine_ratio(x: f32) -> f32 {
     return select(sine(x) / (3.1415927 * x), 1.0, abs(x) < 0.001);
 }
 
-// Fourier terms.
+// Number of Fourier terms.
 const MAX_HARMONICS: f32 = 8.0;
 // Maximum periods of an edge along both axes without Fourier series, to bound the work.
 const MAX_PERIODS: f32 = 32.0;
 // Minimum width relative to the length or a period.
 const THINNEST: f32 = 0.001;
-// Extent along an axis from which on the mean is that of the pattern.
+// Extent along an axis; for larger footprints, the result is the mean of the pattern.
 const WIDEST: f32 = 4096.0;

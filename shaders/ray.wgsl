@@ -49,7 +49,7 @@ fn crosses_plane(o: vec3f, d: vec3f, t_max: f32) -> bool {
     return (o.z * d.z < 0.0) & (abs(o.z) < t_max * abs(d.z));
 }
 
-// Returns that crossing as (x |d.z|, y |d.z|), without a division.
+// Returns the crossing as (x |d.z|, y |d.z|), without a division.
 fn scaled_crossing(o: vec3f, d: vec3f) -> vec2f {
     let a = abs(d.z);
     let s = abs(o.z);
@@ -62,7 +62,8 @@ fn closer(hit: Hit, t: f32, i: u32, origin_prim: u32) -> Hit {
     return Hit(select(hit.t, t, nearer), hit.instance, select(hit.primitive, i, nearer), hit.slot, hit.barycentric);
 }
 
-// Returns the nearer hit, in ties that of the lower instance, then primitive. If b.t is INFINITE_T, b is a miss.
+// Returns the nearer hit; at equal distance the hit with the lower instance, then the lower primitive. If b.t is
+// INFINITE_T, b is a miss.
 fn nearer_hit(a: Hit, b: Hit) -> Hit {
     let lower = (b.instance < a.instance) | ((b.instance == a.instance) & (b.primitive < a.primitive));
     let nearer = (b.t < INFINITE_T) & ((b.t < a.t) | ((b.t == a.t) & lower));

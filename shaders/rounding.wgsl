@@ -1,6 +1,7 @@
 // Correctly rounded quotients and square roots (IEEE 754-2019, 4.3.1: to nearest, ties to even), for devices whose own
-// may be inexact: WGSL allows 2.5 units in the last place. The device's result is corrected by its remainder, exact in
-// integers modulo 2^32. `crates/render/src/gpu/rounding.rs` replaces the operations of a kernel by these.
+// operations may be inexact: WGSL allows 2.5 units in the last place. The device's result is corrected by its
+// remainder, exact in integers modulo 2^32. `crates/render/src/gpu/rounding.rs` replaces the operations of a kernel by
+// these.
 
 const INFINITE = 0x7f800000u;
 
@@ -17,8 +18,8 @@ fn digits_of(bits: u32) -> Digits {
     return Digits(mantissa, select(1 - i32(shift), i32(bits >> 23u), is_normal));
 }
 
-// Returns the rounded bits of 2^(exponent - 127) x (digits / 2^24), digits from 2^24 to 2^25; of slightly more if
-// `more`.
+// Returns the rounded bits of 2^(exponent - 127) x (digits / 2^24), digits from 2^24 to 2^25; of a slightly larger
+// number if `more` is true.
 fn rounded(exponent: i32, digits: u32, more: bool) -> u32 {
     let dropped = u32(clamp(2 - exponent, 1, 26));
     let kept = digits >> dropped;

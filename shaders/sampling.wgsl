@@ -60,7 +60,7 @@ fn sample_key(pixel: vec2u, seed: u32, purpose: u32) -> vec2u {
     return bits.xy;
 }
 
-// Returns four random numbers for a decision, unique if no two of a purpose have the same `bounce`.
+// Returns four random numbers for a decision, unique if no two decisions of a purpose have the same `bounce`.
 fn decision_bits(pixel: vec2u, seed: u32, sample: u32, bounce: u32, purpose: u32) -> vec4u {
     let key = sample_key(pixel, seed, purpose);
     return hash4(vec4u(key.x, key.y, sample, bounce));

@@ -68,7 +68,7 @@ fn bounded(found: Material) -> Material {
     return material;
 }
 
-// Returns `normal`, from a normal map, if the material can use it, else another normal.
+// Returns `normal`, which is from a normal map, if the material can use it, else a different normal.
 fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
     if is_delta(material) {
         let usable = usable_normal(surface, normal);
@@ -245,7 +245,7 @@ fn flipped(surface: Surface) -> Surface {
     return result;
 }
 
-// Returns the absorption behind a surface; `before` is that on the viewer's side.
+// Returns the absorption behind a surface; `before` is the absorption on the viewer's side.
 fn absorption_after(before: vec3f, surface: Surface, material: Material) -> vec3f {
     return select(before, select(vec3f(0.0), material.absorption, surface.side > 0.0), has_inside(material));
 }

@@ -13,9 +13,9 @@ fn sobol_bits(index: u32, key: vec2u) -> vec2u {
     return vec2u(reverseBits(scramble(i, key.x)), reverseBits(scramble(sobol_reversed(i), key.y)));
 }
 
-// Returns the second coordinate of Sobol' point i as 32 bits, the first digit lowest; i is the first one. Digit j is
-// the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2 in five factors (Ahmed, "An Implementation
-// Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR 2024).
+// Returns the second coordinate of Sobol' point i as 32 bits, the first digit lowest; the first coordinate is i. Digit
+// j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2 in five factors (Ahmed, "An
+// Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR 2024).
 fn sobol_reversed(i: u32) -> u32 {
     var x = i;
     x ^= (x >> 1u) & 0x55555555u;

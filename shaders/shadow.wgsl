@@ -1,5 +1,5 @@
-// Shadow rays from a point to a block of at most 32 samples of a light. Terms of primitive, point and light are
-// computed once, and the loop loads no primitive.
+// Shadow rays from a point to a block of at most 32 samples of a light. Terms that depend only on primitive, point and
+// light are computed once, and the loop loads no primitive.
 
 struct SampleBlock {
     pattern: u32,
@@ -41,7 +41,7 @@ struct ShadowFrustum {
     apex: vec3f,
     to: LightSegments,
     length2: f32,          // |towards|^2
-    inverse_depth: f32,    // 1 / (the minimum of dot(towards, ray)); negative if that is not positive
+    inverse_depth: f32,    // 1 / (the minimum of dot(towards, ray)); negative if the minimum is not positive
 }
 
 fn light_frustum(light: Light, p: vec3f) -> ShadowFrustum {
@@ -52,8 +52,8 @@ fn light_frustum(light: Light, p: vec3f) -> ShadowFrustum {
 }
 
 // Returns false if a plane through the apex separates the sphere from the frustum. Its normal is n = m - towards slope,
-// where m is the part of the vector to the sphere's center perpendicular to `towards`, and `slope` the least that keeps
-// all rays below the plane.
+// where m is the part of the vector to the sphere's center perpendicular to `towards`, and `slope` is the smallest
+// slope that keeps all rays below the plane.
 fn may_block(sphere: Sphere, frustum: ShadowFrustum) -> bool {
     let w = sphere.center - frustum.apex;
     let along = dot(w, frustum.to.towards);

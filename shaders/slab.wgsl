@@ -36,12 +36,12 @@ fn interval_hits(interval: vec2f, limit: f32) -> bool {
     return (interval.x <= interval.y) & (interval.y >= 0.0) & (interval.x <= limit);
 }
 
-// All rays from a point with directions in a box. Box tests hit what any of them hits.
+// All rays from a point with directions in a box. A box test reports a hit if any of these rays hits.
 struct RayInterval {
     low_origin: vec3f,
     high_origin: vec3f,
     near_low: vec3f,       // factor from the distance of a lower side to the earliest t
-    near_high: vec3f,      // the same for an upper side
+    near_high: vec3f,      // factor from the distance of an upper side to the earliest t
     far_low: vec3f,        // factor from the distance of a lower side to the latest t; 0 if unbounded
     far_high: vec3f,
 }
@@ -56,7 +56,7 @@ fn ray_interval(origin: vec3f, least: vec3f, most: vec3f, pad: f32) -> RayInterv
                select(zero, of_most, down), select(zero, of_least, up));
 }
 
-// Returns the t where any ray may enter, x, and leave, y.
+// Returns the earliest t at which any ray may enter, x, and the latest t at which any ray may leave, y.
 fn ray_interval_box(low: vec3f, high: vec3f, f: RayInterval) -> vec2f {
     let a = low - f.low_origin;
     let b = high - f.high_origin;

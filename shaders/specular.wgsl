@@ -5,8 +5,9 @@ fn reflected_direction(d: vec3f, n: vec3f) -> vec3f {
     return d - n * (2.0 * dot(d, n));
 }
 
-// Refracts direction d at the normal n, which is on the side that d comes from. `eta` is the index of refraction there
-// relative to that behind; `cosine_i` and `cosine_t` are those of the incident and the refracted direction.
+// Refracts direction d at the normal n, which is on the side that d comes from. `eta` is the index of refraction on
+// that side, relative to the index on the other; `cosine_i` and `cosine_t` are the cosines of the incident and the
+// refracted direction.
 fn refracted_direction(d: vec3f, n: vec3f, eta: f32, cosine_i: f32, cosine_t: f32) -> vec3f {
     return d * eta + n * (eta * cosine_i - cosine_t);
 }

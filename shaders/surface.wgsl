@@ -6,11 +6,11 @@ struct Surface {
     smooth_normal: vec3f,     // interpolated vertex normal of a mesh, else `normal`; light behind it is ignored
     shading_normal: vec3f,    // from the normal map, else `smooth_normal`
     wo: vec3f,                // unit vector to the viewer
-    ray_origin: vec3f,        // origin of rays that leave it, a little above it
-    terminator_offset: vec3f, // from there to the origin of shadow rays, on smooth meshes
-    side: f32,                // 1 if `normal` is the outward one, else -1
+    ray_origin: vec3f,        // origin of rays that leave the surface, slightly above it
+    terminator_offset: vec3f, // from `ray_origin` to the origin of shadow rays, on smooth meshes
+    side: f32,                // 1 if `normal` points outward, else -1
     exclude_front: vec2u,     // primitive that rays on the viewer's side cannot hit again, else NO_PRIMITIVE
-    exclude_back: vec2u,      // the same for rays on the other side
+    exclude_back: vec2u,      // primitive that rays on the other side cannot hit again, else NO_PRIMITIVE
     uv: vec2f,                // texture coordinates
     du: vec3f,                // derivatives of the position, which span the tangent frame
     dv: vec3f,
@@ -21,8 +21,8 @@ fn largest(v: vec3f) -> f32 {
 }
 
 // Returns the surface where a ray hits primitive i, q, without texture coordinates. A Newton step moves the point back
-// onto it, up to the rounding of its coordinates and of its offset from the anchor. Rays start above it by `epsilon`
-// times the largest of these.
+// onto the primitive, up to the rounding of its coordinates and of its offset from the anchor. Rays start above the
+// surface by `epsilon` times the largest of these coordinates.
 fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let point = ray.origin + ray.direction * t;
     let offset = point - q.anchor;

@@ -61,7 +61,7 @@ fn nearest_color(t: Texture, uv: vec2f) -> vec3f {
     return load_texel(t, level, i32(x), i32(y));
 }
 
-// Returns the level, with a fraction, where `length`, in texels of the finest one, is 1 to 2 texels.
+// Returns the level, with a fraction, at which `length`, given in texels of the finest level, is 1 to 2 texels.
 fn level_of_length(t: Texture, length: f32) -> f32 {
     let coarsest = f32(t.levels - 1u);
     let level = max(log2(max(length, 1.0)), 0.0);
@@ -123,9 +123,9 @@ fn ewa_color(t: Texture, f: Footprint) -> vec3f {
 
 // Returns the mean of a level over the ellipse, resized so that the whole filter has the variance that it has on the
 // finest level: M + I, where a half axis r has the variance r^2 and I is the reconstruction filter. Texels are means
-// over a box of variance 1/3, less that of the finest texels: (1 - q) / 3, where q is the squared size of a finest
-// texel; I becomes q I. Half axes stay above 1, so that every ellipse contains a texel. Differences to one texel are
-// averaged, to keep constants exact.
+// over a box of variance 1/3, less the variance of the finest texels: (1 - q) / 3, where q is the squared size of a
+// finest texel; I becomes q I. Half axes stay above 1, so that every ellipse contains a texel. Differences to one texel
+// are averaged, to keep constants exact.
 fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) -> vec3f {
     let size = vec2f(f32(level.width), f32(level.height));
     let q = size / vec2f(f32(t.width), f32(t.height));

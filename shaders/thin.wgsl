@@ -1,6 +1,6 @@
 // The material `dielectric` as a thin sheet, which does not change the direction of transmitted light. Interreflection
-// between its sides adds up to the reflectance 2 R / (1 + R): Stam, "An Illumination Model for a Skin Layer Bounded by
-// Rough Surfaces", EGRW 2001, has the series. Roughness spreads transmitted light like reflected light.
+// between its sides adds up to the reflectance 2 R / (1 + R): see the series in Stam, "An Illumination Model for a Skin
+// Layer Bounded by Rough Surfaces", EGRW 2001. Roughness spreads transmitted light like reflected light.
 
 fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     let c = min(max(cosine, 1e-6), 1.0);

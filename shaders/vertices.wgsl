@@ -1,6 +1,6 @@
 // Optional vertex attributes: colors, and further texture coordinates.
 
-// Returns the interpolated vertex color; white without.
+// Returns the interpolated vertex color; white if the mesh has no vertex colors.
 fn vertex_color(hit: Hit) -> vec4f {
     if is_on_mesh(hit) {
         let i = load_instance(hit.instance - 1u);

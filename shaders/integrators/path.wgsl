@@ -16,8 +16,8 @@ struct PathState {
     albedo_recorded: bool,
     prev_position: vec3f,  // of the last scattering, for a light tree
     prev_normal: vec3f,    // there, or 0 if light may arrive from both sides; also for an environment map
-    skipped_distance: f32, // from the last bounce to the ray's origin, by alpha or camera visibility
-    skips: u32,            // number of surfaces skipped by alpha
+    skipped_distance: f32, // from the last bounce to the ray's origin, past skipped surfaces
+    skips: u32,            // number of surfaces skipped because of their alpha
 }
 
 fn begin_path(pixel: vec2u, sample: u32) -> PathState {
@@ -70,8 +70,8 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         }
     }
     if ABSORPTION != 0u {
-        // An opaque surface hit from inside determines the medium of the whole segment. One with alpha does not: the
-        // ray may have skipped it on entry.
+        // An opaque surface hit from inside determines the medium of the whole segment. A surface with alpha does not:
+        // the ray may have skipped the surface on entry.
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
         let absorption = select(state.absorption, material.absorption, inside);
         state.path.throughput *= transmittance(absorption, hit.t + state.skipped_distance);
@@ -170,7 +170,7 @@ fn decision(key: vec2u, sample: u32) -> vec2f {
     return vec2f(unit_float(bits.x), unit_float(bits.y));
 }
 
-// Adds radiance that arrives after `bounces` bounces, if `taken`, clamping indirect samples.
+// Adds radiance that arrives after `bounces` bounces, if `taken` is true. Clamps indirect samples.
 fn add_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> PathState {
     var state = before;
     var radiance = select(vec3f(0.0), found, taken);
@@ -272,7 +272,7 @@ fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, m
     return state;
 }
 
-// Adds an NEE sample, if `wanted`.
+// Adds an NEE sample, if `wanted` is true.
 fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, chosen: EmitterSelection, u: vec2f,
               wanted: bool, pixel: vec2u) -> PathState {
     let light = sample_emitter(chosen, surface.ray_origin, lit_normal(surface, material), u);

@@ -13,25 +13,25 @@ use wgray_image::Region;
 ///
 /// # Films
 ///
-/// - [`begin`](Backend::begin) creates an empty film. [`resume`](Backend::resume) continues one, possibly of another
+/// - [`begin`](Backend::begin) creates an empty film. [`resume`](Backend::resume) continues one, possibly from another
 ///   backend. Both replace the current film.
-/// - A film covers a region of the image, possibly without pixels.
-/// - A film has the scene's [layout](FilmLayout): moments and pilot statistics under adaptive sampling, layers if
-///   requested ([`Packed::with_layers`]). Layers do not change the bits of other lists.
-/// - [`film`](Backend::film) copies the film, whenever nothing is pending.
+/// - A film covers a region of the image, which may be empty.
+/// - A film has the scene's [layout](FilmLayout): with adaptive sampling also moments and pilot statistics, and layers
+///   if requested ([`Packed::with_layers`]). Layers do not change the bits of other lists.
+/// - [`film`](Backend::film) copies the film, unless a dispatch is pending.
 ///
 /// # Dispatches
 ///
-/// - [`submit`](Backend::submit) starts a dispatch, which adds samples to the pixels of a tile. At most one is pending,
-///   until [`poll`](Backend::poll) returns true or [`wait`](Backend::wait) returns. [`render`](Backend::render) submits
-///   and waits.
-/// - `submit` and `poll` never wait for a device. A backend without one does the work inside `poll` or `wait`.
+/// - [`submit`](Backend::submit) starts a dispatch, which adds samples to the pixels of a tile. At most one dispatch is
+///   pending, until [`poll`](Backend::poll) returns true or [`wait`](Backend::wait) returns.
+///   [`render`](Backend::render) submits and waits.
+/// - `submit` and `poll` never wait for a device. A backend without a device does the work inside `poll` or `wait`.
 /// - With nothing pending, `poll` returns true and `wait` returns immediately.
-/// - The film's bits are the same for every partition of the work into tiles and ranges, if every pixel gets each
-///   sample once, in ascending order.
-/// - Under adaptive sampling all pixels get their first [`samples_of_all`](Backend::samples_of_all) samples before any
-///   gets a further one. For the last tile that lacks pilot samples, one range may contain both.
-/// - An empty tile or an empty range of samples changes nothing, wherever it lies.
+/// - The film's bits are the same for every partition of the work into tiles and ranges, provided that every pixel gets
+///   each sample once, in ascending order.
+/// - With adaptive sampling, all pixels get their first [`samples_of_all`](Backend::samples_of_all) samples before any
+///   pixel gets further samples. For the last tile that lacks pilot samples, one range may contain both.
+/// - An empty tile or an empty range of samples changes nothing, regardless of its position.
 ///
 /// # First hits
 ///
@@ -44,10 +44,11 @@ use wgray_image::Region;
 /// - [`RenderError::NoFilm`]: `submit` or `film` without a film;
 /// - [`RenderError::Pending`]: any method except `poll` and `wait` while a dispatch is pending;
 /// - [`RenderError::Outside`]: a tile outside the film, or a film or first hits outside the image;
-/// - [`RenderError::FilmMismatch`]: `resume` with a film of another layout than the scene's;
+/// - [`RenderError::FilmMismatch`]: `resume` with a film whose layout differs from the scene's;
 /// - [`RenderError::PilotIncomplete`]: further samples before all pixels of the film have their pilot samples.
 ///
-/// All other errors come from the device. Then nothing is pending and no film exists; `begin` and `resume` may succeed.
+/// All other errors come from the device. After such an error, nothing is pending and no film exists; `begin` and
+/// `resume` may still succeed.
 pub trait Backend {
     /// Creates an empty film of a region of the image.
     fn begin(&mut self, region: Region) -> Result<(), RenderError>;
@@ -58,7 +59,7 @@ pub trait Backend {
     /// Starts to add a range of samples to the pixels of a tile.
     fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError>;
 
-    /// Returns true if nothing is pending. Completes an ended dispatch, or submits its next step.
+    /// Returns true if nothing is pending. Completes a finished dispatch, or submits its next step.
     fn poll(&mut self) -> Result<bool, RenderError>;
 
     /// Waits until nothing is pending.
@@ -73,8 +74,8 @@ pub trait Backend {
     /// Copies the film.
     fn film(&mut self) -> Result<Film, RenderError>;
 
-    /// Returns the first hits through the pixel centers, row by row from the top. Waits;
-    /// [`job::first_hits`](crate::job::first_hits) splits a large region.
+    /// Returns the first hits through the pixel centers, in row-major order, top row first. Waits until they are
+    /// available; [`job::first_hits`](crate::job::first_hits) splits a large region.
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
 
     /// Returns the maximum size of a film in pixels, such that [`around`](Backend::around) fits too.
@@ -84,7 +85,7 @@ pub trait Backend {
     /// sampling.
     fn samples_of_all(&self) -> u32;
 
-    /// Returns the pixels on which sample counts in a region depend: the region, and under adaptive sampling its
+    /// Returns the pixels that determine the sample counts of a region: the region, and with adaptive sampling also its
     /// neighbors.
     fn around(&self, region: Region) -> Region;
 }

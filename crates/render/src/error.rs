@@ -49,7 +49,8 @@ pub enum RenderError {
         /// The driver's message.
         message: String,
     },
-    /// The device was lost with all of its memory, for example because its driver was reset. Another one may be opened.
+    /// The device was lost with all of its memory, for example because its driver was reset. Another device may be
+    /// opened.
     #[error("{device}: the device was lost: {message}")]
     Lost {
         /// The adapter's name.
@@ -58,7 +59,7 @@ pub enum RenderError {
         message: String,
     },
     /// The device has too little memory.
-    #[error("{device}: out of memory: {}", message.as_deref().unwrap_or("the driver has no more"))]
+    #[error("{device}: out of memory: {}", message.as_deref().unwrap_or("the driver has no more memory"))]
     OutOfMemory {
         /// The adapter's name.
         device: String,
@@ -82,13 +83,13 @@ pub enum RenderError {
         /// The size and the limit.
         message: String,
     },
-    /// A call that needs a film, before one exists.
+    /// A method that needs a film was called before a film existed.
     #[error("no film; begin or resume one first")]
     NoFilm,
-    /// A call while another is pending.
+    /// A method was called while a dispatch was pending.
     #[error("a call is pending; wait for it, or poll until it is done")]
     Pending,
-    /// A region outside of the film or the image.
+    /// A region extends outside of the film or the image.
     #[error("the {what} x0,y0,x1,y1 = {region} must lie within the {of} {limits}")]
     Outside {
         /// Name of the region.
@@ -100,17 +101,17 @@ pub enum RenderError {
         /// Its pixels.
         limits: Region,
     },
-    /// A film that cannot be resumed for this scene.
+    /// The film cannot be resumed for this scene.
     #[error("the film does not fit the scene: {0}")]
     FilmMismatch(String),
-    /// Further samples under adaptive sampling before all pixels have the pilot samples that determine how many are
-    /// needed.
+    /// With adaptive sampling, further samples were requested before every pixel had its pilot samples, which determine
+    /// the number of samples needed.
     #[error(
         "samples {} to {} come too early: some pixels of the film do not have their first {first} yet",
         samples.start, samples.end
     )]
     PilotIncomplete {
-        /// The samples.
+        /// The requested samples.
         samples: Range<u32>,
         /// Pilot samples per pixel.
         first: u32,

@@ -1,18 +1,18 @@
 //! Excerpts of source text for messages: a numbered, marked line.
 
-/// Prefix of an excerpt's other lines, in place of a line number.
+/// Prefix of the lines of an excerpt that have no line number.
 pub const NO_NUMBER: &str = "      |";
 const WIDTH: usize = 160;
-/// Characters before the location in a truncated line.
+/// Number of characters before the marked location in a truncated line.
 const BEFORE: usize = 60;
 
-/// Returns a line with its number, from 1. Truncates a long one.
+/// Returns a line with its line number, which counts from 1. Truncates a long line.
 pub fn numbered(number: usize, line: &str) -> String {
     let (part, _) = window(line, 0);
     format!("{number:>5} | {part}").trim_end().to_string()
 }
 
-/// Returns a numbered line with marks below `length` characters from `start`. Truncates a long one around them.
+/// Returns a numbered line with marks below `length` characters from `start`. Truncates a long line around the marks.
 pub fn marked(number: usize, line: &str, start: usize, length: usize) -> String {
     let (part, at) = window(line, start);
     let room = part.chars().count().saturating_sub(at).max(1);
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_without_a_place_begin_at_their_beginning() {
+    fn numbered_lines_are_truncated_at_the_end() {
         assert_eq!(numbered(7, "a = b"), "    7 | a = b");
         assert_eq!(numbered(7, ""), "    7 |");
         let long = numbered(1, &"ab".repeat(5000));
@@ -49,19 +49,23 @@ mod tests {
     }
 
     #[test]
-    fn short_lines_are_whole() {
+    fn short_lines_are_not_truncated() {
         assert_eq!(marked(12, "a = é c", 4, 1), "   12 | a = é c\n      |     ^");
-        assert_eq!(marked(1, "ab", 2, 1), "    1 | ab\n      |   ^", "behind the last");
+        assert_eq!(
+            marked(1, "ab", 2, 1),
+            "    1 | ab\n      |   ^",
+            "after the last character"
+        );
         assert_eq!(marked(1, "ab", 0, 99), "    1 | ab\n      | ^^");
         assert_eq!(
             marked(1, "\ta b", 1, 1),
             "    1 |  a b\n      |  ^",
-            "a tab is as wide as its mark"
+            "a tab and its mark have different widths"
         );
     }
 
     #[test]
-    fn of_long_lines_the_place_is_seen() {
+    fn long_lines_are_truncated_around_the_marks() {
         let line: String = (0..5000).map(|i| char::from(b'a' + (i % 26) as u8)).collect();
         for place in [
             0, 1, 59, 60, 61, 100, 158, 159, 160, 2500, 4838, 4839, 4840, 4998, 4999, 5000,

@@ -33,7 +33,7 @@ pub enum Layer {
     Emission,
     /// Radiance scattered once.
     Direct,
-    /// Radiance scattered more often.
+    /// Radiance scattered more than once.
     Indirect,
     /// Albedo of the surface.
     Albedo,
@@ -52,16 +52,16 @@ impl Layer {
     ];
 }
 
-/// Accumulated samples of a rectangle of pixels, row by row from the top.
+/// Accumulated samples of a rectangle of pixels, in row-major order, top row first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
-    /// The pixels in the image.
+    /// Region of the image that the film covers.
     pub region: Region,
     /// rgb: sum of weighted radiances; a: sum of weights.
     pub sums: Vec<Vec4>,
-    /// rgb: summed squared deviations from the mean; a: samples. Empty without adaptive sampling.
+    /// rgb: summed squared deviations from the mean; a: number of samples. Empty without adaptive sampling.
     pub moments: Vec<Vec4>,
-    /// Pilot statistics, for the neighbors. Empty without adaptive sampling.
+    /// Pilot statistics, which determine the sample counts of neighboring pixels. Empty without adaptive sampling.
     pub pilot_sums: Vec<Vec4>,
     /// Weighted sums of each [`Layer`]. Empty unless requested.
     pub layers: [Vec<Vec4>; Layer::ALL.len()],
@@ -97,7 +97,7 @@ impl Film {
         }
     }
 
-    /// Returns the layout; the default one without pixels.
+    /// Returns the layout; the default layout if the film has no pixels.
     pub fn film_layout(&self) -> FilmLayout {
         FilmLayout {
             adaptive: !self.moments.is_empty(),
@@ -129,7 +129,7 @@ impl Film {
         [sums, moments, pilot_sums].into_iter().chain(layers)
     }
 
-    /// Returns the part in a region, which must lie inside.
+    /// Returns the part of the film in a region, which must lie inside the film.
     pub fn part(self, part: Region) -> Film {
         if part == self.region {
             return self;
@@ -150,7 +150,7 @@ impl Film {
         }
     }
 
-    /// Returns a pixel's number of samples, under adaptive sampling.
+    /// Returns a pixel's number of samples. Requires adaptive sampling.
     pub fn sample_count(&self, pixel: usize) -> u32 {
         self.moments[pixel].w as u32
     }
@@ -160,9 +160,9 @@ impl Film {
         (0..self.moments.len()).map(|pixel| self.sample_count(pixel))
     }
 
-    /// Returns the estimated variance of a pixel's mean per channel, under adaptive sampling. It assumes independent
-    /// samples: an upper bound on average for stratified patterns. The pixel's number of samples depends on its
-    /// neighbors instead.
+    /// Returns the estimated variance of a pixel's mean per channel. Requires adaptive sampling. The estimate assumes
+    /// independent samples; for stratified patterns it is, on average, an upper bound. It does not determine the
+    /// pixel's own number of samples, which depends on its neighbors.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
         variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
     }
@@ -172,14 +172,14 @@ impl Film {
         self.layers.iter().all(|list| !list.is_empty())
     }
 
-    /// Returns a layer's mean over a pixel's samples; 0 without samples or layers.
+    /// Returns a layer's mean over a pixel's samples; 0 if the pixel has no samples or the film no layers.
     pub fn layer(&self, layer: Layer, pixel: usize) -> [f32; 3] {
         let sum = self.layers[layer as usize].get(pixel).copied().unwrap_or_default();
         mean(sum.xyz().extend(self.sums[pixel].w))
     }
 
-    /// Returns the fraction of a pixel's samples that hit anything; 0 without samples, 1 without layers. Filters with
-    /// negative weights can move it out of 0 to 1.
+    /// Returns the fraction of a pixel's samples that hit anything; 0 if the pixel has no samples, 1 if the film has no
+    /// layers. Filters with negative weights can move the fraction out of 0 to 1.
     pub fn alpha(&self, pixel: usize) -> f32 {
         let all = self.sums[pixel].w;
         match self.layers[Layer::Emission as usize].get(pixel) {
@@ -202,7 +202,7 @@ pub fn variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3 {
     moments.xyz() * scale
 }
 
-/// Returns a pixel's mean in linear RGB, black without samples.
+/// Returns a pixel's mean in linear RGB; black if the pixel has no samples.
 pub fn mean(sum: Vec4) -> [f32; 3] {
     if sum.w == 0.0 {
         [0.0; 3]

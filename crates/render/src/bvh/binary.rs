@@ -10,18 +10,18 @@ use rayon::prelude::*;
 use super::Aabb;
 use super::wide::{SLOTS, costs};
 
-/// Minimum items of a node that several threads split.
+/// Minimum number of items of a node that several threads split.
 const PARALLEL: usize = 1 << 16;
 /// Items per task of a parallel loop.
 const CHUNK: usize = 1 << 14;
-/// Minimum items of a node whose halves are built in parallel.
+/// Minimum number of items of a node whose halves are built in parallel.
 const JOIN: usize = 1 << 11;
-/// Maximum items of a node split by exhaustive search.
+/// Maximum number of items of a node that is split by exhaustive search.
 const SMALL: usize = 8;
 /// Bins per axis, a power of two.
 const BINS: usize = 16;
 
-/// A box and its index, as the bits of `low.w`, which takes no part in arithmetic; `high.w` is 1.
+/// A box and its index. The index is stored as the bits of `low.w`, which no arithmetic uses; `high.w` is 1.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct BuildItem {
@@ -77,8 +77,8 @@ pub struct Inner {
     pub costs: [f32; SLOTS - 1],
 }
 
-/// A binary BVH in depth-first order. A node of n items owns n - 1 consecutive inner nodes: itself, then those of each
-/// half.
+/// A binary BVH in depth-first order. A node of n items owns n - 1 consecutive inner nodes: itself, then the inner
+/// nodes of each half.
 pub struct Binary {
     pub items: Vec<BuildItem>,
     pub inner: Vec<Inner>,
@@ -177,7 +177,7 @@ impl Bounds {
     }
 }
 
-/// Added to every box, so that the number of nodes counts even among boxes without a surface.
+/// Added to the area of every box, so that the number of nodes matters even if all boxes have zero area.
 const MIN_AREA: f32 = 1e-30;
 
 /// Returns half the surface area, clamped to finite costs.
@@ -186,7 +186,7 @@ pub fn area(low: Vec4, high: Vec4) -> f32 {
     size.x * size.y + size.y * size.z + size.z * size.x + MIN_AREA
 }
 
-/// Partitions the items into two nonempty parts; returns the first one's size.
+/// Partitions the items into two nonempty parts; returns the size of the first part.
 fn split(items: &mut [BuildItem], bounds: &Bounds, levels: u32) -> usize {
     let count = items.len();
     if count == 2 {
@@ -215,7 +215,7 @@ fn split_in_half(items: &mut [BuildItem], bounds: &Bounds) -> usize {
     half
 }
 
-/// Returns the split of lowest SAH cost in the order of centroids along any axis.
+/// Returns the split of lowest SAH cost, among splits of the items sorted by centroid along each axis.
 fn split_small(items: &mut [BuildItem]) -> Option<usize> {
     let count = items.len();
     let mut best: Option<(f32, usize, [BuildItem; SMALL])> = None;

@@ -65,10 +65,10 @@ pub const BUILD_MAX_DEPTH: u32 = 32;
 /// Maximum number of items per leaf: 8 leaves must be addressable by 5 bits.
 pub const MAX_LEAF_SIZE: u32 = 4;
 
-/// Builds the BVH over boxes, independently of the number of threads.
+/// Builds the BVH over boxes. The result does not depend on the number of threads.
 ///
 /// `most_in_leaf` is the maximum number of items per leaf, 1 to [`MAX_LEAF_SIZE`]. Bounds are clamped to finite
-/// numbers. Empty boxes and those with NaN are replaced by the point 0.
+/// numbers. Boxes that are empty or contain NaN are replaced by the point 0.
 pub fn build(boxes: &[Aabb], most_in_leaf: u32) -> Tree {
     let most_in_leaf = most_in_leaf.clamp(1, MAX_LEAF_SIZE) as usize;
     // At most as many levels as the binary BVH, in practice a third.

@@ -45,7 +45,7 @@ impl Node {
         }
     }
 
-    /// Sets a slot's box to the smallest one on the grid around the bounds.
+    /// Sets a slot's box to the smallest box on the grid that contains the bounds.
     pub(super) fn set_bounds(&mut self, slot: usize, bounds: &Aabb) {
         let (base, scale) = (self.base(), self.scale());
         for axis in 0..3 {

@@ -184,7 +184,7 @@ fn boxes_in_geometric_progression() {
             check_builds(&repeated);
         }
     }
-    // Slow growth makes a binary tree of unlimited depth a chain.
+    // With slow growth, a binary tree of unlimited depth would degenerate into a chain.
     let boxes: Vec<Aabb> = (0..2000)
         .map(|i| around(Vec3::X * 1.05f32.powi(-i), Vec3::splat(1e-25)))
         .collect();
@@ -200,7 +200,7 @@ fn binary_levels(inner: &[Inner]) -> u32 {
 
 #[test]
 fn the_depth_is_limited() {
-    // Each box is twice as large as the next one.
+    // Each box is twice as large as the next box.
     let boxes: Vec<Aabb> = (0..240)
         .map(|i| around(Vec3::splat(2f32.powi(120 - i)), Vec3::splat(2f32.powi(120 - i))))
         .collect();

@@ -14,14 +14,15 @@ pub const SLOTS: usize = 8;
 const NODE_COST: f32 = 1.0;
 /// SAH cost of testing an item.
 const ITEM_COST: f32 = 0.3;
-/// Minimum items of a node whose children are built in parallel.
+/// Minimum number of items of a node whose children are built in parallel.
 const PARALLEL: usize = 1 << 14;
 
 pub fn leaf_cost(area: f32, count: usize) -> f32 {
     area * count as f32 * ITEM_COST
 }
 
-/// Returns a binary node's costs in up to 1, 2, .. 7 slots of a wide parent, from those of its halves.
+/// Returns the costs of a binary node that occupies up to 1, 2, .. 7 slots of a wide parent, given the costs of its
+/// halves.
 pub fn costs(area: f32, count: usize, most_in_leaf: usize, sides: &[[f32; SLOTS - 1]; 2]) -> [f32; SLOTS - 1] {
     let shared = |slots: usize| share(slots, |k| sides[0][k - 1], |k| sides[1][k - 1]).0;
     let mut costs = [0.0; SLOTS - 1];
@@ -35,7 +36,8 @@ pub fn costs(area: f32, count: usize, most_in_leaf: usize, sides: &[[f32; SLOTS 
     costs
 }
 
-/// Distributes slots over two sides, at least one each, at the lowest cost. Returns it and the first side's slots.
+/// Distributes slots over two sides, at least one each, at the lowest cost. Returns the cost and the number of slots of
+/// the first side.
 fn share(slots: usize, first: impl Fn(usize) -> f32, second: impl Fn(usize) -> f32) -> (f32, usize) {
     let mut best = (first(1) + second(slots - 1), 1);
     for k in 2..slots {
@@ -97,7 +99,7 @@ impl<'a> Part<'a> {
         count == 1 || (count <= most_in_leaf && leaf_cost(self.area(), count) <= self.cost(1))
     }
 
-    /// Collects the parts in a wide node's slots, of a part with at least two items.
+    /// Collects the parts that fill this number of slots of a wide node. This part must have at least two items.
     fn spread(&self, slots: usize, children: &mut Vec<Part<'a>>) {
         let halves = self.halves();
         let (_, first) = share(slots, |k| halves[0].cost(k), |k| halves[1].cost(k));
@@ -204,7 +206,7 @@ impl Below {
 }
 
 /// Assigns children to slots. Slot c is meant for octant c of the node (bit 0: +x, bit 1: +y, bit 2: +z), so that c ^
-/// octant of a ray approximates front-to-back order. The pair of largest projected distance is assigned first.
+/// octant of a ray approximates front-to-back order. The pair with the largest projected distance is assigned first.
 fn slots_of(bounds: &Aabb, children: &[Part]) -> [Option<usize>; SLOTS] {
     // Halved, to avoid overflow.
     let middle = |bounds: &Aabb| bounds.low * 0.5 + bounds.high * 0.5;

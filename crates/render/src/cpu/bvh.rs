@@ -1,4 +1,4 @@
-//! Closest-hit and occlusion queries of the scene's BVHs: the results of `shaders/bvh.wgsl` by [`traversal`].
+//! Closest-hit and occlusion queries of the scene's BVHs: the results of `shaders/bvh.wgsl`, computed by [`traversal`].
 
 use bytemuck::cast_slice;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
@@ -21,7 +21,7 @@ use crate::records::{
     with_primitive_kind,
 };
 
-/// Maximum number of items tested without the BVH: rays hit most nodes of small ones.
+/// Maximum number of items tested without the BVH: in a small BVH, rays hit most nodes.
 const FEW_ITEMS: usize = 4;
 
 fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
@@ -92,7 +92,7 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
     let pad = mesh_pad(i, origin);
-    // On equal distance, this instance wins only over larger indices.
+    // At equal distance, this instance wins only over instances with larger indices.
     let best = Nearest {
         t: before.t,
         number: if number + 1 < before.instance { NO_INDEX } else { 0 },
@@ -149,7 +149,7 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Returns the samples of the block that an item occludes, or that are set in `before`.
+/// Returns the mask of the block's samples that an item occludes, or that are set in `before`.
 pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
     let all = u32::MAX >> (32 - block.count);
     let wanted = all & !before;
@@ -219,7 +219,7 @@ fn occluded_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u3
     traversal::occluded(*LEVEL, &walked(mesh), &segments, wanted)
 }
 
-/// Like [`traversal::occluded`], if some groups cast no shadow.
+/// Like [`traversal::occluded`], for a mesh in which some groups cast no shadow.
 fn occluded_by_groups(
     scene: &Packed,
     i: &Instance,

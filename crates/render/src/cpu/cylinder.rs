@@ -195,7 +195,7 @@ mod tests {
             // From inside.
             ([1.0, 2.0, 3.0], [0.0, -1.0, 0.0], 2.0, Vec3::NEG_Y),
             ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0], 3.0, Vec3::Z),
-            // Just below the rim, and inside of it.
+            // Just below the rim, and just inside the rim.
             ([-2.0, 2.0, 6.5], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::NEG_X),
             ([-0.9, 2.0, 7.0], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::Z),
         ] {
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_beside_and_beyond_it_miss() {
+    fn rays_beside_and_beyond_a_cylinder_miss() {
         let q = cylinder(DVec3::ZERO, 1.0, 2.0);
         for (origin, direction) in [
             ([-4.0, 1.01, 0.0], [1.0, 0.0, 0.0]),
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn the_far_end_of_a_chord_is_hit_from_the_surface() {
+    fn rays_from_the_surface_hit_the_far_end_of_the_chord() {
         let q = cylinder(DVec3::ZERO, 1.0, 2.0);
         for (origin, direction, t) in [
             ([1.0, 0.0, 0.5], [-1.0, 0.0, 0.0], 2.0),
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_huge_cylinder_keeps_its_digits_near_the_origin() {
+    fn a_huge_cylinder_is_precise_near_the_origin() {
         // On the side of a horizontal cylinder, and the cap of a vertical one.
         let pipe = primitive(
             CYLINDER,
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn segments_are_cut_that_cross_the_surface() {
+    fn segments_that_cross_the_surface_are_occluded() {
         let q = cylinder(DVec3::ZERO, 1.0, 2.0);
         let cut = |p: [f32; 3], to: [f32; 3], from_inside| {
             let levels = solid_levels(CYLINDER, &q, vector_to_local(&q, Vec3::from(p) - q.anchor), from_inside);

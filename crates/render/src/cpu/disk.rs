@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn segments_are_blocked_where_they_cross() {
+    fn segments_that_cross_the_disk_are_occluded() {
         let occludes = |x: f32, y: f32, t_max| disk_occludes(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), t_max);
         assert!(occludes(0.0, 0.0, 1.0) && occludes(0.7, -0.7, 1.0) && occludes(-1.0, 0.0, 1.0));
         assert!(!occludes(0.72, 0.72, 1.0) && !occludes(1.01, 0.0, 1.0));

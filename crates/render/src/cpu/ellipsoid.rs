@@ -104,7 +104,7 @@ mod tests {
 
     /// Hits lie on the quadric |M (p - c)|^2 = 1, with its gradient as normal.
     #[test]
-    fn an_ellipsoid_is_its_quadric() {
+    fn hits_of_an_ellipsoid_lie_on_its_quadric() {
         let center = DVec3::new(0.5, 0.4, 0.4);
         let axes = DMat3::from_cols_array(&[0.3, 0.1, 0.0, -0.1, 0.3, 0.0, 0.0, 0.0, 0.4]);
         let q = ellipsoid(center, axes);
@@ -113,7 +113,7 @@ mod tests {
             let origin = Vec3::new(0.0, -3.0, 1.3);
             let ray = ray(origin.into(), (Vec3::from(target) - origin).into());
             let t = intersect_ellipsoid(&q, false, ray, INFINITE_T);
-            assert!(t < INFINITE_T, "{target:?} is inside, and missed");
+            assert!(t < INFINITE_T, "the ray to {target:?}, inside the ellipsoid, missed");
             let p = ray.origin + ray.direction * t;
             assert!(quadric(p.as_dvec3()).abs() < 1e-5, "{}", quadric(p.as_dvec3()));
             let step = 1e-4;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grazing_ray_decides_by_the_last_digits() {
+    fn grazing_rays_hit_or_miss_precisely() {
         let at = |z: f32| {
             intersect_ellipsoid(
                 &unit_sphere(),
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_behind_or_beyond_the_limit_is_no_hit() {
+    fn hits_behind_the_origin_or_beyond_the_limit_are_misses() {
         let q = unit_sphere();
         assert_eq!(
             intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), INFINITE_T),
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn segments_are_blocked_by_the_surface_they_cut() {
+    fn segments_that_cross_the_surface_are_occluded() {
         let occludes = |o: [f32; 3], d: [f32; 3], t_max| {
             let o = Vec3::from(o);
             ellipsoid_occludes(o, d.into(), dot(o, o) - 1.0, t_max)
@@ -183,7 +183,7 @@ mod tests {
         assert!(occludes([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.5), "into");
         assert!(
             occludes([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.7),
-            "into, continue_through the middle"
+            "into, past the middle"
         );
         assert!(
             occludes([-1.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.2),

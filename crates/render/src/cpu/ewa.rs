@@ -1,5 +1,6 @@
-//! Elliptical weighted average with cached weights, shared by textures of the same size that a material looks up at a
-//! point: usually all, and weights take most of the time. The bits are those of [`super::texture::ewa_color`].
+//! Elliptical weighted average with cached weights. Textures of the same size that a material looks up at a point share
+//! the weights. Usually all textures do, and weights take most of the time. The results are bit-identical to
+//! [`super::texture::ewa_color`].
 
 use std::cell::RefCell;
 use std::sync::LazyLock;
@@ -12,7 +13,7 @@ use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color,
 use super::texture::level_of_length;
 use crate::records::{FLOAT, LINEAR8, Packed, SRGB8, Texture};
 
-/// Returns the same as `ewa_color`.
+/// Returns the same color as `ewa_color`.
 pub fn color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
     LAST.with_borrow_mut(|kernel| {
         let key = Key::of(t, f);
@@ -50,10 +51,10 @@ impl Key {
 
 struct Kernel {
     key: Key,
-    /// Finer level, and the next one if both are blended.
+    /// Finer level, and the next coarser level if both are blended.
     levels: [Weights; 2],
     finer: u32,
-    /// Share of the coarser level.
+    /// Weight of the coarser level.
     between: f32,
 }
 
@@ -61,7 +62,7 @@ struct Weights {
     /// Index within the level.
     texels: Vec<u32>,
     weights: Vec<f32>,
-    /// First texel with a weight above 0; the sum is of differences to it.
+    /// First texel with a positive weight; differences from this texel are summed.
     base: usize,
     /// 1 / (sum of the weights), or 0.
     scale: f32,
@@ -191,7 +192,7 @@ impl Weights {
 static SRGB: LazyLock<Table> = LazyLock::new(|| Table::new(SRGB8));
 static LINEAR: LazyLock<Table> = LazyLock::new(|| Table::new(LINEAR8));
 
-/// [`unpacked_color`] by the exponent and nine digits.
+/// Table of [`unpacked_color`], indexed by the exponent and nine binary digits of a component.
 struct Table(Box<[f32; 1 << 14]>);
 
 impl Table {

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn facets_cover_the_surface() {
+    fn the_projected_area_of_all_microfacets_is_one() {
         for alpha in ALPHAS {
             let area = over_normals(alpha, |m| f64::from(ggx_d(pair(alpha), m.as_vec3())) * m.z);
             assert!((area - 1.0).abs() < 1e-4, "{alpha:?}: {area}");
@@ -141,11 +141,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_seen_is_as_large_as_it_looks() {
+    fn visible_microfacets_have_the_projected_area_of_the_surface() {
         for alpha in ALPHAS {
             for (cosine, longitude) in [(1.0, 0.0), (0.7, 0.3), (0.3, 1.5), (0.05, 2.9)] {
                 let wo = unit(cosine, longitude);
-                // G1 of the projected area of all normals that face the viewer is the surface's projected area.
+                // G1 times the projected area of all normals that face the viewer is the projected area of the surface.
                 let facing = over_normals(alpha, |m| {
                     f64::from(ggx_d(pair(alpha), m.as_vec3())) * m.dot(wo.as_dvec3()).max(0.0)
                 });
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn of_both_directions_less_is_seen_than_of_one() {
+    fn g2_is_at_most_g1_of_either_direction() {
         for alpha in ALPHAS {
             let alpha = pair(alpha);
             for (wo, wi) in [(unit(0.9, 0.2), unit(0.2, 3.0)), (unit(0.1, 1.0), unit(0.4, 1.2))] {
@@ -222,13 +222,16 @@ mod tests {
     }
 
     #[test]
-    fn visible_normals_are_as_frequent_as_their_density_says() {
+    fn sampled_normals_follow_their_pdf() {
         for alpha in ALPHAS {
             for wo in [unit(0.95, 0.4), unit(0.3, 2.5), unit(0.6, 1.5)] {
                 let right = chi_square(alpha, wo, 1.0);
                 assert!(right < 6.0, "{alpha:?}, {wo}: {right}");
                 let wrong = chi_square(alpha, wo, 1.06);
-                assert!(wrong > 6.0, "{alpha:?}, {wo}: a wrong density is not seen: {wrong}");
+                assert!(
+                    wrong > 6.0,
+                    "{alpha:?}, {wo}: a wrong density was not detected: {wrong}"
+                );
             }
         }
     }
@@ -259,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn albedos_are_those_of_a_quadrature() {
+    fn albedos_match_quadrature() {
         for alpha in [0.001, 0.01, 0.06, 0.2, 0.45, 0.8, 1.0] {
             for cosine in [1.0, 0.8, 0.5, 0.25, 0.1, 0.03] {
                 let wo = unit(cosine, 0.4);
@@ -288,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_of_all_ranges_are_numbers() {
+    fn results_are_finite_at_the_ends_of_all_ranges() {
         let tiny = f32::from_bits(1);
         for alpha in [Vec2::splat(0.001), Vec2::ONE, Vec2::new(0.001, 1.0)] {
             for wo in [Vec3::Z, Vec3::X, Vec3::new(0.6, -0.8, tiny), Vec3::new(0.0, 1.0, 1e-20)] {

@@ -87,7 +87,7 @@ fn dot_vector<S: Simd>(a: Vec3, [x, y, z]: &[S::f32s; 3]) -> S::f32s {
     *x * a.x + *y * a.y + *z * a.z
 }
 
-/// Returns a SIMD vector of directions from index i on.
+/// Returns a SIMD vector of directions, starting at index i.
 #[inline(always)]
 fn components<S: Simd>(simd: S, to: &Directions, i: usize) -> [S::f32s; 3] {
     let [x, y, z] = &to.along;
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn simd_equals_scalar() {
+    fn simd_lobes_are_bit_identical_to_the_scalar_functions() {
         let to = LightSegments {
             towards: Vec3::new(0.3, -0.4, 0.5),
             u: Vec3::new(0.7, 0.1, 0.2),

@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn metals_reflect_as_amplitudes_say() {
+    fn metal_fresnel_matches_complex_amplitudes() {
         for (eta, k) in [
             (0.2, 3.9),
             (1.4, 1.8),

@@ -186,8 +186,8 @@ mod tests {
             dv: zero,
         };
         let leaning = normalize(Vec3::new(1.0, 0.0, 1.0));
-        // A normal tilted by 45 degrees, seen from above, reflects along the triangle or below. Seen from its side, it
-        // is usable.
+        // A normal tilted by 45 degrees, seen from above, reflects along the triangle or below. Seen from the side
+        // towards which it tilts, this normal is usable.
         assert_eq!(usable_normal(surface(-0.1), leaning), smooth_normal);
         assert_eq!(usable_normal(surface(0.5), leaning), leaning);
         // At a grazing angle the smooth normal would also reflect below the plane.

@@ -33,21 +33,21 @@ mod tests {
     }
 
     #[test]
-    fn it_is_hit_from_both_sides_however_far() {
+    fn the_plane_is_hit_from_both_sides_at_any_distance() {
         assert_eq!(hit([1e6, 0.0, 3.0], [0.0, 0.0, -1.0]), 2.0);
         assert_eq!(hit([0.0, 0.0, -1.0], [0.0, 0.0, 1.0]), 2.0);
         assert!((hit([0.0, 0.0, 2.0], [1000.0, 0.0, -1.0]) - 1000.0005).abs() < 0.01);
     }
 
     #[test]
-    fn it_is_not_hit_along_it_nor_behind() {
+    fn rays_along_or_away_from_the_plane_miss() {
         assert_eq!(hit([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]), INFINITE_T);
         assert_eq!(hit([0.0, 0.0, 3.0], [1.0, 0.0, 0.0]), INFINITE_T);
         assert_eq!(hit([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]), INFINITE_T);
     }
 
     #[test]
-    fn segments_are_blocked_where_they_cross() {
+    fn segments_that_cross_the_plane_are_occluded() {
         let down = Vec3::new(5.0, 0.0, -2.0);
         assert!(plane_occludes(Vec3::Z, down, 1.0) && plane_occludes(-Vec3::Z, -down, 1.0));
         assert!(!plane_occludes(Vec3::Z, down, 0.5) && !plane_occludes(Vec3::Z, -down, 1.0));

@@ -44,7 +44,7 @@ impl<'a> Cpu<'a> {
     }
 }
 
-/// Maximum pixels of a row per task.
+/// Maximum number of pixels of a row per task.
 const RUN: usize = 32;
 
 impl Backend for Cpu<'_> {
@@ -113,7 +113,7 @@ impl Backend for Cpu<'_> {
     }
 }
 
-/// Adds samples to a tile: under adaptive sampling either pilot samples or later ones.
+/// Adds samples to a tile: with adaptive sampling either pilot samples or later ones.
 fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32>) {
     let Film {
         region,
@@ -169,7 +169,7 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
     });
 }
 
-/// A segment of a film row. Missing and read-only lists are empty.
+/// A segment of a film row. Lists that are missing or read-only are empty.
 struct Run<'a> {
     first: UVec2,
     sums: &'a mut [Vec4],
@@ -196,8 +196,8 @@ impl Run<'_> {
     }
 }
 
-/// Splits a tile's records, whose film covers `region`, into segments of rows, with their first pixels; none if
-/// `records` is empty.
+/// Splits the records of a tile into row segments, each paired with the position of its first pixel. `region` is the
+/// region of the film.
 fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut [Vec4])> {
     let rows = records.chunks_mut(region.width() as usize).enumerate();
     let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
@@ -221,7 +221,7 @@ fn add_pilot_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mu
     run.pilot_sums[x] = pilot_finish(run.pilot_sums[x], run.sums[x], run.moments[x]);
 }
 
-/// Adds samples after the pilot samples, as many as the neighbors' require.
+/// Adds the samples after the pilot samples. The neighbors' pilot statistics determine how many.
 fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, pilot_sums: Vec4) {
     let s = &scene.specialization;
     let end = samples_wanted(

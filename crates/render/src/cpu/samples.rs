@@ -12,7 +12,7 @@ use crate::records::GRID;
 /// Instruction set of this processor.
 pub static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 
-/// Samples on the unit square. Unused lanes repeat the first one.
+/// Samples on the unit square. Unused lanes repeat the first sample.
 pub struct Samples {
     count: usize,
     x: [f32; MOST],

@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn segments_are_blocked_where_they_cross() {
+    fn segments_that_cross_the_triangle_are_occluded() {
         let occludes = |x: f32, y: f32| triangle_occludes(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), 1.0);
         assert!(occludes(0.01, 0.01) && occludes(0.45, 0.5) && occludes(0.9, 0.05));
         assert!(!occludes(-0.01, 0.5) && !occludes(0.5, -0.01) && !occludes(0.55, 0.5));

@@ -17,9 +17,9 @@ pub enum AdapterChoice {
     Auto,
     /// Any adapter.
     Gpu,
-    /// The adapter with this number in [`adapters`], from 1, or this text in its name, driver or type. Larger numbers
-    /// must be a whole word of a name, such as 7900. Of several adapters with the same name, the first that can be
-    /// opened is used.
+    /// The adapter with this number in [`adapters`], counted from 1, or with this text in its name, driver or type.
+    /// Larger numbers must match a whole word of a name, such as 7900. Of several adapters with the same name, the
+    /// first that can be opened is used.
     Named(String),
 }
 
@@ -42,7 +42,7 @@ pub struct GpuInfo {
     pub largest_binding: u64,
     /// Maximum buffer size in bytes.
     pub largest_buffer: u64,
-    /// Maximum storage buffers in a shader.
+    /// Maximum number of storage buffers in a shader.
     pub storage_buffers: u32,
 }
 
@@ -119,7 +119,7 @@ pub(super) fn fitting(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<u
 }
 
 pub(super) fn enumerate() -> Vec<wgpu::Adapter> {
-    // wgpu may panic while a driver is being reset; no adapter then.
+    // wgpu may panic while a driver is being reset. Then there is no adapter.
     let adapters = catch_panic(|| {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
@@ -130,7 +130,7 @@ pub(super) fn enumerate() -> Vec<wgpu::Adapter> {
 }
 
 /// Returns the sort key of an adapter, lowest first. Lavapipe precedes SwiftShader, since it is many times faster.
-/// Other adapters of a type keep the system's order.
+/// Otherwise, adapters of the same type keep the system's order.
 fn preference(info: &wgpu::AdapterInfo) -> (u8, bool) {
     let kind = match info.device_type {
         DeviceType::DiscreteGpu => 0,
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn lavapipe_goes_before_other_software_and_real_gpus_before_both() {
+    fn adapters_are_sorted_gpus_first_then_lavapipe_then_other_software() {
         let (swiftshader, lavapipe) = ("SwiftShader Device (Subzero)", "llvmpipe (LLVM 15.0.6, 256 bits)");
         let in_order = |adapters: &[(&'static str, DeviceType)]| {
             let mut infos: Vec<wgpu::AdapterInfo> = adapters
@@ -235,12 +235,12 @@ mod tests {
                 ("GeForce A", DeviceType::DiscreteGpu),
             ]),
             ["GeForce B", "GeForce A", "Radeon", "virtio", lavapipe, swiftshader],
-            "the two of one type as they came"
+            "the order within a type changed"
         );
     }
 
     #[test]
-    fn a_name_means_one_adapter_or_is_refused_with_those_that_it_fits() {
+    fn unknown_and_ambiguous_names_are_rejected_with_the_candidates() {
         let infos = [
             adapter("Radeon RX 7900", "radv Mesa 25", "discrete"),
             adapter("Radeon RX 7900 XT", "radv Mesa 25", "discrete"),
@@ -249,13 +249,13 @@ mod tests {
             adapter("llvmpipe (LLVM 15)", "Mesa 22", "software"),
         ];
         let found = |name: &str| fitting(&infos, &AdapterChoice::Named(name.to_string()));
-        assert_eq!(found("radeon rx 7900"), Ok(vec![0]), "the whole name goes before parts");
-        assert_eq!(found("XT"), Ok(vec![1]));
         assert_eq!(
-            found("780m"),
-            Ok(vec![2, 3]),
-            "the same card with two drivers is not ambiguous"
+            found("radeon rx 7900"),
+            Ok(vec![0]),
+            "a part of a name was preferred to the whole name"
         );
+        assert_eq!(found("XT"), Ok(vec![1]));
+        assert_eq!(found("780m"), Ok(vec![2, 3]), "one card with two drivers was ambiguous");
         assert_eq!(found("amdvlk"), Ok(vec![3]));
         assert_eq!(found("lavapipe"), Ok(vec![4]));
         assert_eq!(found("SOFTWARE"), Ok(vec![4]));
@@ -266,7 +266,7 @@ mod tests {
             let none = found(digit).unwrap_err();
             assert!(none.contains(&format!("contains '{digit}'")), "{none}");
         }
-        assert_eq!(found("15"), Ok(vec![4]), "a word of a name");
+        assert_eq!(found("15"), Ok(vec![4]), "a whole word of a name did not match");
         assert!(
             found("7900")
                 .unwrap_err()

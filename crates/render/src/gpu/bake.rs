@@ -16,7 +16,7 @@ use crate::records::{
 /// Maximum number of materials, lights and textures of a baked scene: compile time grows faster than linearly.
 pub const MAX_RECORDS: usize = 512;
 
-/// Returns [`bake`] if the scene is small enough.
+/// Returns the result of [`bake`], if the scene is small enough.
 pub fn bake_if_small(packed: &Packed) -> Option<String> {
     // Lights in a light tree are read from buffers.
     let lights = if packed.lighting.nodes.is_empty() {
@@ -142,7 +142,7 @@ pub fn tables() -> String {
     out
 }
 
-/// Returns WGSL functions that load records of BVHs and meshes, never baked.
+/// Returns WGSL functions that load records of BVHs and meshes, which are never baked.
 pub fn tree_tables() -> String {
     let mut out = String::new();
     from_rows::<BvhItem>(&mut out, "load_item", "nodes", "counts.tree.x");
@@ -246,7 +246,7 @@ fn write_function(out: &mut String, signature: &str, start: &str, result: &str, 
     let _ = writeln!(out, "    return {result};\n}}");
 }
 
-/// Writes a function from an index to a constant record: a chain of selections.
+/// Writes a function that returns the constant record with a given index: a chain of selections.
 fn write_table<R: Record>(out: &mut String, name: &str, records: &[R]) {
     let record = R::NAME;
     let first = records.first().map_or(format!("{record}()"), R::constant);

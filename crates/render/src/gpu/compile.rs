@@ -27,7 +27,7 @@ pub fn check(source: &Source) -> Result<ValidKernel, ShaderError> {
     check_at(source).map_err(|(error, _)| error)
 }
 
-/// Errors include the byte offset in the whole text, if known.
+/// Errors include the byte offset in the kernel's text, if known.
 pub fn check_at(source: &Source) -> Result<ValidKernel, (ShaderError, Option<usize>)> {
     let start = |span: Option<Span>| span.and_then(Span::to_range).map(|range| range.start);
     if let Some((place, rule)) = too_deep(&source.text) {
@@ -98,7 +98,7 @@ impl ValidKernel {
         let mut module = specialised.into_owned();
         prune(&mut module);
         let info = validate(&module).map_err(|error| ShaderError::other("specialisation", &error))?;
-        // Unbounded by naga, because each loop of the kernels counts to a bound.
+        // naga need not bound loops, because each loop of the kernels counts to a bound.
         let options = spv::Options {
             lang_version: (1, 3),
             force_loop_bounding: false,

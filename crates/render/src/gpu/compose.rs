@@ -1,5 +1,5 @@
-//! Kernel sources: concatenated shader files, in any order since WGSL's module scope has none, and their locations in
-//! the text.
+//! Kernel sources: concatenated shader files and their locations in the text. The order of the files does not matter,
+//! because WGSL declarations at module scope are unordered.
 
 use std::ops::Range;
 use std::{fs, io, path::Path};
@@ -133,8 +133,8 @@ impl Shaders {
         source
     }
 
-    /// Composes a kernel. `baked` is the text of functions with the scene as constants; without it, the scene is read
-    /// from buffers.
+    /// Composes a kernel. `baked` is the text of functions with the scene as constants; if it is `None`, the scene is
+    /// read from buffers.
     pub fn compose(&self, kernel: &Kernel, integrator: Integrator, baked: Option<&str>) -> Source {
         self.compose_with_texels(kernel, integrator, baked, None)
     }
@@ -228,7 +228,7 @@ impl Source {
         self.text.push_str(&other.text);
     }
 
-    /// Replaces a range inside one file, with as many lines.
+    /// Replaces a range inside one file by text with the same number of lines.
     pub fn replaced(&self, range: Range<usize>, with: &str) -> Source {
         let lines = self.text[range.clone()].matches('\n').count();
         let with = with.to_string() + &"\n".repeat(lines);
@@ -263,7 +263,7 @@ impl Source {
         Some(format!("{file}:{line}:{column}"))
     }
 
-    /// Returns a byte's file, its contents, and the offset in it.
+    /// Returns the file that contains a byte, the contents of the file, and the offset of the byte in the file.
     pub fn locate(&self, offset: usize) -> Option<(&str, &str, usize)> {
         let i = self.parts.partition_point(|part| part.start <= offset).checked_sub(1)?;
         let end = self.parts.get(i + 1).map_or(self.text.len(), |next| next.start);

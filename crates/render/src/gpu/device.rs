@@ -19,7 +19,7 @@ pub struct Device {
     pub(super) queue: CatchPanicOnDrop<wgpu::Queue>,
     pub(super) device: CatchPanicOnDrop<wgpu::Device>,
     failure: Failure,
-    /// Its adapter.
+    /// The adapter.
     pub info: GpuInfo,
 }
 
@@ -27,13 +27,13 @@ pub struct Device {
 ///
 /// # Errors
 ///
-/// [`RenderError::NoDevice`] if no adapter matches, or adapters of different names do; else the error of the last one
-/// that cannot be opened.
+/// [`RenderError::NoDevice`] if no adapter matches, or adapters with different names match; otherwise the error of the
+/// last adapter that cannot be opened.
 pub fn choose(choice: &AdapterChoice) -> Result<Device, RenderError> {
     choose_among(choice, &|_| true)
 }
 
-/// Like [`choose`], among adapters that are `wanted`.
+/// Like [`choose`], considering only adapters for which `wanted` returns true.
 ///
 /// # Errors
 ///
@@ -160,7 +160,7 @@ impl Device {
             mapped_at_creation: true,
         };
         let buffer = self.device.create_buffer(&descriptor);
-        // Without memory it cannot be mapped. The enclosing `checked` reports the reason.
+        // If memory is exhausted, the buffer cannot be mapped. The enclosing `checked` reports the reason.
         if let Ok(mut view) = buffer.get_mapped_range_mut(..) {
             view.slice(..contents.len()).copy_from_slice(contents);
             drop(view);
@@ -238,7 +238,7 @@ mod tests {
             Err(error) => panic!("{error}"),
         };
         assert!(device.checked(|| ()).is_ok());
-        device.buffer(u64::MAX, BufferUsages::STORAGE); // no device has that much
+        device.buffer(u64::MAX, BufferUsages::STORAGE); // no device has that much memory
         let error = device.checked(|| ()).expect_err("the recorded error").to_string();
         assert!(error.starts_with(&device.info.name), "{error}");
         assert!(device.checked(|| ()).is_ok(), "the error is reported twice");

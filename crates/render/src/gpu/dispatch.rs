@@ -1,4 +1,4 @@
-//! Generated WGSL functions that call another one for each kind of primitive, as a constant.
+//! Generated WGSL functions that call another function once for each kind of primitive, with the kind as a constant.
 
 use std::fmt::Write as _;
 

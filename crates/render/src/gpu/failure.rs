@@ -1,5 +1,5 @@
-//! Device failures: errors, out-of-memory and device loss. wgpu reports them by error scopes, callbacks and panics, and
-//! a loss by one callback only.
+//! Device failures: errors, out-of-memory and device loss. wgpu reports failures by error scopes, callbacks and panics,
+//! but a device loss only once, by a callback.
 
 use std::error::Error;
 use std::fmt::Display;
@@ -13,7 +13,7 @@ pub struct Failure(Arc<Mutex<FailureState>>);
 
 #[derive(Default)]
 struct FailureState {
-    /// Permanent.
+    /// The device loss, which is permanent.
     lost: Option<DeviceFault>,
     /// First error outside of scopes, until it is reported.
     untold: Option<DeviceFault>,
@@ -87,8 +87,8 @@ impl Failure {
         });
     }
 
-    /// Returns the value of wgpu calls, or an error: a device loss, the first error of the scopes, one recorded outside
-    /// of them, or a panic, in this order.
+    /// Returns the value of wgpu calls, or an error: a device loss, the first error of the scopes, an error recorded
+    /// outside of the scopes, or a panic, in this order.
     pub fn judge<T>(
         &self,
         device: &str,

@@ -1,4 +1,4 @@
-//! Locations of functions in a WGSL text, without a parser because it may be wrong.
+//! Locations of functions in a WGSL text, found without a parser because the text may contain errors.
 
 use std::ops::Range;
 
@@ -30,7 +30,7 @@ pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
         let Some(close) = closing(&plain, open) else { break };
         let head = &plain[start..open];
         let result = head.rfind("->").map_or("", |arrow| &text[start + arrow + 2..open]);
-        // Attributes of a result precede its type.
+        // The attributes of a result precede the type.
         let result = result.rsplit(')').next().unwrap_or_default().trim();
         found.push(FunctionText {
             name,
@@ -85,7 +85,7 @@ fn next_word(text: &str, from: usize, word: &str) -> Option<usize> {
         .find(|&i| !text[..i].ends_with(part_of_name) && !text[i + word.len()..].starts_with(part_of_name))
 }
 
-/// Returns the closing brace of the one at `open`.
+/// Returns the closing brace that matches the opening brace at `open`.
 fn closing(text: &str, open: usize) -> Option<usize> {
     let mut depth = 0usize;
     for (i, byte) in text.bytes().enumerate().skip(open) {
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn functions_are_found_whatever_is_in_comments() {
+    fn braces_and_functions_in_comments_are_ignored() {
         let text = "// fn no() {\nfn one(a: f32) -> vec3f { if a > 1.0 { /* } */ } return v; }\n\
             @compute @workgroup_size(8) /* fn */ fn two(){}\nfn ä() -> @builtin(position) vec4f { } fn open() { {";
         let found = functions(text);

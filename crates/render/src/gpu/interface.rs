@@ -12,8 +12,8 @@ use super::naga_messages::type_name;
 use crate::error::ShaderError;
 use wgray_scene::Integrator;
 
-/// Returns the interface errors of a kernel that naga accepts; those of outputs only if `whole`, which requires all
-/// function bodies.
+/// Returns the interface errors of a kernel that naga accepts. Outputs are checked only if `whole` is true, which
+/// requires all function bodies.
 pub fn mistakes(
     kernel: &Kernel,
     integrator: Integrator,
@@ -94,7 +94,7 @@ impl Sides<'_> {
         self.found.push(error);
     }
 
-    /// Returns the first character of the file with a span of the built-in kernel.
+    /// Returns the location of the first character of the file that contains a span of the built-in kernel.
     fn file_with(&self, span: Span) -> Option<Span> {
         let (file, ..) = self.built_in.locate(span.to_range()?.start)?;
         self.source.start_of(file).map(|start| Span::from(start..start + 1))
@@ -161,7 +161,7 @@ impl Sides<'_> {
                 self.report(Some(own.global_variables.get_span(handle)), message);
             }
         }
-        // Without a buffer that the program reads back, the image would be black.
+        // If a buffer that the program reads back were missing, the image would be black.
         for (handle, known) in right.global_variables.iter() {
             let stores = AddressSpace::Storage {
                 access: StorageAccess::LOAD | StorageAccess::STORE,
@@ -250,8 +250,8 @@ struct Layouts<'a> {
 }
 
 impl Layouts<'_> {
-    /// Returns the first difference of two memory layouts. Member names are free, except one of the reference at
-    /// another offset.
+    /// Returns the first difference of two memory layouts. Member names may differ, but a name of the reference must
+    /// not appear at a different offset.
     fn difference(&self, own: Handle<Type>, right: Handle<Type>, path: &str) -> Option<String> {
         match (&self.own.types[own].inner, &self.right.types[right].inner) {
             (

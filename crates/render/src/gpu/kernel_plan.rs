@@ -11,7 +11,7 @@ use crate::records::Packed;
 pub struct KernelPlan {
     /// Entry point.
     pub entry: &'static str,
-    /// The scene is constants in the source.
+    /// True if the source contains the scene as constants.
     pub baked: bool,
     /// Lines of WGSL.
     pub lines: usize,

@@ -1,26 +1,26 @@
-//! Samples per dispatch for which software Vulkan truncates no loops.
+//! Number of samples per dispatch for which software Vulkan truncates no loops.
 
 use crate::records::{MAX_PATH_LEAVES, Packed, SAMPLE_BLOCK};
 
 /// Iterations of all loops after which Mesa 22.3's llvmpipe ends every loop of an invocation. An iteration counts if
 /// any lane needs it.
 const MAX_ROUNDS: f64 = 65_535.0;
-/// Primitives that may occlude a block of light samples, estimated.
+/// Estimated number of primitives that may occlude a block of light samples.
 const CANDIDATES: f64 = 4.0;
 
-/// Iterations of a BVH traversal, estimated: nodes, leaves, triangles.
+/// Estimated iterations of a BVH traversal: nodes, leaves, triangles.
 const ROUNDS_OF_TREE: f64 = 150.0;
 
 /// Bounces after which Russian roulette has ended nearly all paths: a reflectance of 95 % leaves 0.95^100 = 0.6 %.
 const MAX_ROULETTE_BOUNCES: u32 = 100;
 
-/// Surfaces skipped by alpha before a hit, estimated.
+/// Estimated number of surfaces that a ray passes through because of their alpha before a hit.
 const ROUNDS_OF_PASSING: f64 = 4.0;
 
 const ROUNDS_OF_LOOKUP: f64 = 8.0;
 
-/// Returns the estimated maximum number of samples per dispatch. Errors only cost time: truncated dispatches are
-/// repeated with fewer samples, and more dispatches take longer.
+/// Returns the estimated maximum number of samples per dispatch. A wrong estimate only costs time: truncated dispatches
+/// are repeated with fewer samples, and more dispatches take longer.
 pub fn samples_per_dispatch(packed: &Packed, baked: bool) -> u32 {
     let samples = MAX_ROUNDS / rounds_of_sample(packed, baked);
     (samples as u32).max(1)
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn longer_samples_come_in_shorter_calls() {
+    fn more_iterations_per_sample_give_fewer_samples_per_dispatch() {
         let plain = samples_per_dispatch(&scene(6, 0), false);
         assert!((100..65_535).contains(&plain), "{plain}");
         assert!(samples_per_dispatch(&scene(6, 0), true) > plain);

@@ -17,8 +17,8 @@ pub struct Held {
 pub type FailedAllocation = (String, u64);
 
 impl Held {
-    /// Adds the failed allocation, if known, and the memory in use to an out-of-memory error without a message. Keeps
-    /// other errors.
+    /// Adds the failed allocation, if known, and the memory in use to an out-of-memory error without a message. Returns
+    /// other errors unchanged.
     pub fn explain(&self, error: RenderError, asked: Option<&FailedAllocation>) -> RenderError {
         match error {
             RenderError::OutOfMemory { device, message: None } => RenderError::OutOfMemory {
@@ -32,7 +32,7 @@ impl Held {
     fn message(&self, asked: Option<&FailedAllocation>) -> String {
         let asked = match asked {
             Some((what, bytes)) => format!("the driver has no {} MiB for {what}", mebibytes(*bytes)),
-            None => "the driver has no more".to_owned(),
+            None => "the driver has no more memory".to_owned(),
         };
         let used = [
             (self.scene, "for the scene"),
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_are_told_once() {
+    fn out_of_memory_errors_are_explained_once() {
         let held = Held {
             scene: 3 << 19,
             film: 64 << 20,
@@ -85,7 +85,10 @@ mod tests {
         assert_eq!(error_with_use.to_string(), line);
         assert_eq!(held.explain(error_with_use, None).to_string(), line);
         let unknown = Held::default().explain(error(), None).to_string();
-        assert_eq!(unknown, format!("gpu: out of memory: the driver has no more; {rest}"));
+        assert_eq!(
+            unknown,
+            format!("gpu: out of memory: the driver has no more memory; {rest}")
+        );
         let other = RenderError::Cancelled;
         assert!(matches!(held.explain(other, Some(&asked)), RenderError::Cancelled));
     }

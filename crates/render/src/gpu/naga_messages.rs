@@ -12,7 +12,7 @@ use naga::{Function, Module, Span, Type, WithSpan};
 use super::compose::Source;
 use super::functions::functions;
 
-/// Scalar types of naga, and in WGSL.
+/// Names of scalar types in naga and in WGSL.
 const SCALARS: [(&str, &str); 4] = [
     ("Scalar { kind: Float, width: 4 }", "f32"),
     ("Scalar { kind: Sint, width: 4 }", "i32"),
@@ -45,7 +45,7 @@ pub fn message(module: &Module, text: &str, error: &ValidationError) -> String {
 /// Returns a parse error's location and message.
 pub fn parse_message(error: &ParseError, source: &Source) -> (Option<Span>, String) {
     let labels: Vec<(Span, &str)> = error.labels().collect();
-    // Prefers the wrong value to the one that gives the reason.
+    // Prefers the location of the wrong value to the location that explains the error.
     let has_type = |(_, label): &&(Span, &str)| label.starts_with("this expression has type");
     let chosen = labels.iter().find(has_type).or(labels.first());
     let mut message = without_debug(error.message());
@@ -75,7 +75,7 @@ pub fn place(text: &str, error: &WithSpan<ValidationError>) -> Option<Span> {
     })
 }
 
-/// Removes fields of Rust's records, such as `Struct { members: … }`.
+/// Removes the fields of Rust structs, such as `Struct { members: … }`.
 fn without_debug(message: &str) -> String {
     match (message.find(" { "), message.rfind('}')) {
         (Some(start), Some(end)) if start < end => [&message[..start], &message[end + 1..]].concat(),
@@ -106,7 +106,8 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// Returns a message with names for indices, `[3]`. The words before one determine what it refers to.
+    /// Returns a message with names in place of indices such as `[3]`. The words before an index determine what the
+    /// index refers to.
     fn replaced(&self, message: &str) -> String {
         let (mut out, mut rest) = (String::new(), message);
         while let Some(start) = rest.find('[') {

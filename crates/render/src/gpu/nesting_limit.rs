@@ -9,7 +9,7 @@ const OPERATORS: usize = 1000;
 /// Maximum number of `else if` in all enclosing blocks.
 const ALTERNATIVES: usize = 400;
 
-/// Returns the location of too deep code, and the violated rule.
+/// Returns the location of code that is nested too deeply, and the violated rule.
 pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
     let plain = without_comments(text);
     let bytes = plain.as_bytes();
@@ -68,7 +68,7 @@ mod tests {
     use crate::gpu::compose::Shaders;
 
     #[test]
-    fn what_shaders_are_made_of_is_not_too_deep() {
+    fn built_in_shaders_and_long_flat_code_are_accepted() {
         for (name, text) in Shaders::built_in().files() {
             assert_eq!(too_deep(text), None, "{name}");
         }
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_on_and_on_is() {
+    fn deeply_nested_code_is_rejected() {
         let of = |part: &str, count: usize| format!("fn f() {{ let y = x{}; }}", part.repeat(count));
         for part in ["+x", ".x", "[0]", "<x", "+(x", "-f(x)", "+1.5"] {
             assert_eq!(too_deep(&of(part, 300)), None, "{part}");
@@ -93,7 +93,7 @@ mod tests {
         let of = |count: usize| format!("if a {{}} {} else {{}}", "else if b { x(); }\n ".repeat(count));
         assert_eq!(too_deep(&of(400)), None);
         assert!(too_deep(&of(401)).is_some());
-        // Nested chains add up.
+        // The lengths of nested chains add up.
         let inner = of(300);
         assert!(too_deep(&format!("{}if c {{ {inner} }}", "if a {} else if b { ".repeat(101))).is_some());
     }

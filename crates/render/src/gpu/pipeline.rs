@@ -12,7 +12,7 @@ use super::rounding::Rounding;
 use crate::error::RenderError;
 use crate::records::Specialization;
 
-/// Side of a workgroup; the kernels declare the same.
+/// Side of a workgroup; the kernels declare the same size.
 pub const WORKGROUP: u32 = 8;
 
 const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
@@ -31,7 +31,7 @@ pub const DISPATCH_GROUP: usize = 0;
 /// Bind group of the scene. Its last bindings have the texels.
 pub const SCENE: usize = 1;
 
-/// Number of storage buffers, without further texels.
+/// Number of storage buffers, not counting further texel buffers.
 pub const STORAGE_BUFFERS: usize = {
     let (mut count, mut group) = (0, 0);
     while group < GROUPS.len() {
@@ -80,7 +80,7 @@ pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) ->
     GROUPS.iter().enumerate().map(layout).collect()
 }
 
-/// Creates a bind group of buffers, in binding order.
+/// Creates a bind group of buffers, which are given in binding order.
 pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
     let entries: Vec<wgpu::BindGroupEntry> = (0..)
         .zip(buffers)
@@ -97,7 +97,7 @@ pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&w
 }
 
 /// Compiles a kernel: with `exact` to SPIR-V that is executed as written, else from WGSL by wgpu. naga validates both
-/// first, for the same error messages. Pipelines in the device's cache are returned at once.
+/// first, for the same error messages. Pipelines in the device's cache are returned immediately.
 pub fn pipeline(
     device: &Device,
     layouts: &[wgpu::BindGroupLayout],

@@ -1,4 +1,4 @@
-//! Compiled pipelines of a device, ready at once.
+//! Cache of compiled pipelines of a device.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,7 +7,7 @@ use super::compose::{Kernel, Source};
 use super::rounding::Rounding;
 use crate::records::Specialization;
 
-/// Maximum number of pipelines. The least recently used is dropped.
+/// Maximum number of pipelines. The least recently used pipeline is dropped first.
 const CAPACITY: usize = 32;
 
 /// Hash of everything that a pipeline is compiled from.

@@ -1,9 +1,9 @@
-//! Dead code elimination by a kernel's constants. Drivers do this only after inlining, at far greater cost.
+//! Dead code elimination, based on a kernel's constants. Drivers do this only after inlining, at far greater cost.
 
 use naga::compact::{KeepUnused, compact};
 use naga::{Arena, Block, Expression, Literal, Module, Statement};
 
-/// Replaces branches on constants by the block taken, then removes unused items.
+/// Replaces branches on constants by the block that is executed, then removes unused items.
 pub fn prune(module: &mut Module) {
     let functions = module.functions.iter_mut().map(|(_, function)| function);
     let entry_points = module
@@ -18,7 +18,7 @@ pub fn prune(module: &mut Module) {
     compact(module, KeepUnused::No);
 }
 
-/// Returns a block without dead branches, and true if it jumps at the end.
+/// Returns a block without dead branches, and true if the block ends with a jump.
 fn taken(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
     let mut out = Block::new();
     for (statement, span) in block.span_into_iter() {

@@ -55,14 +55,14 @@ pub struct Gpu {
     first_hits: Option<wgpu::ComputePipeline>,
     scene: SceneBuffers,
     work: wgpu::Buffer,
-    /// The kernel's completion record, and its mappable copy.
+    /// The kernel's completion record, and a mappable copy of the record.
     completion: [wgpu::Buffer; 2],
     /// Film rows before the last dispatch, for `undo`.
     before: Option<wgpu::Buffer>,
     film: Option<(Target, FilmState)>,
     pending: Option<Pending>,
     rules: Rules,
-    /// Estimated maximum without truncated loops.
+    /// Estimated maximum number of samples for which the driver truncates no loops.
     samples_per_dispatch: u32,
     slider_values: Option<wgpu::Buffer>,
     timer: Option<Timer>,
@@ -76,9 +76,9 @@ pub struct Dispatch {
     pub kernel: &'static str,
     /// Duration.
     pub took: Duration,
-    /// True if measured by the device, else until the observed completion.
+    /// True if the device measured the duration; otherwise the duration ends when completion is observed.
     pub by_device: bool,
-    /// Pixel samples, or pixels for kernels without samples.
+    /// Number of pixel samples; number of pixels for kernels that take no samples.
     pub samples: u64,
 }
 
@@ -112,7 +112,7 @@ struct Target {
     group: wgpu::BindGroup,
 }
 
-/// Film rows that contain a tile: a piece of each list, in bytes.
+/// Film rows that contain a tile: a range of bytes of each list.
 struct Rows {
     lists: u64,
     list: u64,
@@ -148,7 +148,7 @@ const FIRST_HITS_RECORD: usize = size_of::<FirstHit>();
 const LOOP_PROBE: UVec2 = UVec2::new(0, 4);
 
 impl Gpu {
-    /// Compiles the kernel, uploads the scene and dispatches the kernel without samples, since drivers compile at the
+    /// Compiles the kernel, uploads the scene and dispatches the kernel with no samples, since drivers compile at the
     /// first dispatch.
     pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
         Gpu::with_sliders(device, packed, shaders, options, Vec::new())
@@ -213,12 +213,12 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// Returns the overrides read from a buffer, in its order.
+    /// Returns the overrides that are read from a buffer, in the order of the buffer.
     pub fn sliders(&self) -> &[Slider] {
         &self.kernels.sliders
     }
 
-    /// Sets the sliders as bits, and discards the film.
+    /// Sets the values of the sliders, given as bits, and discards the film.
     ///
     /// # Errors
     ///
@@ -250,7 +250,8 @@ impl Gpu {
         &self.device
     }
 
-    /// Uploads a changed scene and discards the film. Returns false, without changes, if it needs another kernel.
+    /// Uploads a changed scene and discards the film. Returns false and changes nothing if the scene needs a different
+    /// kernel.
     ///
     /// # Errors
     ///
@@ -389,7 +390,8 @@ impl Gpu {
         }
     }
 
-    /// Saves the film rows of a tile, and dispatches as many samples as should complete.
+    /// Saves the film rows of a tile, and dispatches as many samples as the driver is expected to execute without
+    /// truncating loops.
     fn dispatch_part(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
         let rows = Rows::of(film, tile);
@@ -422,7 +424,7 @@ impl Gpu {
         Ok(())
     }
 
-    /// Ends a finished dispatch and submits the next one. A truncated one is repeated with half the samples.
+    /// Ends a finished dispatch and submits the next one. A truncated dispatch is repeated with half the samples.
     fn end_part(&mut self, pending: Pending) -> Result<(), RenderError> {
         let Pending {
             tile,
@@ -478,7 +480,8 @@ impl Gpu {
         }
     }
 
-    /// Discards the film after an error, and the completion buffer, since copies to it would fail while it is mapped.
+    /// Discards the film after an error. Also discards the completion buffer, since copies to the buffer would fail
+    /// while it is mapped.
     fn or_lost<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
         let result = self.explained(result, None);
         if result.is_err() {

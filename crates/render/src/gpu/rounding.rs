@@ -1,4 +1,5 @@
-//! Correctly rounded quotients and square roots on other devices: calls replace the operations of naga modules.
+//! Correctly rounded quotients and square roots on devices that round them differently: in naga modules, function calls
+//! replace the operations.
 
 use std::collections::HashMap;
 
@@ -83,7 +84,7 @@ fn calls_of(module: &Module, function: &Function, info: &FunctionInfo) -> Result
     Ok(calls)
 }
 
-/// Splits evaluation at each replaced expression, and inserts its call.
+/// Splits evaluation at each replaced expression, and inserts the call that replaces it.
 fn call(block: &mut Block, expressions: &mut Arena<Expression>, calls: &Calls) {
     for (statement, span) in std::mem::take(block).span_into_iter() {
         let Statement::Emit(range) = statement else {

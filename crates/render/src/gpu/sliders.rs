@@ -13,7 +13,7 @@ use super::pipeline::{DISPATCH_GROUP, GROUPS};
 use crate::error::ShaderError;
 use wgray_scene::Integrator;
 
-/// Binding of the values in the dispatch group, after those of all kernels.
+/// Binding of the values in the dispatch group, after the bindings of all kernels.
 const BINDING: usize = GROUPS[DISPATCH_GROUP].len();
 /// Name of the buffer of values.
 const VALUES: &str = "slider_values";
@@ -25,19 +25,19 @@ pub struct Slider {
     pub file: String,
     /// Name of the override.
     pub name: String,
-    /// Its line, from 1.
+    /// Line of the declaration, counted from 1.
     pub line: usize,
-    /// Its type.
+    /// Type of the override.
     pub kind: Kind,
-    /// Minimum of a number.
+    /// Minimum value of a number.
     pub min: f64,
-    /// Maximum.
+    /// Maximum value of a number.
     pub max: f64,
     /// Value in the file.
     pub default: Value,
 }
 
-/// Type of an override, by its WGSL name.
+/// Type of an override, named as in WGSL.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -82,7 +82,7 @@ impl Kind {
 }
 
 impl Slider {
-    /// Returns a value clamped to the range, rounded for an integer; `None` if of another type.
+    /// Returns a value clamped to the range, rounded for an integer; `None` if the value has a different type.
     pub fn clamped(&self, value: Value) -> Option<Value> {
         match (self.kind, value) {
             (Kind::Bool, Value::Bool(_)) => Some(value),
@@ -157,7 +157,7 @@ pub fn with_buffer(source: Source, kernel: &Kernel, sliders: &[Slider]) -> Resul
     Ok(source)
 }
 
-/// Returns a kernel's sliders, and the places of their declarations.
+/// Returns a kernel's sliders, and the locations of the declarations.
 fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Slider, Range<usize>)> {
     let module = checked.module();
     module.overrides.iter().filter_map(move |(handle, declared)| {
@@ -171,7 +171,7 @@ fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Sli
             return None;
         }
         let (kind, default) = match module.global_expressions[(*init)?] {
-            // The file's digits, not those of the nearest f64.
+            // Parses the shortest digits of the f32, such as 0.1: a direct conversion to f64 would add digits.
             Expression::Literal(Literal::F32(x)) => (Kind::F32, Value::Number(x.to_string().parse().ok()?)),
             Expression::Literal(Literal::I32(x)) => (Kind::I32, Value::Number(x.into())),
             Expression::Literal(Literal::U32(x)) => (Kind::U32, Value::Number(x.into())),
@@ -205,7 +205,7 @@ fn is_needed_to_compile(module: &Module, handle: Handle<Override>) -> bool {
     in_expressions || module.types.iter().any(|(_, ty)| is_size(&ty.inner))
 }
 
-/// Returns the range in a comment after a declaration, `// LOW..HIGH`, else one around the value.
+/// Returns the range in a comment after a declaration, `// LOW..HIGH`, else a range around the value.
 fn range_of(kind: Kind, default: Value, rest: &str) -> [f64; 2] {
     let Value::Number(value) = default else {
         return kind.limits();
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn overrides_that_are_needed_to_compile_are_no_sliders() {
+    fn overrides_that_compilation_needs_are_not_sliders() {
         let free = "override free: f32 = 0.5; // 0..1\nfn half_of(x: f32) -> f32 { return x * free; }\n";
         assert_eq!(found(free).len(), 1);
         for bound in [

@@ -27,7 +27,7 @@ const FLOAT_CONTROLS: &[u8] = b"SPV_KHR_float_controls";
 /// Bits of the controlled floats.
 const WIDTH: u32 = 32;
 
-/// Returns a module's instructions: opcode, and words, of which the first has opcode and length.
+/// Returns a module's instructions: the opcode, and all words. The first word encodes opcode and length.
 pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     let mut rest = module.get(HEADER..).unwrap_or(&[]);
     std::iter::from_fn(move || {
@@ -218,7 +218,7 @@ mod tests {
         assert_eq!(
             other_instructions(&plain),
             other_instructions(&all),
-            "other instructions are changed"
+            "other instructions were changed"
         );
         assert_eq!(plain[..HEADER], all[..HEADER]);
     }
@@ -232,6 +232,6 @@ mod tests {
         let behind = capabilities + extension(FLOAT_CONTROLS).len() - 2;
         wrong.splice(behind..behind, first);
         assert_eq!(asked(&wrong).2, asked(&module).2);
-        assert!(!in_order(&wrong), "a capability behind an extension");
+        assert!(!in_order(&wrong), "a capability after an extension was not detected");
     }
 }

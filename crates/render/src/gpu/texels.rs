@@ -1,4 +1,4 @@
-//! Buffer limits of a device: scenes beyond are rejected, and texels are split across buffers.
+//! Buffer limits of a device: scenes that exceed the limits are rejected, and texels are split across buffers.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
 use crate::error::RenderError;
 use crate::records::Packed;
 
-/// Distribution of texels. All buffers but the last have 2^shift words.
+/// Distribution of texels. All buffers except the last have 2^shift words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TexelParts {
     /// Number of buffers, at least 1.
@@ -19,7 +19,7 @@ pub struct TexelParts {
 }
 
 impl TexelParts {
-    /// Returns the distribution for a scene, or an error beyond the device's limits.
+    /// Returns the distribution for a scene, or an error if the scene exceeds the device's limits.
     pub fn of(info: &GpuInfo, packed: &Packed) -> Result<TexelParts, RenderError> {
         let largest = info.largest_binding.min(info.largest_buffer);
         let too_large = |message: String| RenderError::TooLarge {
@@ -65,8 +65,8 @@ impl TexelParts {
             .map(move |rest| &rest[..rest.len().min(size)])
     }
 
-    /// Returns WGSL with the function of `shaders/texels.wgsl` for several buffers, and their bindings but the first.
-    /// `None` for one.
+    /// Returns WGSL with the function of `shaders/texels.wgsl` for several buffers, and the bindings of all buffers
+    /// except the first. `None` for a single buffer.
     pub fn wgsl(&self) -> Option<String> {
         if self.count == 1 {
             return None;
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn texels_lie_in_as_few_buffers_as_hold_them() {
+    fn texels_are_split_across_as_few_buffers_as_possible() {
         let storage = STORAGE_BUFFERS as u32;
         for (texels, buffers) in [(0, 1), (1, 1), (1024, 1), (1025, 2), (2048, 2), (4096, 4)] {
             let packed = packed(1, texels);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_device_cannot_see_is_told_with_the_way_out() {
+    fn scenes_that_exceed_a_buffer_limit_are_rejected() {
         let storage = STORAGE_BUFFERS as u32;
         let message = |info: GpuInfo, packed: &Packed| TexelParts::of(&info, packed).unwrap_err().to_string();
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Durations of dispatches by GPU timestamps.
+//! Durations of dispatches, measured with GPU timestamps.
 
 use std::time::Duration;
 
@@ -21,7 +21,7 @@ struct Clock {
 }
 
 impl Timer {
-    /// Creates a timer, which returns nothing if the device has no clock.
+    /// Creates a timer, which measures nothing if the device has no clock.
     pub fn new(device: &Device) -> Timer {
         let has_clock = device.device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         Timer {
@@ -54,7 +54,7 @@ impl Timer {
         }
     }
 
-    /// Returns the duration between two timestamps of two words each.
+    /// Returns the duration between two timestamps, which take two words each.
     pub fn took(&self, words: &[u32]) -> Option<Duration> {
         let clock = self.clock.as_ref()?;
         let [a, b, c, d] = *words else { return None };

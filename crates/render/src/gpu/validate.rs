@@ -12,7 +12,7 @@ use super::rounding::Rounding;
 use crate::error::{ShaderError, ShaderErrors};
 use crate::records::Packed;
 
-/// Maximum errors reported of a kernel.
+/// Maximum number of errors reported per kernel.
 const MOST: usize = 16;
 
 /// Representation of the scene in the checked kernels.
@@ -29,7 +29,7 @@ pub enum Forms {
 ///
 /// # Errors
 ///
-/// All errors, without duplicates of several kernels. Only the first one in each function is found.
+/// All errors; an error of several kernels is listed once. Only the first error of each function is found.
 pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result<(), ShaderErrors> {
     let baked = (forms == Forms::All).then(|| bake_if_small(packed)).flatten();
     let mut scenes = vec![None];
@@ -133,8 +133,9 @@ mod tests {
         shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
     ";
 
-    /// Returns the messages for built-in shaders with parts of files replaced; an empty part is the end.
-    fn said(edits: &[(&str, &str, &str)]) -> Vec<String> {
+    /// Returns the messages for built-in shaders with parts of files replaced; an empty part stands for the end of the
+    /// file.
+    fn messages_of(edits: &[(&str, &str, &str)]) -> Vec<String> {
         let mut shaders = Shaders::built_in();
         for (name, old, new) in edits {
             let text = shaders.text(name);
@@ -151,8 +152,8 @@ mod tests {
     }
 
     #[track_caller]
-    fn says(edits: &[(&str, &str, &str)], wanted: &[&str]) {
-        let messages = said(edits);
+    fn reports(edits: &[(&str, &str, &str)], wanted: &[&str]) {
+        let messages = messages_of(edits);
         assert_eq!(messages.len(), wanted.len(), "{messages:#?}");
         for wanted in wanted {
             let (place, parts) = wanted.split_once(' ').unwrap();
@@ -167,13 +168,13 @@ mod tests {
     const ADAPTIVE: &str = "kernels/adaptive.wgsl";
 
     #[test]
-    fn the_built_in_shaders_are_right() {
-        assert_eq!(said(&[]), [""; 0]);
+    fn the_built_in_shaders_are_valid() {
+        assert_eq!(messages_of(&[]), [""; 0]);
     }
 
     #[test]
-    fn every_kernel_is_checked_and_all_mistakes_are_told_once() {
-        says(
+    fn every_kernel_is_checked_and_each_error_is_reported_once() {
+        reports(
             &[
                 (RENDER, "sample++", "sample+"),
                 (FIRST_HITS, "pixel_first_hit(pixel)", "pixel_first_hit(pixels)"),
@@ -198,27 +199,27 @@ mod tests {
     }
 
     #[test]
-    fn the_entry_point_must_be_what_the_program_calls() {
-        says(
+    fn the_entry_point_must_match_the_program() {
+        reports(
             &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(4, 4)")],
             &["kernels/render.wgsl: workgroup size of `render` is (4, 4) .. (8, 8)"],
         );
-        says(
+        reports(
             &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(BOUNCES, 8)")],
             &["kernels/render.wgsl: workgroup size of `render` is set by an override"],
         );
-        says(
+        reports(
             &[(FIRST_HITS, "fn first_hits", "fn hits_first")],
             &["kernels/first_hits.wgsl: must be called `first_hits`, not `hits_first`"],
         );
         let built_in = Shaders::built_in();
         let text = built_in.text(FIRST_HITS);
         let start = text.find("@compute").unwrap();
-        says(
+        reports(
             &[(FIRST_HITS, &text[start..], "")],
             &["kernels/first_hits.wgsl:1:1: there is no entry point: @compute @workgroup_size(8, 8) fn first_hits"],
         );
-        says(
+        reports(
             &[
                 (FIRST_HITS, "@compute @workgroup_size(8, 8)", ""),
                 (FIRST_HITS, "@builtin(global_invocation_id) ", ""),
@@ -229,17 +230,17 @@ mod tests {
     }
 
     #[test]
-    fn bindings_must_be_what_the_program_binds() {
+    fn bindings_must_match_the_program() {
         let film = "@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;";
-        says(
+        reports(
             &[(FILM, "@binding(1)", "@binding(40)")],
             &["film.wgsl: `film` must be at @group(0) @binding(1)"],
         );
-        says(
+        reports(
             &[(FILM, film, "var<private> film: array<vec4f, 9>;")],
             &["film.wgsl:1:1: @group(0) @binding(1) .. `var<storage, read_write>` film: array<vec4<f32>> is missing"],
         );
-        says(
+        reports(
             &[
                 (FIRST_HITS, "array<FirstHit>", "array<vec4f>"),
                 (
@@ -250,26 +251,26 @@ mod tests {
             ],
             &["kernels/first_hits.wgsl: `hits[]` is `vec4<f32>` and must be `FirstHit`"],
         );
-        says(
+        reports(
             &[("bindings.wgsl", "", "@group(0) @binding(30) var<uniform> more: vec4f;")],
             &["bindings.wgsl: `more`: the program binds nothing at @group(0) @binding(30)"],
         );
-        says(
+        reports(
             &[("bindings.wgsl", "var<uniform> camera", "var<storage, read> camera")],
             &["bindings.wgsl: `camera` is `var<storage, read>`; @group(1) @binding(0) must be `var<uniform>`"],
         );
-        says(
+        reports(
             &[("bindings.wgsl", "texels: array<u32>", "texels: array<u32, 16>")],
             &["bindings.wgsl: `texels` is `array<u32, 16>` and must be `array<u32>`"],
         );
         // A read-only buffer that is not needed may be absent.
-        says(&[("bindings.wgsl", "", "// nothing")], &[]);
+        reports(&[("bindings.wgsl", "", "// nothing")], &[]);
     }
 
     #[test]
-    fn bindings_must_be_laid_out_as_the_program_writes_them() {
+    fn layouts_of_bindings_must_match_the_program() {
         let rows = "struct Rows { light_counts: vec4u, more: vec4u }\n";
-        says(
+        reports(
             &[
                 ("bindings.wgsl", "completion: Completion", "completion: Receipts"),
                 (
@@ -280,7 +281,7 @@ mod tests {
             ],
             &["bindings.wgsl: `completion` is not laid out .. `completion.more` is `f32`"],
         );
-        says(
+        reports(
             &[
                 ("bindings.wgsl", "", rows),
                 (
@@ -294,8 +295,8 @@ mod tests {
     }
 
     #[test]
-    fn errors_in_generated_code_are_left_out_where_a_file_has_the_cause() {
-        let messages = said(&[("bindings.wgsl", "records: array<vec4u>", "records: array<vec2u>")]);
+    fn errors_in_generated_code_are_omitted_if_a_file_has_the_cause() {
+        let messages = messages_of(&[("bindings.wgsl", "records: array<vec4u>", "records: array<vec2u>")]);
         assert!(
             messages
                 .iter()
@@ -306,8 +307,8 @@ mod tests {
     }
 
     #[test]
-    fn a_second_definition_of_a_name_is_reported_with_the_place_of_the_first() {
-        says(
+    fn redefinitions_are_reported_with_the_other_definition() {
+        reports(
             &[("phong.wgsl", "", "const steps: i32 = 3;")],
             &["bvh_node.wgsl:5:4: redefinition of `steps`; the other definition is at phong.wgsl:"],
         );
@@ -315,22 +316,22 @@ mod tests {
 
     #[test]
     fn constants_of_a_shader_must_have_values() {
-        says(
+        reports(
             &[("math.wgsl", "", "override MINE: f32;")],
             &["math.wgsl: `MINE` has no value"],
         );
-        says(&[("math.wgsl", "", "override MINE: f32 = 2.0;")], &[]);
+        reports(&[("math.wgsl", "", "override MINE: f32 = 2.0;")], &[]);
     }
 
     #[test]
     fn results_must_be_written() {
-        says(
+        reports(
             &[(RENDER, "    report_completion(local);\n", "")],
             &[
                 "kernels/render.wgsl: `render` never writes `completion`, which the program reads: every pixel must end with `report_completion(local)`",
             ],
         );
-        says(
+        reports(
             &[(
                 FIRST_HITS,
                 "hits[place.y * params.film_size.x + place.x] =",
@@ -341,9 +342,9 @@ mod tests {
     }
 
     #[test]
-    fn messages_name_what_is_in_the_source() {
+    fn messages_use_the_names_of_the_source() {
         let with = |body: &str| {
-            said(&[(
+            messages_of(&[(
                 "phong.wgsl",
                 "",
                 &format!("fn wrong(a: f32, b: vec3f, n: u32) {{\n    {body}\n}}"),

@@ -34,15 +34,15 @@ impl From<bool> for Flow {
 /// Callback after each dispatch, with the region of the band and the done fraction of all work, 0 to 1.
 pub type Watch<'a> = dyn FnMut(&mut dyn Backend, Region, f64) -> Result<Flow, RenderError> + 'a;
 
-/// Renders the bands of a region from the top, with dispatches sized by the measured speed. Pieces from a checkpoint
-/// are not rendered again.
+/// Renders the bands of a region, from top to bottom. The measured speed determines the size of dispatches. Pieces from
+/// a checkpoint are not rendered again.
 pub struct Bands<'a> {
     store: &'a mut dyn CheckpointStore,
     bands: VecDeque<Band>,
     samples: u32,
-    /// Completion of bands rendered together; `None` if one after the other.
+    /// Completion of bands rendered together; `None` if they are rendered one after the other.
     whole: Option<bool>,
-    /// Samples at the end of the current pass, under [`Bands::in_passes`].
+    /// Samples at the end of the current pass, if the bands are rendered in passes ([`Bands::in_passes`]).
     pass: Option<u32>,
     steps: Steps,
     /// Samples over all pixels, in finished bands and in total.
@@ -50,17 +50,17 @@ pub struct Bands<'a> {
     total: f64,
     /// Time and duration of the last checkpoint.
     kept: (Instant, Duration),
-    /// Samples over all pixels, rendered, not loaded.
+    /// Samples over all pixels that were rendered, not loaded.
     rendered: f64,
 }
 
 /// A rendered band.
 pub struct FinishedBand {
-    /// Its pixels.
+    /// Pixels of the band.
     pub film: Film,
-    /// Minimum samples of a pixel.
+    /// Minimum number of samples of a pixel.
     pub min_samples: u32,
-    /// Samples requested per pixel so far; under adaptive sampling a maximum.
+    /// Samples requested per pixel so far; with adaptive sampling a maximum.
     pub requested_samples: u32,
     /// Number of camera rays.
     pub camera_rays: u64,
@@ -117,7 +117,7 @@ enum End {
 /// Target duration between copies of a film.
 const PASS: Duration = Duration::from_secs(1);
 
-/// Minimum rows of a shortened band, without and with adaptive sampling, which adds two.
+/// Minimum rows of a shortened band, without and with adaptive sampling, which adds two rows of neighbors.
 const MIN_ROWS: [u32; 2] = [16, 64];
 
 impl<'a> Bands<'a> {
@@ -187,7 +187,7 @@ impl<'a> Bands<'a> {
         self.bands.iter().map(|band| band.region.pixels()).sum()
     }
 
-    /// Renders and returns the next band; `None` after the last one. After an error, the next call resumes the band
+    /// Renders and returns the next band; `None` after the last band. After an error, the next call resumes the band
     /// from its last checkpoint, possibly on another backend. Calls `made` whenever progress is stored.
     ///
     /// # Errors
@@ -221,9 +221,9 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// Renders one more pass over all bands, of one or more samples per pixel. Returns the samples of every pixel;
-    /// `None` if they are complete or the time is up, after which [`Bands::render_next`] returns the bands. After an
-    /// error the pass can be continued, and [`Bands::last_pass`] returns the one before it.
+    /// Renders another pass over all bands, adding one or more samples per pixel. Returns the number of samples of
+    /// every pixel; `None` if all samples are complete or the time is up, after which [`Bands::render_next`] returns
+    /// the bands. After an error the pass can be continued, and [`Bands::last_pass`] returns the previous pass.
     ///
     /// # Errors
     ///
@@ -262,7 +262,7 @@ impl<'a> Bands<'a> {
         self.bands.iter().map(samples).min().unwrap_or(self.samples)
     }
 
-    /// Passes copies of all bands after the last whole pass to `output`, from the top.
+    /// Passes copies of all bands, as of the last complete pass, to `output`, from top to bottom.
     ///
     /// # Errors
     ///
@@ -316,7 +316,7 @@ impl<'a> Bands<'a> {
             if self.work_on_all(until, backend, watch, made)? == End::TimeIsUp || until >= self.samples {
                 return Ok(());
             }
-            // A round copies all films: with many samples it adds a quarter.
+            // A round copies all films: with many samples a round adds a quarter.
             until = (until + (until / 4).max(1)).min(self.samples);
         }
     }
@@ -509,7 +509,7 @@ impl Band {
         self.reached().map_or(0, |reached| reached.pass.start.min(all))
     }
 
-    /// Samples over all pixels, without those of an incomplete pass.
+    /// Samples over all pixels, not counting an incomplete pass.
     fn work(&self, all: u32) -> f64 {
         self.region.pixels() as f64 * f64::from(self.samples(all))
     }
@@ -519,7 +519,7 @@ impl Band {
 ///
 /// # Errors
 ///
-/// [`RenderError::Memory`] if it is not.
+/// [`RenderError::Memory`] if the memory is not available.
 pub fn check_memory(bytes: u64) -> Result<(), RenderError> {
     match usize::try_from(bytes).is_ok_and(|bytes| fallible(|| Vec::<u8>::new().try_reserve_exact(bytes)).is_ok()) {
         true => Ok(()),

@@ -1,5 +1,5 @@
 //! Checkpoints: a file that receives finished pieces of an image, and at intervals the unfinished one, to resume an
-//! interrupted job. One process writes it at a time; others wait.
+//! interrupted job. One process writes the file at a time; others wait.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -76,7 +76,7 @@ pub struct Checkpoint<'a> {
     key: Key,
     film_layout: FilmLayout,
     entries: Vec<Entry>,
-    /// Pieces not replaced by later ones, by their first rows.
+    /// Pieces not replaced by later pieces; the key is the first row.
     latest: BTreeMap<u32, usize>,
     /// End of the last complete piece.
     end: u64,
@@ -171,7 +171,7 @@ impl<'a> Checkpoint<'a> {
             };
             match file.try_lock() {
                 Err(TryLockError::WouldBlock) => {
-                    // A process that is being killed ends within a second: no message.
+                    // A killed process ends within a second: waiting for it is not reported.
                     rounds += 1;
                     if rounds == QUIET_RETRIES {
                         report(&format!(
@@ -271,7 +271,7 @@ impl<'a> Checkpoint<'a> {
         Ok(())
     }
 
-    /// Rewrites the file without replaced pieces if these are the greater part.
+    /// Rewrites the file without replaced pieces if they take more than half of the file.
     fn tidy(&mut self) {
         let lengths = self
             .latest
@@ -280,7 +280,7 @@ impl<'a> Checkpoint<'a> {
         let needed: u64 = lengths.sum();
         let bound = (2 * needed + WASTE).max(self.untidy);
         if self.end > bound && self.rewrite(|temporary, path| temporary.persist(path)).is_err() {
-            // The disk may be full, or the file not replaceable. Nothing is lost; a later call tries again.
+            // The disk may be full, or the file cannot be replaced. Nothing is lost; a later call tries again.
             self.untidy = 2 * self.end;
         }
     }
@@ -314,7 +314,7 @@ impl<'a> Checkpoint<'a> {
         Ok(())
     }
 
-    /// Restores a deleted file. Keeps and reports another file in its place.
+    /// Restores a deleted file. If a different file has taken its place, keeps and reports that file.
     fn still_there(&mut self) -> io::Result<()> {
         if is_at(&self.file, &self.path) && self.file.metadata()?.len() >= self.end {
             return Ok(());

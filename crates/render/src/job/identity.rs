@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use crate::records::{Packed, PackedMesh, Specialization};
 use wgray_image::Region;
 
-/// Maximum image side in pixels, and samples per pixel, as in scenes.
+/// Maximum image side in pixels, and maximum samples per pixel. Scenes have the same limits.
 const MAX_COUNT: u32 = 65_536;
 
-/// Everything that determines a film's bits, not the device.
+/// Everything that determines a film's bits. The device does not.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
@@ -23,7 +23,7 @@ pub struct Identity {
     pub picture: [u32; 2],
     /// Rendered pixels: x0, y0, x1, y1.
     pub region: [u32; 4],
-    /// Samples per pixel; under adaptive sampling the maximum.
+    /// Samples per pixel; with adaptive sampling the maximum.
     pub pixel_samples: u32,
     /// True if sampling is adaptive.
     pub adaptive: bool,
@@ -104,7 +104,7 @@ impl Identity {
         }
     }
 
-    /// Describes the first difference of another job: "its size is A, not B".
+    /// Describes the first difference from another job: "its size is A, not B".
     pub fn difference(&self, other: &Identity) -> Option<String> {
         let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
         let short = |hash: &str| hash.get(..16).unwrap_or(hash).to_owned();
@@ -203,7 +203,7 @@ fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
 /// Minimum length of a list hashed by all threads.
 const PARALLEL_BYTES: usize = 1 << 20;
 
-/// Hashes bytes after their length, so that no two lists of lists hash alike.
+/// Hashes the length of a list before its bytes, so that different lists of lists never hash the same bytes.
 fn list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
     hasher.update(&(bytes.len() as u64).to_le_bytes());
     match bytes.len() >= PARALLEL_BYTES {

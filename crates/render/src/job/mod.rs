@@ -39,7 +39,7 @@ pub struct WorkSplit {
 }
 
 impl Default for WorkSplit {
-    /// Films of at most 64 MiB, 192 MiB under adaptive sampling.
+    /// Films of at most 64 MiB, or 192 MiB with adaptive sampling.
     fn default() -> WorkSplit {
         WorkSplit {
             band_pixels: 4 << 20,
@@ -50,8 +50,8 @@ impl Default for WorkSplit {
 }
 
 impl WorkSplit {
-    /// Returns [`WorkSplit::default`], with smaller bands for layers, so that a film takes no more memory than an
-    /// adaptive one.
+    /// Returns [`WorkSplit::default`], with smaller bands for layers, so that a film takes no more memory than with
+    /// adaptive sampling.
     pub fn of(film_layout: FilmLayout) -> WorkSplit {
         const LISTS: u64 = 3;
         let split = WorkSplit::default();
@@ -62,7 +62,7 @@ impl WorkSplit {
     }
 }
 
-/// Splits a region into bands of whole rows that fit a film, from the top; none without pixels.
+/// Splits a region into bands of whole rows that fit a film, from top to bottom; an empty region has no bands.
 pub fn bands(region: Region, split: &WorkSplit, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
     let [width, height] = [region.width(), region.height()].map(|n| u64::from(n.max(1)));
     let rows = (split.band_pixels.min(largest_film) / width).clamp(1, height) as u32;
@@ -74,7 +74,8 @@ pub fn bands(region: Region, split: &WorkSplit, largest_film: u64) -> impl Itera
     })
 }
 
-/// Returns the first hits through a region's pixel centers, row by row from the top, in dispatches of bounded size.
+/// Returns the first hits through a region's pixel centers, in row-major order, top row first. Dispatches have a
+/// bounded size.
 pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<FirstHit>, RenderError> {
     const CALL_PIXELS: u64 = 1 << 18;
     let split = WorkSplit {
@@ -88,8 +89,8 @@ pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<First
     Ok(hits)
 }
 
-/// Renders an image band by band from the top, and passes each to `output`. `progress` receives the done fraction of
-/// the work, 0 to 1, and returns true to continue.
+/// Renders an image band by band, from top to bottom, and passes each band to `output`. `progress` receives the
+/// finished fraction of the work, 0 to 1, and returns true to continue.
 pub fn render(
     backend: &mut dyn Backend,
     region: Region,
@@ -167,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_get_all_samples_first_or_all_pixels_some() {
+    fn both_orders_give_every_pixel_each_sample_once() {
         for (order, first) in [(Order::Rows, 0..16), (Order::Pixels, 0..4)] {
             let (mut notes, region) = (Notes(Vec::new()), Region::whole(64, 64));
             let mut steps = Steps::new(&WorkSplit::default(), DISPATCH_DURATION, order);

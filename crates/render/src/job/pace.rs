@@ -1,4 +1,4 @@
-//! Adaptive size of dispatches, from the measured speed.
+//! Size of dispatches, adapted to the measured speed.
 
 use std::time::Duration;
 
@@ -17,7 +17,8 @@ pub(super) struct Pace {
 impl Pace {
     /// Small enough for the slowest device and scene.
     const FIRST_CALL: f64 = 16384.0;
-    /// Maximum speedup from skipped samples under adaptive sampling. In the next tile no pixel may skip any.
+    /// Maximum speedup from skipped samples with adaptive sampling. It is limited because in the next tile, maybe no
+    /// pixel skips samples.
     const MAX_OUTLIER_RATIO: f64 = 8.0;
     /// Minimum work: one workgroup.
     const LEAST: f64 = 64.0;
@@ -31,7 +32,7 @@ impl Pace {
         }
     }
 
-    /// Records a finished dispatch. `of_all` means that no pixel skipped samples.
+    /// Records a finished dispatch. `of_all` is true if no pixel skipped samples.
     pub fn took(&mut self, work: f64, time: Duration, of_all: bool) {
         let speed = work / time.as_secs_f64().max(1e-6);
         let speed = self.speed.map_or(speed, |known| speed.min(2.0 * known));
@@ -46,7 +47,7 @@ impl Pace {
         self.most = self.most.min(work / 2.0);
     }
 
-    /// Discards the speed of another work or device.
+    /// Discards the speed of other work or of another device.
     pub fn forget(&mut self) {
         self.speed = None;
     }

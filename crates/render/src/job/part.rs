@@ -30,7 +30,7 @@ pub struct PartHeader {
     pub aovs: Vec<String>,
     /// True if the image has alpha.
     pub alpha: bool,
-    /// Bits (f32) of the distance of half brightness in a PNG of the depth.
+    /// Bits (f32) of the distance that a PNG of the depth maps to half brightness.
     pub middle_depth: u32,
     /// Name of the view transform.
     pub view_transform: String,
@@ -41,7 +41,7 @@ pub struct PartHeader {
 }
 
 impl PartHeader {
-    /// Returns why another part does not belong to the same image, if it does not.
+    /// Returns the reason why another part does not belong to the same image; `None` if it does.
     fn difference(&self, other: &PartHeader, view_is_given: bool) -> Option<&'static str> {
         let view = |header: &PartHeader| (header.view_transform.clone(), header.exposure);
         if (&self.aovs, self.alpha) != (&other.aovs, other.alpha) {
@@ -106,14 +106,15 @@ impl PartHeader {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tile {
-    /// Number of the part, from 1.
+    /// Number of the part, counted from 1.
     pub number: u32,
     /// Number of parts.
     pub of: u32,
 }
 
 impl Tile {
-    /// Returns the part's rows of a region, balanced to one row; `None` with fewer rows than parts.
+    /// Returns the part's rows of a region. The sizes of parts differ by at most one row. `None` if there are fewer
+    /// rows than parts.
     pub fn rows(self, region: Region) -> Option<Region> {
         let Tile { number, of } = self;
         let height = u64::from(region.height());
@@ -199,7 +200,7 @@ pub enum PartError {
 pub struct Parts {
     /// The job.
     pub identity: Identity,
-    /// The header, equal in all parts except the tile.
+    /// The header; all its fields except the tile are equal in all parts.
     pub header: PartHeader,
     /// Paths and hash keys. Files are opened per read, as the number of open files is limited.
     files: Vec<(PathBuf, Key)>,
@@ -208,8 +209,8 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Opens all parts of an image, in any order. Checks that they are complete, of one job, and cover every row once.
-    /// Their view settings must agree unless `view_is_given`.
+    /// Opens all parts of an image, given in any order. Checks that the parts are complete, belong to one job, and
+    /// cover every row exactly once. The view settings of the parts must agree unless `view_is_given`.
     ///
     /// # Errors
     ///
@@ -232,7 +233,7 @@ impl Parts {
             });
             let first = || all.files.first().map_or(path, |(first, _)| first).display();
             if let Some(what) = all.identity.difference(&header.identity) {
-                return Err(bad(format!("belongs to another image than {}: {what}", first())));
+                return Err(bad(format!("belongs to a different image than {}: {what}", first())));
             }
             if let Some(what) = all.header.difference(&part, view_is_given) {
                 return Err(bad(format!("{what} than {}", first())));
@@ -268,7 +269,7 @@ impl Parts {
         (next < y1).then(|| (next, y1 - 1))
     }
 
-    /// Returns the layout of the merged image, without names unknown to this version.
+    /// Returns the layout of the merged image, omitting names that this version does not know.
     pub fn layout(&self) -> Layout {
         let Identity {
             picture, pixel_samples, ..
@@ -298,7 +299,7 @@ impl Parts {
         }
     }
 
-    /// Passes all pieces to a sink, from the top.
+    /// Passes all pieces to a sink, from top to bottom.
     ///
     /// # Errors
     ///
@@ -324,7 +325,7 @@ impl Parts {
     }
 }
 
-/// Describes missing rows, with the missing parts if all count the same.
+/// Describes missing rows, and the missing parts if all parts agree on the number of parts.
 fn missing(from: u32, to: u32, tiles: &[Tile]) -> String {
     let rows = match from == to {
         true => format!("row {from} is missing"),
@@ -449,7 +450,7 @@ mod tests {
         header.part.as_mut().unwrap()
     }
 
-    /// Files with correct hashes that are never written. Fuzzing found that the first case panicked.
+    /// Files with correct hashes that the program never writes. Fuzzing found that the first case panicked.
     #[test]
     fn what_no_program_writes_is_refused() {
         assert_eq!(error_of(|_, _| ()), "");

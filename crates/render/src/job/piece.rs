@@ -7,7 +7,7 @@ use crate::error::RenderError;
 use crate::film::Film;
 use wgray_image::Region;
 
-/// Rows of an image with their samples so far. Any backend can continue it, with the same bits.
+/// Rows of an image with their samples so far. Any backend can continue the piece and gives the same bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmPiece {
     /// Whole rows of the job's region.
@@ -33,7 +33,7 @@ pub struct StoredPiece {
 
 /// Storage of pieces while others are rendered.
 pub trait CheckpointStore {
-    /// Returns the pieces from the top, without shared rows.
+    /// Returns the pieces, which share no rows, from top to bottom.
     fn pieces(&self) -> Vec<StoredPiece>;
 
     /// Loads a piece.
@@ -43,7 +43,7 @@ pub trait CheckpointStore {
     /// Unreadable pieces.
     fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError>;
 
-    /// Stores a piece in place of those of the same rows. Reports a failure, without stopping the work.
+    /// Stores a piece, replacing earlier pieces of the same rows. Reports a failure without stopping the work.
     fn keep(&mut self, piece: &FilmPiece);
 
     /// Flushes all stored pieces to the disk.
@@ -52,11 +52,11 @@ pub trait CheckpointStore {
     /// Interval between checkpoints of unfinished pieces.
     fn interval(&self) -> Duration;
 
-    /// Returns true if pieces should take about one interval.
+    /// Returns true if rendering a piece should take about one interval.
     fn small_pieces(&self) -> bool;
 }
 
-/// Drops everything: the work survives a lost device, but not the process.
+/// Stores nothing: the work survives a lost device, but not the end of the process.
 #[derive(Debug)]
 pub struct NoCheckpoint;
 

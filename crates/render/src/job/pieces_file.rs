@@ -7,7 +7,7 @@
 //! | header | length (u32), JSON of a [`Header`], BLAKE3 hash of both |
 //! | piece | 14 words (see `Head`), their hash, lists of the film, first hits, hash of all preceding bytes |
 //!
-//! Pieces' hashes are keyed with the header's, so that pieces of other files are rejected.
+//! The hashes of pieces are keyed with the hash of the header, so that pieces of other files are rejected.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -114,7 +114,7 @@ impl<T> HashingStream<T> {
 }
 
 impl<W: Write> HashingStream<W> {
-    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+    fn write_and_hash(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.inner.write_all(bytes)?;
         self.hasher.update(bytes);
         self.bytes += bytes.len() as u64;
@@ -124,7 +124,7 @@ impl<W: Write> HashingStream<W> {
     /// Writes the hash of all bytes so far, including hashes.
     fn put_hash(&mut self) -> io::Result<()> {
         let hash = self.hash();
-        self.put(&hash)
+        self.write_and_hash(&hash)
     }
 
     fn put_words(&mut self, words: &[u32]) -> io::Result<()> {
@@ -134,7 +134,7 @@ impl<W: Write> HashingStream<W> {
             for (to, word) in copy.iter_mut().zip(chunk) {
                 *to = word.to_le();
             }
-            self.put(cast_slice(&copy[..chunk.len()]))?;
+            self.write_and_hash(cast_slice(&copy[..chunk.len()]))?;
         }
         Ok(())
     }
@@ -170,7 +170,7 @@ pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u
     let mut out = HashingStream::new(out);
     out.inner.write_all(MAGIC)?;
     out.put_words(&[text.len() as u32])?;
-    out.put(&text)?;
+    out.write_and_hash(&text)?;
     let key = out.hash();
     out.put_hash()?;
     Ok((key, MAGIC.len() as u64 + out.bytes))
@@ -407,7 +407,7 @@ pub fn read_piece(
     Ok((piece, hits))
 }
 
-/// Returns the pieces that no later one replaces, from the top. `entries` are in file order.
+/// Returns the pieces that no later piece replaces, from top to bottom. `entries` are in file order.
 pub fn latest(entries: &[Entry]) -> Vec<usize> {
     let mut rows = std::collections::BTreeMap::<u32, usize>::new();
     for (number, entry) in entries.iter().enumerate() {
@@ -416,9 +416,9 @@ pub fn latest(entries: &[Entry]) -> Vec<usize> {
     rows.into_values().collect()
 }
 
-/// Adds a piece to a map from first rows to numbers, replacing those that share rows.
+/// Adds a piece to a map from first rows to numbers, replacing pieces that share rows with it.
 pub fn replace(rows: &mut std::collections::BTreeMap<u32, usize>, entries: &[Entry], number: usize, region: Region) {
-    // Pieces are disjoint: only the last one that starts above can overlap.
+    // Pieces are disjoint: only the last piece that starts above can overlap.
     let above = rows
         .range(..region.y0)
         .next_back()

@@ -20,15 +20,15 @@ pub enum Order {
     Pixels,
 }
 
-/// Minimum rows of a dispatch under [`Order::Rows`]: two rows of workgroups on a GPU.
+/// Minimum rows of a dispatch with [`Order::Rows`]: two rows of workgroups on a GPU.
 const ROWS: u32 = 16;
 
 /// Samples of the pixels of a film.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SampleProgress {
-    /// Samples in progress; all earlier ones are complete. Empty when all are.
+    /// Samples in progress; all earlier samples are complete. Empty when all samples are complete.
     pub pass: Range<u32>,
-    /// Column and row of the first pixel without them.
+    /// Column and row of the first pixel that lacks these samples.
     pub next: [u32; 2],
 }
 
@@ -62,7 +62,7 @@ impl Dispatch {
 }
 
 impl Steps {
-    /// Creates an empty sequence, of dispatches that take about `call`.
+    /// Creates an empty sequence of dispatches that take about the duration `call`.
     pub fn new(split: &WorkSplit, call: Duration, order: Order) -> Steps {
         Steps {
             split: *split,
@@ -81,7 +81,7 @@ impl Steps {
         }
     }
 
-    /// Starts a film of a region, of the pixels [`Steps::film`]. Keeps the measured speed.
+    /// Starts a film of a region; [`Steps::film`] returns the film's own region. Keeps the measured speed.
     pub fn start(&mut self, backend: &dyn Backend, region: Region, samples: u32) {
         self.region = region;
         self.samples = samples;
@@ -213,7 +213,7 @@ impl Steps {
         }
     }
 
-    /// Returns true if every pixel has all samples, or those of [`Steps::stop_at`].
+    /// Returns true if every pixel has all samples, or the number set by [`Steps::stop_at`].
     pub fn is_done(&self) -> bool {
         self.reached.pass.is_empty()
     }
@@ -249,7 +249,7 @@ impl Steps {
     }
 }
 
-/// Returns the pixels of the film of a region: with neighbors under adaptive sampling.
+/// Returns the pixels of the film of a region: with adaptive sampling, the region and its neighbors.
 pub(super) fn film_of(backend: &dyn Backend, region: Region, samples: u32) -> Region {
     match backend.samples_of_all() < samples {
         true => backend.around(region),

@@ -13,8 +13,8 @@ use wgray_scene::Integrator;
 pub enum Aov {
     /// Outward geometric normal.
     Normal,
-    /// Outward shading normal: of the first hit, without normal maps; under the path integrator the mean over samples,
-    /// with normal maps, shorter than 1 where they differ.
+    /// Outward shading normal of the first hit, without normal maps. With the path integrator: mean over samples, with
+    /// normal maps; shorter than 1 where the samples differ.
     ShadingNormal,
     /// Distance along the ray.
     Depth,
@@ -30,7 +30,7 @@ pub enum Aov {
     Albedo,
     /// Radiance scattered once.
     Direct,
-    /// Radiance scattered more often. Emission, direct and indirect add up to the image.
+    /// Radiance scattered more than once. Emission, direct and indirect add up to the image.
     Indirect,
     /// Unscattered radiance of emitters and the environment.
     Emission,
@@ -45,7 +45,7 @@ pub enum Aov {
 pub enum AovSource {
     /// First hit of the ray through the pixel's center.
     FirstHit,
-    /// Mean over samples, weighted as the radiance. Only under the path integrator.
+    /// Mean over samples, weighted like the radiance. Only with the path integrator.
     Samples,
     /// Adaptive sampling statistics.
     Adaptive,
@@ -59,7 +59,7 @@ pub enum Channel {
     Whole(&'static str, fn(&FirstHit) -> u32),
     /// A component of a layer's mean.
     Mean(&'static str, Layer, usize),
-    /// A component of the shading normal: of the mean with layers, else of the first hit.
+    /// A component of the shading normal: with layers of the mean, otherwise of the first hit.
     ShadingNormal(&'static str, usize),
     /// Number of samples.
     Count(&'static str),
@@ -121,7 +121,7 @@ impl Aov {
         Aov::Variance,
     ];
 
-    /// Returns the source under an integrator, which may lack it: [`Aov::missing`].
+    /// Returns the source with an integrator, which may not support the variable: see [`Aov::missing`].
     pub fn source(self, integrator: Integrator) -> AovSource {
         match self {
             Aov::ShadingNormal if integrator.has_layers() => AovSource::Samples,
@@ -129,7 +129,7 @@ impl Aov {
         }
     }
 
-    /// Returns why renders with these settings lack the variable, if they do.
+    /// Returns the reason why renders with these settings lack the variable; `None` if they have it.
     pub fn missing(self, integrator: Integrator, adaptive: bool) -> Option<&'static str> {
         match self.source(integrator) {
             AovSource::Adaptive if !adaptive => Some("needs adaptive sampling"),
@@ -138,7 +138,7 @@ impl Aov {
         }
     }
 
-    /// Returns the layer it displays as a radiance image.
+    /// Returns the layer that the variable displays as a radiance image, if any.
     pub fn light(self) -> Option<Layer> {
         self.channels().iter().find_map(|channel| match channel {
             Channel::Mean(_, layer, _) => Some(*layer),
@@ -227,7 +227,7 @@ impl Aov {
         }
     }
 
-    /// Returns the color of a band's pixel `i` in a PNG, before quantization; black without a hit.
+    /// Returns the color of a band's pixel `i` in a PNG, before quantization; black if nothing is hit.
     ///
     /// - Albedo and radiance: linear, before the view transform.
     /// - Normals: mapped from [-1, 1] to [0, 1].
@@ -242,7 +242,7 @@ impl Aov {
             return film.layer(layer, i).into();
         }
         match self {
-            // Samples without a hit count as black.
+            // Samples that hit nothing count as black.
             Aov::ShadingNormal if film.has_layers() => {
                 Vec3::from(film.layer(Layer::Normal, i)) * 0.5 + 0.5 * film.alpha(i)
             }

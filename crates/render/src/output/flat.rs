@@ -18,7 +18,7 @@ use wgray_image::memory::fallible;
 /// Bytes per pixel that the WebP encoder allocates: a copy of four channels, and the file in a buffer that doubles.
 const WEBP_BESIDE: u64 = 12;
 
-/// Writes the radiance, in a JPEG composited over black.
+/// Writes the radiance; in a JPEG, it is composited over black.
 pub fn write(
     files: &mut [Pending],
     format: Format,
@@ -41,7 +41,7 @@ pub fn write(
         Format::WebP => layout.region.pixels() * WEBP_BESIDE,
         _ => 0,
     };
-    // Before rendering, as a later failure would abort the process. The encoder's part is freed at once.
+    // Before rendering, as a later failure would abort the process. The memory of the encoder is freed immediately.
     let mut pixels: Vec<u8> = room(bytes).ok_or(RenderError::Memory(bytes + beside))?;
     room(beside).ok_or(RenderError::Memory(bytes + beside))?;
     render(&mut |band| {

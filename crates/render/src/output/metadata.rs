@@ -19,7 +19,7 @@ pub fn read_metadata(path: &Path) -> Option<Metadata> {
     } else {
         flat::read_metadata
     };
-    // The file may be from anywhere; the readers are made for good ones.
+    // The file is untrusted, but the readers expect valid files and may panic.
     let metadata = catch_panic(|| read(file)).ok().flatten();
     metadata.filter(|metadata| {
         metadata

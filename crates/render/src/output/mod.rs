@@ -34,9 +34,9 @@ pub struct Layout {
     pub aovs: Vec<Aov>,
     /// True if the image has alpha, which requires film layers. Colors are premultiplied.
     pub alpha: bool,
-    /// Distance of half brightness in a PNG of the depth.
+    /// Distance that a PNG of the depth maps to half brightness.
     pub middle_depth: f32,
-    /// Sample count of full brightness in a PNG.
+    /// Sample count that a PNG maps to full brightness.
     pub max_samples: u32,
     /// View transform and exposure, except in an EXR.
     pub view: ViewSettings,
@@ -51,5 +51,5 @@ pub struct Band<'a> {
     pub hits: &'a [FirstHit],
 }
 
-/// Receives a region's bands from the top.
+/// Receives a region's bands, from top to bottom.
 pub type Sink<'a> = dyn FnMut(Band) -> Result<(), RenderError> + 'a;

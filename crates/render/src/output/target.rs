@@ -32,7 +32,7 @@ impl Format {
         }
     }
 
-    /// Returns a file's format by its extension: `.png`, `.exr`, `.jpg`, `.jpeg` or `.webp`.
+    /// Returns the format that a path's extension selects: `.png`, `.exr`, `.jpg`, `.jpeg` or `.webp`.
     pub fn of(path: &Path) -> Option<Format> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         let known = |format: &Format| extension == format.name() || (*format == Format::Jpeg && extension == "jpg");
@@ -48,7 +48,7 @@ impl Format {
         }
     }
 
-    /// Returns the maximum side in pixels, if below that of scenes.
+    /// Returns the maximum side in pixels, if it is below the maximum of scenes.
     pub const fn longest_side(self) -> Option<u32> {
         match self {
             Format::Png | Format::Exr => None,
@@ -97,7 +97,7 @@ pub enum Layers {
 /// The files of an image.
 #[derive(Debug)]
 pub struct Target {
-    /// Their format.
+    /// Format of the files.
     pub format: Format,
     /// Files in the order of [`files`].
     pub files: Vec<Pending>,

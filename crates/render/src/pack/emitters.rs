@@ -28,12 +28,13 @@ pub struct PackedEmitters {
 
 /// Maximum number of emitters selected by power alone; more use a light tree.
 pub const MAX_LISTED_EMITTERS: usize = 16;
-/// Maximum number of emitters in a light tree, at about 100 bytes each. More are selected by power alone.
+/// Maximum number of emitters in a light tree, which takes about 100 bytes per emitter. Larger numbers are selected by
+/// power alone.
 const MAX_TREE_EMITTERS: usize = 500_000;
 
 /// Collects all emitters: primitives, delta lights, triangles of meshes and the environment map. Sets
-/// [`Material::density`], the PDF of samples on emissive surfaces. `environment_integral` is the map's over all
-/// directions.
+/// [`Material::density`], the PDF of samples on emissive surfaces. `environment_integral` is the integral of the map
+/// over all directions.
 pub fn emitters(
     scene: &Scene,
     materials: &mut [Material],
@@ -59,7 +60,7 @@ pub fn emitters(
         .collect();
     let mut packed = PackedEmitters::default();
     let mut powers = Vec::new();
-    // Each emitter's material; a unique number for lights without one.
+    // Each emitter's material; a unique number for lights without a material.
     let mut kinds = Vec::new();
     for (i, (primitive, _)) in (0..).zip(primitives) {
         let material = &materials[primitive.material as usize];
@@ -152,8 +153,8 @@ pub fn emitters(
 }
 
 /// Defensive sampling of near emitters: scales the power of each kind so that a quarter of the samples are uniform over
-/// all emitters, and an occluded strong emitter does not starve the others. Returns the factors of the kinds; none for
-/// a single kind.
+/// all emitters, and an occluded strong emitter does not starve the others. Returns the factors of the kinds; no
+/// factors for a single kind.
 fn defend(powers: &mut [f64], kinds: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
     let mut near: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
     for (i, (power, kind)) in powers.iter().zip(kinds).enumerate() {
@@ -467,7 +468,7 @@ fn light_of(primitive: &Primitive, number: u32, material: &Material, t_max: f32)
     }
 }
 
-/// Returns half the diagonal of the box around bounded geometry, 1 if it is empty.
+/// Returns half the diagonal of the bounding box of bounded geometry; 1 if the box is empty.
 fn radius(primitives: &[(Primitive, bool)], trees: &PackedBvh) -> f64 {
     let spheres = primitives.iter().filter(|(p, _)| p.kind != PLANE).map(|(p, _)| {
         let sphere = bounding_sphere(p);

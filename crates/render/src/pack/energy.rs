@@ -46,7 +46,7 @@ fn points(count: u32) -> Vec<Vec2> {
     (0..count).map(|i| sobol_sample(i, UVec2::new(1, 2))).collect()
 }
 
-/// Returns the single-scattering albedo of rough glass, by reflection and transmission.
+/// Returns the single-scattering albedo of rough glass: the energy reflected and transmitted.
 fn glass_albedo(index: f32, alpha: f32, cosine: f32, facets: &[Vec2]) -> f32 {
     let wo = Vec3::new(max(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine);
     glass_albedo_aniso(index, Vec2::splat(alpha), wo, facets)
@@ -89,12 +89,12 @@ fn schlick_albedo(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
     sum / facets.len() as f64
 }
 
-/// Lobes of a material with tables, in their order.
+/// Lobes of a material that have tables, in the order of the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TableLobes {
     /// Reflection, for a Fresnel term of 1.
     Mirror,
-    /// Rough glass, with the bits of its index: from outside, from inside.
+    /// Rough glass from outside, then from inside, with the bits of the index of refraction.
     Glass(u32),
     /// The F0 and F90 parts of reflection, and rough glass with an index.
     PrincipledLobes(Option<u32>),

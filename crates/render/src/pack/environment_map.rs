@@ -30,7 +30,7 @@ struct PackedMap {
     cells: usize,
     blocks: usize,
     shifts: u32,
-    /// Integral of the mean component over all directions, by cells.
+    /// Integral of the mean component over all directions, summed over cells.
     sum: f64,
 }
 
@@ -271,8 +271,8 @@ fn bin_normal(bin: u32) -> DVec3 {
     DVec3::new(folded(x, y), folded(y, x), z).normalize()
 }
 
-/// Returns the mean clamped cosine for cosines uniform in m - r to m + r. Larger if few are positive, so that light
-/// just above the horizon is sampled often enough.
+/// Returns the mean clamped cosine for cosines uniform in m - r to m + r. The result is larger if few cosines are
+/// positive, so that light just above the horizon is sampled often enough.
 fn mean_cosine(m: f64, r: f64) -> f64 {
     if m >= r {
         m
@@ -292,7 +292,7 @@ fn write_bin(weights: &[f64], words: &mut Vec<u32>) {
 }
 
 /// Writes the cumulative distribution of up to [`ENVIRONMENT_BLOCKS`] weights in multiples of 2^-24, so that
-/// differences are exact. Zero weights give empty intervals.
+/// differences are exact. A weight of 0 gives an empty interval.
 fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
@@ -445,7 +445,7 @@ mod tests {
     #[test]
     fn bins_contain_their_center_normal() {
         for bin in 0..NORMAL_BINS * NORMAL_BINS {
-            // Two points on the edge of the octahedral map are the same normal.
+            // Two points on the edge of the octahedral map represent the same normal.
             let normal = bin_normal(bin);
             let again = bin_normal(normal_bin(normal.as_vec3()));
             assert!((normal - again).length() < 1e-6, "{bin}: {normal}, {again}");
@@ -516,7 +516,8 @@ mod tests {
                 }
                 first += places.len();
             }
-            // A white hemisphere's irradiance from the upward direction, by rows.
+            // The distribution of rows for the upward normal, whose irradiance comes from the upper hemisphere of a
+            // white map.
             let stride = (grid.rows() + 1) * 33;
             let up = normal_bin(Vec3::new(0.01, 0.01, 1.0)) as usize;
             let distribution = |bin: usize| widths(&words[grid.rows() * 32 + bin * stride..][..33]);

@@ -104,7 +104,7 @@ impl Lobe {
     }
 }
 
-/// Returns the lobes: a positive one, and for Mitchell a negative one.
+/// Returns the lobes: a positive lobe, and for Mitchell also a negative lobe.
 fn lobes(filter: PixelFilter) -> Vec<Lobe> {
     if filter.kind != PixelFilterKind::Mitchell {
         return vec![Lobe::new(filter, 0.0, filter.radius)];

@@ -16,8 +16,8 @@ use wgray_scene::{Geometry, Scene, Shape};
 /// Maximum number of bounded primitives without a BVH: a few are faster as constants in a loop.
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
-/// Builds the BVH over mesh instances and these primitives, each with its index and true if it casts a shadow. Also
-/// returns [`Counts::item_padding`](super::Counts::room).
+/// Builds the BVH over mesh instances and these primitives, each given with its index and whether it casts a shadow.
+/// Also returns [`Counts::item_padding`](super::Counts::item_padding).
 pub fn trees(
     scene: &Scene,
     primitives: &[(u32, &Primitive, bool)],
@@ -83,8 +83,9 @@ pub fn trees(
     (trees, Vec4::new(BOX_PAD * condition_number, farthest, 0.0, 0.0))
 }
 
-/// Returns the meshes packed with vertex tangents: those with a normal map in any instance, and those with tangents and
-/// a material with tangent directions (anisotropy, coat normal map), which else use the triangles' tangents.
+/// Returns the meshes that are packed with vertex tangents: meshes with a normal map in any instance, and meshes that
+/// have both tangents and a material with tangent directions (anisotropy, coat normal map), which would otherwise use
+/// the tangents of the triangles.
 fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
     let needs_tangents = |mesh: &Mesh, material: &usize| {
         let material = &scene.materials[*material];
@@ -100,7 +101,7 @@ fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
 }
 
 impl PackedBvh {
-    /// Sets the meshes' buffer rows in the instances. Nodes come last in the first buffer.
+    /// Sets the buffer rows of meshes in the instances. The nodes of meshes come last in the first buffer.
     fn place_rows(&mut self) {
         let mut node_row = self.mesh_nodes_row();
         let mut row = 0;

@@ -8,7 +8,7 @@ use super::primitive::parallelogram;
 use super::{DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, RECTANGLE, SPOT};
 use wgray_scene::{self as scene, Scene};
 
-/// `t_max` to directional lights: beyond any scene, with a finite square.
+/// `t_max` of shadow rays to directional lights: beyond any scene, with a finite square.
 pub(super) const DISTANT: f32 = 1e10;
 
 /// Minimum relative distance from a shadow ray's end to the light sample, as lights may lie on surfaces.
@@ -17,12 +17,12 @@ const BEFORE_LIGHT: f64 = 1e-5;
 /// Minimum range of the cosine of a spot light's falloff.
 const MIN_FALLOFF: f64 = 1e-12;
 
-/// Returns it relative to the vector to the sample.
+/// Returns `t_max` of shadow rays, relative to the vector to the light sample.
 pub(super) fn t_max(shadow_epsilon: f64) -> f32 {
     (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
 }
 
-/// Packs the lights, rectangles first, and counts these, which add a primitive and a material each.
+/// Packs the lights, rectangles first, and counts the rectangles. Each rectangle adds a primitive and a material.
 pub(super) fn pack_lights(
     scene: &Scene,
     primitives: &mut Vec<Primitive>,

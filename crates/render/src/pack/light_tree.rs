@@ -1,5 +1,5 @@
-//! Builder of the light tree: a BVH over emitters with four children per node, in f64. Sections and equations are those
-//! of Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018.
+//! Builder of the light tree: a BVH over emitters with four children per node, in f64. Section and equation numbers
+//! refer to Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -152,7 +152,7 @@ impl Bounds {
         all.reduce(|a, b| a.with(&b))
     }
 
-    /// Returns the numerator of equation 2. `room` enlarges the box, so that points have a cost too.
+    /// Returns the numerator of equation 2. `room` enlarges the box, so that boxes without extent have a cost, too.
     fn cost(&self, room: f64) -> f64 {
         let size = self.high - self.low + room;
         let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
@@ -160,10 +160,10 @@ impl Bounds {
     }
 }
 
-/// Maximum children of a node.
+/// Maximum number of children of a node.
 const WIDTH: usize = 4;
 
-/// Minimum emitters of a node whose children are built in parallel.
+/// Minimum number of emitters of a node whose children are built in parallel.
 const PARALLEL: usize = 2048;
 
 /// Builds the tree, root first.
@@ -194,7 +194,7 @@ struct Builder<'a> {
 struct Part<'a> {
     order: &'a mut [u32],
     bounds: Bounds,
-    /// Binary splits above.
+    /// Number of binary splits above.
     level: u32,
 }
 
@@ -295,7 +295,7 @@ impl Builder<'_> {
         node.intensity[i] = ((bounds.intensity / self.total) as f32).max(f32::MIN_POSITIVE);
     }
 
-    /// Partitions emitters by the surface area orientation heuristic. Returns the first part's size.
+    /// Partitions emitters by the surface area orientation heuristic. Returns the size of the first part.
     fn split(&self, order: &mut [u32], level: u32) -> usize {
         let half = order.len() / 2;
         let middle = |i: &u32| {
@@ -335,7 +335,7 @@ impl Builder<'_> {
             let stretched = size[longest] / size[axis]; // K_r
             let mut first: Option<Bounds> = None;
             for split in 1..BUCKETS {
-                // With an empty bucket before it, a split equals the previous one.
+                // If the bucket before it is empty, a split equals the previous split.
                 let Some(added) = buckets[split - 1] else { continue };
                 let nearer = first.map_or(added, |before| before.with(&added));
                 first = Some(nearer);

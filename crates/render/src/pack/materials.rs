@@ -17,19 +17,19 @@ use wgray_scene::{
 #[derive(Default)]
 pub struct Appearances {
     pub materials: Vec<Material>,
-    /// Texture lookups; those of a material are consecutive.
+    /// Texture lookups; the lookups of a material are consecutive.
     pub lookups: Vec<Lookup>,
     pub textures: Vec<Texture>,
     pub texels: Vec<u32>,
-    /// Each image's pyramid, by address.
+    /// The pyramid of each image; the key is the address of the image.
     places: BTreeMap<usize, u32>,
     /// Levels that each image needs.
     levels: BTreeMap<usize, u32>,
-    /// Textures, with one per strength as a normal map.
+    /// Textures; a normal map has one texture per strength.
     records: BTreeMap<(usize, Option<u64>), u32>,
-    /// Tables of rough glass, by index of refraction and alpha (`None` if textured).
+    /// Tables of rough glass; the key is the index of refraction and alpha (`None` if textured).
     energies: BTreeMap<(u32, Option<u32>), u32>,
-    /// Tables of anisotropic microfacets, by parts, roughness and anisotropy.
+    /// Tables of anisotropic microfacets; the key is the parts, the roughness and the anisotropy.
     aniso_table: BTreeMap<(TableLobes, Option<u32>, Option<u32>), u32>,
 }
 
@@ -89,8 +89,8 @@ impl Appearances {
         appearances
     }
 
-    /// Returns the maximum lookups of a material, and of a mirror or glass. Both are the overall maximum under `path`,
-    /// which evaluates all materials in one place.
+    /// Returns the maximum number of lookups of a material, and of a mirror or glass. With `path` both are the overall
+    /// maximum, because `path` evaluates all materials in one place.
     pub fn lookups(&self, integrator: Integrator) -> (u32, u32) {
         let most = |specular: bool| {
             let materials = self
@@ -277,7 +277,7 @@ impl Appearances {
         })
     }
 
-    /// Returns the record of a color texture, or with a strength of a normal map.
+    /// Returns the record of a color texture or, if there is a strength, of a normal map.
     fn texture(&mut self, scene: &Scene, i: usize, strength: Option<f64>) -> u32 {
         let key = (i, strength.map(f64::to_bits));
         if let Some(record) = self.records.get(&key) {

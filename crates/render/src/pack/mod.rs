@@ -175,7 +175,7 @@ fn counts(
     }
 }
 
-/// Returns true for the box of one pixel, which weights all samples equally.
+/// Returns true for the box filter of one pixel, which weights all samples equally.
 fn is_pixel(filter: PixelFilter) -> bool {
     filter.kind == PixelFilterKind::Box && filter.radius == 0.5
 }

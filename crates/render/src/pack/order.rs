@@ -4,7 +4,7 @@ use super::shadow_casters::{can_cast_shadow, may_cast_shadow};
 use super::{MAX_LINEAR_PRIMITIVES, PLANE, Primitive};
 use wgray_scene::Scene;
 
-/// Primitives in order, each with true if it can cast a shadow.
+/// Primitives in order, each with whether it can cast a shadow.
 pub struct SortedPrimitives {
     all: Vec<(Primitive, bool)>,
     outside: usize,
@@ -37,7 +37,7 @@ impl SortedPrimitives {
         &self.all[..self.outside]
     }
 
-    /// Returns those in the BVH, with indices.
+    /// Returns the primitives in the BVH, each with its index and whether it casts a shadow.
     pub fn in_bvh(&self) -> Vec<(u32, &Primitive, bool)> {
         let numbers = self.outside as u32..;
         let rest = numbers.zip(&self.all[self.outside..]);

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 use super::{CYLINDER, DISK, ELLIPSOID, PLANE, Primitive, RECTANGLE, Sphere, TRIANGLE};
 use wgray_scene::{Bounds, Geometry, Parallelogram, Scene};
 
-/// Enlarges bounding spheres, for the rounding of records.
+/// Factor that enlarges bounding spheres, because records are rounded.
 const SPHERE_MARGIN: f64 = 1.0 + 1e-5;
 
 /// Radius of a plane's bounding sphere: beyond any scene, with a finite square.
@@ -77,7 +77,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
         anchor = (center + columns * outwards).as_vec3();
         middle = to_local * (center - anchor.as_dvec3());
     }
-    // `level` of a cylinder is its side's.
+    // `level` of a cylinder is the level of its side.
     let square = match kind {
         CYLINDER => middle.truncate().length_squared(),
         _ => middle.length_squared(),
@@ -96,7 +96,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
     }
 }
 
-/// Returns a surface point near a local point: on a cap if that is beyond it, else on the side.
+/// Returns a surface point near a local point: on a cap if the point is beyond the cap, otherwise on the side.
 fn nearest_of_cylinder(point: DVec3) -> DVec3 {
     let across = point.truncate();
     let across = match point.z.abs() > 1.0 && across.length() < 1.0 {
@@ -166,7 +166,7 @@ pub fn bounding_sphere(primitive: &Primitive) -> Sphere {
     }
 }
 
-/// Returns the area for light samples: for an ellipsoid that of `ellipsoid_area` in WGSL, for a plane 0.
+/// Returns the area for light samples: for an ellipsoid, the value of `ellipsoid_area` in WGSL; for a plane, 0.
 pub fn area(primitive: &Primitive) -> f64 {
     let [u, v, w] = axes(primitive);
     let span = u.cross(v).length();
@@ -207,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_map_stretches_by_its_longest_axis() {
+    fn the_largest_singular_value_is_the_longest_axis() {
         let turn = DMat3::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0);
         for axes in [[1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [0.5, 2.0, 1.0], [1e-4, 1.0, 1e3]] {
             let map = turn * DMat3::from_diagonal(DVec3::from_array(axes)) * turn.transpose();

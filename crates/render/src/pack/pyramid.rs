@@ -8,8 +8,8 @@ use wgray_scene::downsample::{Level, decoded, half_of};
 use wgray_scene::texture::words;
 use wgray_scene::{Encoding, Image, Texels};
 
-/// Appends the table of an image's levels, then the levels, finest first, row by row from the bottom. Returns the
-/// offset of the table.
+/// Appends the table of an image's levels, then the levels, finest first, in row-major order, bottom row first. Returns
+/// the offset of the table.
 pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     let table = texels.len();
     let is_float = matches!(image.texels, Texels::Floats(_));
@@ -38,7 +38,8 @@ pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     table as u32
 }
 
-/// Appends rows of `words` words in parallel, to uninitialized memory, which a single thread would have to zero.
+/// Appends rows of `words` words in parallel. Writes to uninitialized memory, because only a single thread would zero
+/// it.
 fn append<I: Iterator<Item = u32>>(
     texels: &mut Vec<u32>,
     (words, rows): (usize, usize),
@@ -92,7 +93,7 @@ fn write_level(image: &Image, level: &Level, texels: &mut Vec<u32>) {
     }
 }
 
-/// Encodes a linear value, in steps of 8 bits.
+/// Encodes a linear value in units of 8-bit steps.
 fn steps(x: f64, encoding: Encoding) -> f64 {
     match encoding {
         Encoding::Srgb => linear_to_srgb(x) * 255.0,
@@ -100,7 +101,7 @@ fn steps(x: f64, encoding: Encoding) -> f64 {
     }
 }
 
-/// Packs a color into a word, in these steps: see `unpacked_color` in `shaders/texel.wgsl`.
+/// Packs a color, in these units, into a word: see `unpacked_color` in `shaders/texel.wgsl`.
 fn packed(steps: [f64; 3]) -> u32 {
     let exponent = exponent(steps.into_iter().fold(0.0, f64::max));
     joined(steps.map(|x| mantissa(x, exponent)), exponent)
@@ -124,12 +125,13 @@ fn joined([red, green, blue]: [u32; 3], exponent: u32) -> u32 {
     red | green << 9 | blue << 18 | exponent << 27
 }
 
-/// Returns [`packed`] of an sRGB-encoded color in 32-bit floats, in a third of the time; `None` if its error could
-/// change a bit.
+/// Returns [`packed`] of an sRGB-encoded color, computed in 32-bit floats in a third of the time; `None` if the error
+/// could change a bit.
 fn approximately_packed(color: DVec3) -> Option<u32> {
     /// Bound of the curve's relative error, some hundred units in the last place.
     const ERROR: f64 = 1e-5;
-    /// Maximum distance of a mantissa, at most 512, from an integer for certain rounding.
+    /// A mantissa (at most 512) within this distance of an integer rounds to that integer despite the error of the
+    /// approximation.
     const CERTAIN: f64 = 0.5 - 2.0 * 512.0 * ERROR;
     let steps = color.as_vec3().to_array().map(|x| {
         let curve = if x <= 0.003_130_8 {
@@ -151,11 +153,11 @@ fn approximately_packed(color: DVec3) -> Option<u32> {
     is_certain.then(|| joined(rounded, exponent))
 }
 
-/// Tables of [`packed`] for bytes: most texels are of the finest levels.
+/// Tables of [`packed`] for bytes: most texels belong to the finest levels.
 struct PackedBytes {
-    /// Exponent by the largest byte.
+    /// Exponent for each value of the largest byte.
     exponents: [u32; 256],
-    /// Mantissas of all bytes, per exponent.
+    /// Mantissas of all bytes, for each exponent.
     mantissas: Vec<[u32; 256]>,
 }
 
@@ -193,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn colors_by_tables_and_by_32_bit_powers_are_packed_as_by_64_bits() {
+    fn packing_by_tables_and_in_32_bits_matches_64_bits() {
         for encoding in [Encoding::Srgb, Encoding::Linear] {
             let (table, bytes) = (decoded(encoding), PackedBytes::new(encoding));
             for i in 0..1_u32 << 16 {

@@ -1,5 +1,5 @@
-//! Selection of primitives that can cast shadows: not flat ones with all shapes and lights on one side, like the walls
-//! of a room.
+//! Selection of primitives that can cast shadows. Flat primitives with all shapes and lights on one side cannot, like
+//! the walls of a room.
 
 use glam::DVec3;
 
@@ -63,7 +63,7 @@ fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
             shape.geometry.each_extreme(normal, |p| found |= point(p));
             found
         });
-    // Directional lights and planes are infinite: by direction.
+    // Directional lights and planes are infinite, so the direction decides.
     let both_by_directions = both_by_shapes
         || scene.lights.iter().any(|light| match light {
             Light::Directional { direction, .. } => height(-direction.dot(normal), 1.0),
@@ -116,7 +116,11 @@ mod tests {
 
     #[test]
     fn anything_below_a_floor_makes_it_cast_a_shadow() {
-        assert_eq!(casting(&(ball(0.99) + FLOOR)), [true, true], "a part of a sphere");
+        assert_eq!(
+            casting(&(ball(0.99) + FLOOR)),
+            [true, true],
+            "a sphere partly below the floor"
+        );
         let below = light("point", "position", [0.0, 2.0, 2.0]);
         assert_eq!(casting(&(below + &ball(2.0) + FLOOR)), [true, true]);
         let upwards = light("directional", "direction", [0.6, 0.0, 0.8]);

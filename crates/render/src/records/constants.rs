@@ -53,9 +53,9 @@ constants! {
     pub const TRANSMISSIVE_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
     /// Rows and columns, per side, of the table at [`Material::energy`].
     pub const ENERGY_SIZE: u32 = 32;
-    /// Rows of the table at [`Material::aniso_table`], by azimuth.
+    /// Number of rows of the table at [`Material::aniso_table`]; rows correspond to the azimuth.
     pub const ANISO_LINES: u32 = 49;
-    /// Columns of the table at [`Material::aniso_table`], by cosine.
+    /// Number of columns of the table at [`Material::aniso_table`]; columns correspond to the cosine.
     pub const ANISO_COLUMNS: u32 = 48;
     /// Minimum alpha of a microfacet lobe; below it in both axes it is a delta.
     pub const SMALLEST_ALPHA: f32 = 1e-3;
@@ -67,11 +67,11 @@ constants! {
     pub const MIN_SHEEN_ROUGHNESS: f32 = 0.15;
     /// [`Material::alpha_mode`]: the surface is opaque.
     pub const OPAQUE: u32 = 0;
-    /// [`Material::alpha_mode`]: exists where the opacity is at least the cutoff.
+    /// [`Material::alpha_mode`]: the surface exists where the opacity is at least the cutoff.
     pub const MASK: u32 = 1;
     /// [`Material::alpha_mode`]: the opacity is the probability of a hit.
     pub const BLEND: u32 = 2;
-    /// Maximum number of surfaces skipped by alpha.
+    /// Maximum number of surfaces that a ray passes through because of their alpha.
     pub const MAX_ALPHA_SKIPS: u32 = 64;
     /// Bits of pure-delta kinds.
     pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
@@ -175,23 +175,23 @@ constants! {
     pub const FOR_OPACITY: u32 = 0x10000;
     /// Added to [`Material::rotation`].
     pub const FOR_DIRECTION: u32 = 0x20000;
-    /// [`Lookup::channels`], index of the channel's two bits: [`Material::roughness`].
+    /// [`Lookup::channels`], positions of the channels' pairs of bits: channel of [`Material::roughness`].
     pub const ROUGHNESS_CHANNEL: u32 = 0;
-    /// That of [`Material::metallic`].
+    /// Channel of [`Material::metallic`].
     pub const METALLIC_CHANNEL: u32 = 1;
-    /// That of [`Material::anisotropy`].
+    /// Channel of [`Material::anisotropy`].
     pub const ANISOTROPY_CHANNEL: u32 = 2;
-    /// That of [`Material::specular_weight`].
+    /// Channel of [`Material::specular_weight`].
     pub const WEIGHT_CHANNEL: u32 = 3;
-    /// That of [`Material::transmission`].
+    /// Channel of [`Material::transmission`].
     pub const TRANSMISSION_CHANNEL: u32 = 4;
-    /// That of [`Material::clearcoat`].
+    /// Channel of [`Material::clearcoat`].
     pub const COAT_CHANNEL: u32 = 5;
-    /// That of [`Material::clearcoat_roughness`].
+    /// Channel of [`Material::clearcoat_roughness`].
     pub const COAT_ROUGHNESS_CHANNEL: u32 = 6;
-    /// That of [`Material::sheen_roughness`].
+    /// Channel of [`Material::sheen_roughness`].
     pub const SHEEN_ROUGHNESS_CHANNEL: u32 = 7;
-    /// That of [`Material::opacity`].
+    /// Channel of [`Material::opacity`].
     pub const OPACITY_CHANNEL: u32 = 8;
 
     /// [`Pattern::Grid`].
@@ -210,15 +210,15 @@ constants! {
     /// Bins between center and radius of a pixel filter.
     pub const FILTER_BINS_MAX: u32 = 128;
 
-    /// Distance of a miss, and maximum.
+    /// Maximum hit distance; also the distance stored for a miss.
     pub const INFINITE_T: f32 = f32::MAX;
-    /// Refers to nothing.
+    /// Index that refers to nothing.
     pub const NO_INDEX: u32 = u32::MAX;
     /// The primitive of a ray that does not start on a surface.
     pub const NO_PRIMITIVE: UVec2 = UVec2::new(0, NO_INDEX);
-    /// Shadow rays per block, a bit each of a mask.
+    /// Shadow rays per block; each has a bit of a mask.
     pub const SAMPLE_BLOCK: u32 = 32;
 
-    /// Effective samples of the variance estimate required to repeat the pilot samples once.
+    /// Effective sample size of the variance estimate that is required for each repetition of the pilot samples.
     pub const EFFECTIVE_SAMPLES_PER_DOUBLING: f32 = 2.0;
 }

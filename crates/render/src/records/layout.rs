@@ -27,13 +27,13 @@ records! {
         pub forward: Vec3,
         /// Seed of all random patterns.
         pub seed: u32,
-        /// Vector from the center of the lens to its edge or first corner; 0 without a lens.
+        /// Vector from the center of the lens to its edge or first corner; 0 if the camera has no lens.
         pub lens_u: Vec3,
         /// Corners of the lens; 0 if it is round.
         pub blades: u32,
         /// Perpendicular to `lens_u`, of the same length.
         pub lens_v: Vec3,
-        /// 1 / (focus distance); 0 without a lens.
+        /// 1 / (focus distance); 0 if the camera has no lens.
         pub inverse_focus: f32,
     }
 
@@ -43,17 +43,18 @@ records! {
         pub ambient: Vec3,
         /// Offset of ray origins above a surface, relative to the largest coordinate.
         pub shadow_epsilon: f32,
-        /// Radiance of rays that leave the scene; under `path` only as seen by the camera, with [`BACKGROUND`].
+        /// Radiance of rays that leave the scene; with `path` only for camera rays, if [`BACKGROUND`] is set.
         pub background: Vec3,
         /// 1 / (samples of an area light).
         pub light_weight: f32,
-        /// Constant radiance of the environment, under `path`.
+        /// Constant radiance of the environment, for `path`.
         pub radiance: Vec3,
         /// `t_max` of shadow rays to a point on a surface, relative to its distance.
         pub t_max: f32,
-        /// World-space direction to the center of the map. From here on, fields are 0 without a map.
+        /// World-space direction to the center of the map. This and all following fields are 0 if there is no map.
         pub x: Vec3,
-        /// Offset of the texels: three floats each, row by row from the top, between rows of the means at the poles.
+        /// Offset of the texels: three floats each, in row-major order, top row first. The first and last row contain
+        /// the means at the poles.
         pub texels: u32,
         /// World-space direction a quarter turn left of the center.
         pub y: Vec3,
@@ -61,7 +62,7 @@ records! {
         pub width: u32,
         /// World-space direction to the upper edge.
         pub z: Vec3,
-        /// Rows, without those of the poles.
+        /// Number of rows, not counting the rows of the poles.
         pub height: u32,
         /// Offset of the cells' alias tables in the texels, block by block. A cell has two words: its own probability
         /// times 2^32, and the row (bits 16 to 31) and column of its alias.
@@ -103,7 +104,7 @@ records! {
     pub struct Sphere {
         /// Center.
         pub center: Vec3,
-        /// Radius; that of a plane exceeds any scene.
+        /// Radius; for a plane, larger than any scene.
         pub radius: f32,
     }
 
@@ -123,11 +124,11 @@ records! {
         pub exponent: u32,
         /// [`MIRROR`], [`METAL`]: reflectance. [`GLASS`], [`ROUGH_GLASS`], [`THIN`]: transmittance.
         pub tint: Vec3,
-        /// Index of refraction behind the surface, relative to that in front.
+        /// Index of refraction behind the surface, relative to the index in front of it.
         pub ior: f32,
-        /// Emitted radiance: under `phong` of [`EMITTER`] only, under `path` of any kind.
+        /// Emitted radiance: with `phong` only of [`EMITTER`], with `path` of any kind.
         pub emission: Vec3,
-        /// Emitters under `path`: pdf of light samples per area (`ellipsoid_area`), or 1 with a light tree. Else 0.
+        /// Emitters with `path`: pdf of light samples per area (`ellipsoid_area`), or 1 with a light tree. Otherwise 0.
         pub density: f32,
         /// [`GLASS`], [`ROUGH_GLASS`], [`PRINCIPLED`]: absorption coefficient behind the surface, per length.
         pub absorption: Vec3,
@@ -164,15 +165,15 @@ records! {
         pub specular_weight: f32,
         /// Opacity (alpha).
         pub opacity: f32,
-        /// Minimum opacity of existing surfaces under [`MASK`].
+        /// Minimum opacity at which the surface exists, for [`MASK`].
         pub cutoff: f32,
         /// [`OPAQUE`], [`MASK`] or [`BLEND`].
         pub alpha_mode: u32,
         /// 1 for a thin sheet, else 0.
         pub thin: u32,
-        /// 1 if invisible to the camera, [`CULL_BACKFACE`] if back faces are, else 0.
+        /// 1 if invisible to the camera, [`CULL_BACKFACE`] if only its back faces are, else 0.
         pub camera_visibility: u32,
-        /// 1 + offset of the anisotropic albedo table in the texels; 0 without one.
+        /// 1 + offset of the anisotropic albedo table in the texels; 0 if there is no table.
         pub aniso_table: u32,
         /// [`COLORS_OF_BASE`], [`COLORS_OF_EMISSION`] or [`NO_COLORS`].
         pub vertex_colors: u32,
@@ -206,7 +207,7 @@ records! {
         pub format: u32,
         /// Second row of the matrix.
         pub v: Vec3,
-        /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`] along u, plus four times that along v.
+        /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`] along u, plus four times the value along v.
         pub wrap: u32,
         /// Offset of its level table in the texels.
         pub texels: u32,
@@ -218,7 +219,7 @@ records! {
         pub levels: u32,
     }
 
-    /// A light: the points center + a u + b v, with a and b in -1..=1, or in the range of its kind under `path`.
+    /// A light: the points center + a u + b v, with a and b in -1..=1, or with `path` in the range of its kind.
     pub struct Light {
         /// Center, or direction of a directional light.
         pub center: Vec3,
@@ -238,10 +239,9 @@ records! {
         pub number: u32,
         /// Flat emitters: unit normal of the emitting side. [`SPOT`]: unit direction of its axis.
         pub normal: Vec3,
-        /// Kind of its primitive under `path`, or [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`ENVIRONMENT`].
+        /// Kind of its primitive (for `path`), or [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`ENVIRONMENT`].
         pub kind: u32,
-        /// Under `path`: [`Material::density`], or the probability of a delta light or the environment; 0 in light
-        /// trees.
+        /// For `path`: [`Material::density`], or the probability of a delta light or the environment; 0 in light trees.
         pub density: f32,
         /// Emitting sides: 1 (front) or 2.
         pub sides: u32,
@@ -251,9 +251,10 @@ records! {
         pub falloff: f32,
     }
 
-    /// An entry of Walker's alias table of emitters: itself below the threshold, else its alias.
+    /// An entry of Walker's alias table of emitters: random numbers below the threshold select the entry itself, others
+    /// its alias.
     pub struct Emitter {
-        /// Probability of selecting itself, 0 to 1.
+        /// Probability of selecting the entry itself, 0 to 1.
         pub threshold: f32,
         /// Alias index.
         pub alias_index: u32,
@@ -303,9 +304,9 @@ records! {
     pub struct Counts {
         /// Primitives of each kind outside of the BVH: first (x), end of shadow casters (y), end (z).
         pub primitives: [UVec4; KINDS as usize],
-        /// Number of area lights (x), which come first, and of all (y).
+        /// Number of area lights (x), which come first, and of all lights (y).
         pub lights: UVec2,
-        /// First rows of lights (x) and textures (y); that of materials is 0.
+        /// First rows of lights (x) and textures (y); the first row of materials is 0.
         pub tables: UVec2,
         /// First rows of the scene BVH's items (x), instances (y) and group words (z).
         pub tree: UVec4,
@@ -323,9 +324,9 @@ records! {
         pub base: Vec3,
         /// Biased exponents of the grid steps along x, y, z, a byte each; bit 24 + i is set for an inner node i.
         pub scales: u32,
-        /// Index of the first inner child; they are contiguous.
+        /// Index of the first inner child; the children are contiguous.
         pub first_child: u32,
-        /// First item of its leaves; they are contiguous.
+        /// First item of its leaves; the items are contiguous.
         pub first_item: u32,
         /// A byte per leaf: number of items (upper three bits) and offset of the first.
         pub leaves: UVec2,
@@ -383,7 +384,7 @@ records! {
         pub shape: u32,
         /// Third column.
         pub w: Vec3,
-        /// First row of vertex normals and v, or [`NO_INDEX`] without either.
+        /// First row of vertex normals and v, or [`NO_INDEX`] if the mesh has neither.
         pub attributes: u32,
         /// Largest object-space coordinate.
         pub size: f32,
@@ -391,7 +392,7 @@ records! {
         pub condition_number: f32,
         /// 1, or -1 for a mirroring transform.
         pub side: f32,
-        /// 1 with texture coordinates, else 0.
+        /// 1 if the mesh has texture coordinates, else 0.
         pub has_uvs: u32,
         /// [`SOME_SHADOWS`] if some groups cast no shadow, else 0.
         pub shadows: u32,
@@ -405,7 +406,7 @@ records! {
         pub colors: u32,
         /// First row of further texture coordinates, two sets per row, or [`NO_INDEX`].
         pub more_uvs: u32,
-        /// Number of these sets.
+        /// Number of further sets of texture coordinates.
         pub uv_sets: u32,
         /// 0.
         pub unused: u32,

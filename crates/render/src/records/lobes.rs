@@ -14,7 +14,7 @@ pub struct Lobe {
     pub name: &'static str,
     /// Purposes of lookups that may give a material this lobe.
     pub purposes: u32,
-    /// True if a material has it without textures.
+    /// True if a material, ignoring its textures, has this lobe.
     pub is_in: fn(&Material) -> bool,
 }
 

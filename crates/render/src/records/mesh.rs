@@ -14,7 +14,7 @@ pub struct PackedMesh {
     pub triangles: Vec<UVec4>,
     /// Position and u of each vertex.
     pub vertices: Vec<Vec4>,
-    /// Normal, or 0, and v of each vertex; empty without either.
+    /// Normal, or 0, and v of each vertex; empty if the mesh has neither.
     pub attributes: Vec<Vec4>,
     /// Tangents along u and v of each vertex; or empty.
     pub tangents: Vec<[Vec4; 2]>,

@@ -21,8 +21,8 @@ pub struct Packed {
     pub integrator: Integrator,
     /// Values of the whole scene.
     pub environment: Environment,
-    /// Primitives, including lights' rectangles. Those outside of the BVH come first, sorted by kind, then by whether
-    /// they can cast a shadow.
+    /// Primitives, including lights' rectangles. Primitives outside of the BVH come first, sorted by kind, then by
+    /// whether they can cast a shadow.
     pub primitives: Vec<Primitive>,
     /// Bounding sphere of each primitive.
     pub bounds: Vec<Sphere>,
@@ -61,7 +61,7 @@ pub struct PackedBvh {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lighting {
     /// Lights, rectangles first, with their primitives. If the integrator needs emitters, every emissive primitive has
-    /// one.
+    /// a light.
     pub lights: Vec<Light>,
     /// Alias table of emitters, if the integrator needs it.
     pub emitters: Vec<Emitter>,
@@ -79,7 +79,7 @@ pub struct PackedTextures {
     pub lookups: Vec<Lookup>,
     /// Textures of these lookups.
     pub records: Vec<Texture>,
-    /// Their images: tables of offsets, and texels.
+    /// Images of these textures: tables of offsets, and texels.
     pub texels: Vec<u32>,
 }
 
@@ -88,15 +88,15 @@ pub struct PackedTextures {
 pub struct Sampling {
     /// Bins of the pixel filter; empty for the box of the pixel.
     pub filter_table: Vec<Vec4>,
-    /// Samples per pixel; under adaptive sampling the maximum.
+    /// Samples per pixel; with adaptive sampling the maximum.
     pub pixel_samples: u32,
     /// True if sampling is adaptive.
     pub adaptive: bool,
 }
 
 impl Packed {
-    /// Returns the light samples per hit: those of all lights, one for a point or directional light; under `path` one
-    /// in all.
+    /// Returns the number of light samples per hit: the samples of all lights, with one for a point or directional
+    /// light; with `path` one in total.
     pub fn light_samples(&self) -> u64 {
         if self.integrator.needs_emitters() {
             return u64::from(!self.lighting.emitters.is_empty());
@@ -144,7 +144,7 @@ impl Packed {
         of_meshes.sum::<u64>() + self.lists().map(|bytes| bytes.len() as u64).sum::<u64>()
     }
 
-    /// Returns the bytes of all lists except those of meshes. Naming every field prevents forgetting one.
+    /// Returns the bytes of all lists except the lists of meshes. Naming every field prevents forgetting one.
     pub fn lists(&self) -> impl Iterator<Item = &[u8]> {
         let Packed {
             origin: _,
@@ -212,7 +212,7 @@ impl Packed {
         }
     }
 
-    /// Returns true if another scene differs in the camera only.
+    /// Returns true if the other scene differs only in the camera.
     pub fn same_but_camera(&self, other: &Packed) -> bool {
         let plain = |scene: &Packed| {
             let Sampling {

@@ -6,11 +6,11 @@ use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
 /// A type of a record's field.
 pub trait Field: Copy {
-    /// Its name in WGSL.
+    /// Name of the type in WGSL.
     const WGSL: &'static str;
     /// Returns the WGSL expression of its value.
     fn constant(self) -> String;
-    /// Returns the WGSL expression that reads it from `words`, its components of a row.
+    /// Returns the WGSL expression that reads a value from `words`, which are components of a row.
     fn from_row(words: &str) -> String;
 }
 
@@ -44,13 +44,13 @@ fields! {
 
 /// A record that the shaders declare by the same name.
 pub trait Record: bytemuck::Pod {
-    /// Its name.
+    /// Name of the record.
     const NAME: &'static str;
-    /// Returns its declaration in WGSL.
+    /// Returns the declaration of the record in WGSL.
     fn declaration() -> String;
     /// Returns the WGSL expression of its value.
     fn constant(&self) -> String;
-    /// Returns the WGSL expression that reads it from the 16-byte rows `r0`, `r1` and so on.
+    /// Returns the WGSL expression that reads a record from the 16-byte rows `r0`, `r1` and so on.
     fn from_rows() -> String;
 }
 

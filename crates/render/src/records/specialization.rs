@@ -35,41 +35,41 @@ specialization! {
     tlas_kinds = "TLAS_KINDS",
     /// Bit 0: area lights exist; bit 1: other lights do; bit 2: these include spot lights.
     lights = "LIGHTS",
-    /// 1 with a lens, else 0.
+    /// 1 if the camera has a lens, else 0.
     lens = "LENS",
     /// 1 for a panorama, else 0.
     panoramic = "PANORAMIC",
-    /// 1 with camera-invisible surfaces, else 0.
+    /// 1 if camera-invisible surfaces exist, else 0.
     camera_invisible = "CAMERA_INVISIBLE",
     /// Pattern of pixel samples.
     pixel_pattern = "PIXEL_PATTERN",
-    /// Side of its grid of cells; else number of samples.
+    /// Side of the pattern's grid of cells; number of samples if the pattern has no grid.
     pixel_side = "PIXEL_SIDE",
-    /// Samples per pixel; per round under adaptive sampling.
+    /// Samples per pixel; with adaptive sampling samples per round.
     pixel_samples = "PIXEL_SAMPLES",
     /// Pattern of area light samples.
     light_pattern = "LIGHT_PATTERN",
-    /// Side of its grid of cells; else number of samples.
+    /// Side of the pattern's grid of cells; number of samples if the pattern has no grid.
     light_side = "LIGHT_SIDE",
     /// Samples per area light.
     light_samples = "LIGHT_SAMPLES",
     /// Bins of the filter table; 0 for a box filter of one pixel.
     filter_bins = "FILTER_BINS",
-    /// Pilot samples per pixel; all without adaptive sampling.
+    /// Pilot samples per pixel; all samples if sampling is not adaptive.
     pilot_samples = "PILOT_SAMPLES",
     /// Bits of the `f32` squared target error of adaptive sampling.
     squared_error = "SQUARED_ERROR",
     /// Bit length of the largest shininess if all are integers up to 4096, else 0.
     exponent_bits = "EXPONENT_BITS",
-    /// Maximum bounces; under `phong` 0 without specular materials.
+    /// Maximum number of bounces; with `phong` 0 if no material is specular.
     bounces = "BOUNCES",
-    /// 1 with ray differentials, else 0.
+    /// 1 if ray differentials are needed, else 0.
     differentials = "DIFFERENTIALS",
     /// Maximum texture lookups of a material except mirrors and glass.
     lookups = "LOOKUPS",
     /// Maximum texture lookups of a mirror or glass.
     specular_lookups = "SPECULAR_LOOKUPS",
-    /// 1 with normal maps, else 0.
+    /// 1 if normal maps exist, else 0.
     normal_maps = "NORMAL_MAPS",
     /// Bit i: textures of kind i exist.
     texture_kinds = "TEXTURE_KINDS",
@@ -79,29 +79,29 @@ specialization! {
     uv_sets = "UV_SETS",
     /// 1 if vertex colors exist and are used, else 0.
     vertex_colors = "VERTEX_COLORS",
-    /// Under `path`, like all fields below. Bit i: materials of kind i exist.
+    /// This and all following fields are for `path`. Bit i: materials of kind i exist.
     materials = "MATERIALS",
-    /// 1 with rough diffuse materials, else 0.
+    /// 1 if rough diffuse materials exist, else 0.
     rough = "ROUGH",
     /// Bit i: BSDFs of kind i may be pure deltas.
     delta_kinds = "DELTA_KINDS",
-    /// 1 with anisotropic microfacets, else 0.
+    /// 1 if anisotropic microfacets exist, else 0.
     anisotropic = "ANISOTROPIC",
     /// Bits of the lobes of [`PRINCIPLED`](super::PRINCIPLED) materials, such as [`LOBE_COAT`](super::LOBE_COAT).
     lobes = "LOBES",
-    /// 1 if rays may skip surfaces by alpha, else 0.
+    /// 1 if rays may pass through surfaces because of their alpha, else 0.
     alpha_surfaces = "ALPHA_SURFACES",
-    /// 1 with absorbing media, else 0.
+    /// 1 if absorbing media exist, else 0.
     absorption = "ABSORPTION",
-    /// 1 with emissive surfaces, else 0.
+    /// 1 if emissive surfaces exist, else 0.
     emissive = "EMISSIVE",
-    /// 0 without sampled lights, 1 for a single emitter, else 2.
+    /// 0 if no lights are sampled, 1 if there is a single emitter, else 2.
     emitters = "EMITTERS",
-    /// 1 with a light tree, else 0.
+    /// 1 if there is a light tree, else 0.
     light_tree = "LIGHT_TREE",
     /// Bit i: lights of kind i exist; [`INSTANCE`](super::INSTANCE) for emissive meshes.
     emitter_kinds = "EMITTER_KINDS",
-    /// 1 with textured emission, else 0.
+    /// 1 if emission is textured, else 0.
     emission_textures = "EMISSION_TEXTURES",
     /// Flags [`ENVIRONMENT_MAP`](super::ENVIRONMENT_MAP), [`ENVIRONMENT_INVISIBLE`](super::ENVIRONMENT_INVISIBLE) and
     /// [`BACKGROUND`](super::BACKGROUND).

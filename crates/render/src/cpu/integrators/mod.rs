@@ -1,4 +1,4 @@
-//! Integrators. Each is the twin of the file with its name in `shaders/integrators/`.
+//! Integrators. Each is the twin of the file of the same name in `shaders/integrators/`.
 
 pub mod path;
 pub mod phong;

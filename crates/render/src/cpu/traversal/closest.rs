@@ -1,4 +1,4 @@
-//! Traversal of a BVH by a ray: leaves by distance, closest hit and any hit.
+//! Traversal of a BVH along a ray: leaves from front to back, closest hit, and any hit.
 
 use std::ops::Range;
 
@@ -11,10 +11,10 @@ use super::line::greater;
 use super::{Line, Mesh, Nearest, remaining_t_max};
 use crate::bvh::{BUILD_MAX_DEPTH, Node};
 
-/// Maximum nodes on the stack: each level pops one and pushes up to 8.
+/// Maximum number of nodes on the stack: each level pops one node and pushes up to 8.
 pub const STACK: usize = BUILD_MAX_DEPTH as usize * 7 + 1;
 
-/// Decodes one side of all child boxes along an axis, with `side` `Node::low` or `Node::high`.
+/// Decodes one side of all child boxes along an axis; `side` is `Node::low` or `Node::high`.
 #[inline(always)]
 pub fn side<S: Simd>(simd: S, node: &Node, side: &[[u8; 8]; 3], axis: usize, scale: f32) -> f32x8<S> {
     let mut steps = [0.0; 8];
@@ -88,7 +88,7 @@ pub fn leaves<S: Simd>(
     mut limit: f32,
     mut visit: impl FnMut(Range<usize>, f32) -> f32,
 ) {
-    // By axis: 1 for a negative direction, origins relative to near and far sides, reciprocals.
+    // Per axis: 1 for a negative direction, origins relative to near and far sides, reciprocals.
     let mut down = [0; 3];
     let mut from = [[0.0; 3]; 2];
     let mut inverse = [0.0; 3];

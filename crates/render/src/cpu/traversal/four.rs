@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 
 use super::{Line, Mesh};
 
-/// Up to four triangles of a leaf. Unused lanes repeat the last one.
+/// Up to four triangles of a leaf. Unused lanes repeat the last triangle.
 pub struct Four<S: Simd> {
     corners: [[f32x4<S>; 3]; 3],
     /// Mask of the lanes in use.
@@ -38,8 +38,8 @@ impl<S: Simd> Four<S> {
         }
     }
 
-    /// Returns hits and distances, as [`Line::triangle`] for each. Distances may be negative by up to the boxes'
-    /// padding.
+    /// Returns hits and distances, equal to [`Line::triangle`] of each triangle. Distances may be negative, down to
+    /// minus the padding of boxes.
     #[inline(always)]
     pub fn intersect(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
         let zero = f32x4::splat(simd, 0.0);
@@ -72,7 +72,7 @@ impl<S: Simd> Four<S> {
             near = near.max(first.min(second));
             far = far.min(first.max(second));
         }
-        // In this order NaN is preserved.
+        // This order of operands preserves NaN.
         let t = near.simd_gt(t).select(near, t);
         let t = far.simd_lt(t).select(far, t);
         let met = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);

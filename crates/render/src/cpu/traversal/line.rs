@@ -5,15 +5,15 @@ use glam::Vec3;
 /// Minimum magnitude of direction components in box tests, so that reciprocals are finite.
 pub const LEAST: f32 = f32::from_bits((127 - 100) << 23);
 
-/// A ray with shared values of box and triangle tests.
+/// A ray with precomputed values that box and triangle tests share.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    /// Permutation of the axes of all other fields; the last one is the direction's largest component.
+    /// Permutation of the axes, applied to all other fields; the direction's largest component comes last.
     pub axes: [usize; 3],
     pub o: [f32; 3],
-    /// Origin relative to which lower sides are taken, which pads boxes.
+    /// Origin for tests of lower sides, offset to pad the boxes.
     pub o_low: [f32; 3],
-    /// The same for upper sides.
+    /// Origin for tests of upper sides, likewise offset.
     pub o_high: [f32; 3],
     pub inverse: [f32; 3],
     /// Shear and scale that map the direction to the last axis.
@@ -47,7 +47,7 @@ pub fn axes_from(third: usize) -> [usize; 3] {
 }
 
 impl Line {
-    /// Creates a ray from `o` along `d`, of any length. Boxes count as enlarged by `pad`.
+    /// Creates a ray from `o` along `d`, which may have any length. Box tests enlarge boxes by `pad`.
     #[inline(always)]
     pub fn new(o: Vec3, d: Vec3, pad: f32) -> Line {
         let axes = axes(d);
@@ -87,7 +87,7 @@ impl Line {
     }
 
     /// Returns the distance of the hit with a triangle, if any: Woop, Benthin and Wald, "Watertight Ray/Triangle
-    /// Intersection", JCGT 2(1), 2013. The ray must also hit its box.
+    /// Intersection", JCGT 2(1), 2013. The ray must also hit the triangle's box.
     #[inline(always)]
     pub fn triangle(&self, vertices: [&[f32; 4]; 3]) -> Option<f32> {
         let corners = [
@@ -117,7 +117,7 @@ impl Line {
             }
         }
         let [near, far] = self.slab(low, high);
-        // In this order NaN is preserved.
+        // This order of operands preserves NaN.
         let t = less(far, greater(near, t));
         (near <= far && t > 0.0).then_some(t)
     }

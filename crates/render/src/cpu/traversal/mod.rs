@@ -1,8 +1,8 @@
 //! Closest-hit and occlusion queries over a BVH of triangles or other items.
 //!
-//! The results equal those of testing every triangle ([`Line::triangle`]), independently of the BVH: a triangle is hit
-//! only where its box is; every step of the box test is monotone, so that a box is hit wherever a box inside it is; on
-//! equal distance the smallest index wins.
+//! The results are the same as testing every triangle with [`Line::triangle`], whatever the BVH: a triangle is hit only
+//! where its box is; every step of the box test is monotone, so that a box is hit wherever a box inside it is; at equal
+//! distance the smallest index wins.
 //!
 //! Each function is compiled for several instruction sets (`fearless_simd`). All give the same bits, since nothing is
 //! contracted to fused multiply-adds.
@@ -38,26 +38,26 @@ pub struct Mesh<'a> {
 /// The closest hit so far, or the bounds of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// Distance in lengths of the ray's direction.
+    /// Distance, as a multiple of the length of the ray's direction.
     pub t: f32,
     pub number: u32,
     /// Position in leaf order.
     pub slot: u32,
 }
 
-/// Returns an upper bound on the distance beyond `start` of anything nearer than `t`, with a margin for rounding.
+/// Returns an upper bound on the distance from `start` to anything nearer than `t`, with a margin for rounding.
 pub fn remaining_t_max(start: f32, t: f32) -> f32 {
     (t - start) + t * 4.7683716e-7
 }
 
-/// Returns the closest triangle nearer than `best`, except the one with index `skip`, else `best`. A distance is
-/// `start` plus the nonnegative distance from the ray's origin, and positive. On equal distance the smallest index
-/// wins.
+/// Returns the closest triangle nearer than `best`, except the triangle with index `skip`; `best` if no triangle is
+/// hit. A distance is `start` plus the nonnegative distance from the ray's origin, and positive. At equal distance the
+/// smallest index wins.
 pub fn closest(level: Level, mesh: &Mesh, line: &Line, start: f32, skip: u32, best: Nearest) -> Nearest {
     dispatch!(level, simd => closest::closest(simd, mesh, line, start, skip, best))
 }
 
-/// Returns true if the ray hits a triangle nearer than `t_max`, except the one with index `skip`.
+/// Returns true if the ray hits a triangle nearer than `t_max`, except the triangle with index `skip`.
 pub fn any(level: Level, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) -> bool {
     dispatch!(level, simd => closest::any(simd, mesh, line, skip, t_max))
 }
@@ -111,7 +111,7 @@ pub struct Segments<'a> {
     /// Padding of boxes.
     pub pad: f32,
     pub directions: &'a Directions,
-    /// Occluders are nearer than this, in lengths of a segment's direction.
+    /// Occluders are nearer than this distance, as a multiple of the length of a segment's direction.
     pub t_max: f32,
     /// Index of a triangle that occludes nothing.
     pub skip: u32,
@@ -123,8 +123,8 @@ pub fn occluded(level: Level, mesh: &Mesh, segments: &Segments, asked: u32) -> u
 }
 
 /// Returns the mask of the segments in `asked` that an item occludes. `boxes` returns an item's bounds, or `None` if it
-/// occludes nothing. `visit` gets an item and the mask of segments that hit its bounds, and returns those that it
-/// occludes.
+/// occludes nothing. `visit` gets an item and the mask of segments that hit its bounds, and returns the mask of
+/// segments that the item occludes.
 pub fn occluded_items(
     level: Level,
     nodes: &[Node],

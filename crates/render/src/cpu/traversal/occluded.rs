@@ -15,7 +15,7 @@ use crate::bvh::{Aabb, Node};
 /// Maximum number of segments tested one by one, against all boxes of a node or triangles of a leaf at once.
 const FEW: u32 = 6;
 
-/// Maximum number of SIMD vectors: the narrowest have four lanes.
+/// Maximum number of SIMD vectors: the narrowest vectors have four lanes.
 const MAX_LANES: usize = MOST / 4;
 
 #[derive(Clone, Copy)]
@@ -38,8 +38,8 @@ struct Slope {
     sides: [usize; 2],
     /// Origins relative to these sides.
     from: [f32; 2],
-    /// Reciprocals that minimize the near and maximize the far distance if the signs agree, else those that minimize
-    /// the distance of entry by either side.
+    /// Reciprocals that minimize the near and maximize the far distance if the signs agree, otherwise reciprocals that
+    /// minimize the entry distance for either side.
     inverse: [f32; 2],
 }
 
@@ -147,8 +147,8 @@ fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64)
     bits
 }
 
-/// Visits leaves with the segments that hit them. `visit` returns those that are occluded. Returns all occluded
-/// segments.
+/// Visits leaves with the segments that hit them. `visit` returns the segments that the leaf occludes. Returns all
+/// occluded segments.
 #[inline(always)]
 fn walk<S: Simd>(
     simd: S,
@@ -368,7 +368,7 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// Returns the segments that hit an item's box, as `interval_hits` of `slab.rs`.
+/// Returns the mask of segments that hit an item's box, like `interval_hits` in `slab.rs`.
 #[inline(always)]
 fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segments, bounds: &Aabb) -> u64 {
     let [near, far] = line_intervals(
@@ -384,7 +384,7 @@ fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segm
     (near.simd_le(far) & far.simd_ge(zero) & near.simd_le(t_max)).to_bitmask()
 }
 
-/// Returns the segments' intervals inside a box, as [`Line::slab`](super::Line::slab).
+/// Returns the segments' intervals inside a box, like [`Line::slab`](super::Line::slab).
 #[inline(always)]
 fn line_intervals<S: Simd>(
     simd: S,
@@ -431,7 +431,7 @@ fn segments_hitting_child<S: Simd>(
     (near.simd_le(far) & far.simd_gt(zero)).to_bitmask()
 }
 
-/// Returns the segments that a triangle occludes, as [`Line::triangle`](super::Line::triangle).
+/// Returns the mask of segments that a triangle occludes, like [`Line::triangle`](super::Line::triangle).
 #[inline(always)]
 fn occluded_by_triangle<S: Simd>(
     simd: S,
@@ -466,7 +466,7 @@ fn occluded_by_triangle<S: Simd>(
         high[k] = greater(greater(a, b), c);
     }
     let [near, far] = line_intervals(simd, lanes, o, segments.pad, low, high);
-    // In this order NaN is preserved.
+    // This order of operands preserves NaN.
     let t = near.simd_gt(t).select(near, t);
     let t = far.simd_lt(t).select(far, t);
     let hit = inside

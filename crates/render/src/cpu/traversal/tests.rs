@@ -187,7 +187,7 @@ fn compare(
     seen
 }
 
-/// Returns triangles of a size at random points, -1 to 1.
+/// Returns triangles of a given size at random points, with coordinates from -1 to 1.
 fn soup(random: &mut Random, count: usize, size: f32) -> Scene {
     let mut corners = Vec::new();
     for _ in 0..count {

@@ -390,7 +390,8 @@ fn coincident_and_exponential_emitters_give_shallow_trees() {
     assert!(depth(&one_place) <= 8, "{}", depth(&one_place));
     let row: Vec<TreeEmitter> = (0..count).map(|i| at(i, DVec3::X * f64::from(i), 1.0)).collect();
     assert!(depth(&row) <= 12, "{}", depth(&row));
-    // Each has a thousandth of the next: unbounded, they would be split off one by one.
+    // The distances and intensities form geometric progressions: without a depth limit, the emitters would be split off
+    // one by one.
     let falling: Vec<TreeEmitter> = (0..300)
         .map(|i| at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))
         .collect();
