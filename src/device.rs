@@ -1,17 +1,18 @@
-//! Devices: which one is requested, and which one renders.
+//! The requested device, and the device that renders.
 
 /// The requested device. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
-    /// A hardware GPU if there is one. Otherwise software Vulkan, but the CPU for scenes with a BVH (meshes, or more
-    /// than 64 bounded primitives), which it traverses faster, or if no adapter exists.
+    /// A hardware GPU, if available. Otherwise software Vulkan, or the CPU if no adapter exists or if the scene has a
+    /// BVH (meshes, or more than 64 bounded primitives), which the CPU traverses faster.
     #[default]
     Auto,
     /// The CPU, without any driver.
     Cpu,
     /// Any adapter: a hardware GPU, else software Vulkan.
     Gpu,
-    /// The adapter with this text in its name, driver or type, or with this number in the list of adapters, from 1.
+    /// The adapter whose name, driver or type contains this text, or the adapter with this number in the list of
+    /// adapters, counted from 1.
     Named(String),
 }
 
@@ -33,7 +34,7 @@ impl From<&str> for Device {
 pub struct DeviceInfo {
     /// The adapter's name, or `cpu`.
     pub name: String,
-    /// The driver's name and version; for the CPU those of this crate, and the number of threads.
+    /// The name and version of the driver; for the CPU, the name and version of this crate, and the number of threads.
     pub driver: String,
     /// The interface to the driver, such as `vulkan`, or `cpu`.
     pub interface: String,

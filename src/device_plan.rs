@@ -12,7 +12,7 @@ use crate::open::faster_on_cpu;
 #[cfg(not(feature = "gpu"))]
 use crate::{error::Error, open::adapter};
 
-/// The device of a render, and the reason.
+/// The device of a render, and why it was chosen.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DevicePlan {
     pub info: DeviceInfo,
@@ -22,8 +22,8 @@ pub struct DevicePlan {
     pub adapter: Option<(gpu::GpuInfo, gpu::KernelPlan)>,
 }
 
-/// Returns the device that a render would use. If it cannot be opened or is too small for the scene, a render uses the
-/// next device, or the CPU.
+/// Returns the device that a render would use. If this device cannot be opened or has too little memory, a render falls
+/// back to the next device or to the CPU.
 ///
 /// # Errors
 ///

@@ -12,7 +12,7 @@ pub enum Error {
     /// An invalid scene file.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// An invalid description that was made in code.
+    /// An invalid description that was created in code.
     #[error(transparent)]
     Description(#[from] Problem),
     /// A render option that does not apply to the scene or the device.

@@ -17,7 +17,7 @@ pub(crate) fn cpu(scene: &Packed) -> Ready<'_> {
     (Box::new(Cpu::new(scene)), DeviceInfo::cpu())
 }
 
-/// Returns why the CPU is faster than any adapter, if it is: measured in `docs/performance.md`.
+/// Returns the reason if the CPU is faster than any adapter for this scene; `docs/performance.md` has the measurements.
 #[cfg(feature = "gpu")]
 pub(crate) fn faster_on_cpu(scene: &Packed) -> Option<String> {
     if scene.specialization.tlas_kinds == 0 {
@@ -44,7 +44,7 @@ pub(crate) fn choice_of(device: &Device) -> gpu::AdapterChoice {
     }
 }
 
-/// Opens the first matching adapter that `wanted` accepts, by name and whether it is software.
+/// Opens the first matching adapter that `wanted` accepts. `wanted` gets the name, and whether the adapter is software.
 #[cfg(feature = "gpu")]
 pub(crate) fn adapter<'a>(
     scene: &'a Packed,

@@ -13,12 +13,12 @@ use crate::device::Device;
 pub struct Options {
     /// The device.
     pub device: Device,
-    /// The region to render, with the pixels of the full image; without, the full image.
+    /// The region to render; `None` renders the full image. The pixels are identical to those of the full image.
     pub crop: Option<Region>,
-    /// The layers besides the radiance. Repetitions are ignored.
+    /// The layers to render in addition to the radiance. Duplicates are ignored.
     pub aovs: Vec<Aov>,
-    /// Round quotients and square roots correctly in software, as GPUs may be off by one unit in the last place. Vulkan
-    /// only; the CPU ignores it.
+    /// Round quotients and square roots correctly in software, because the results of GPUs may be off by one unit in
+    /// the last place. Requires Vulkan; has no effect on the CPU.
     pub exact_rounding: bool,
 }
 

@@ -19,7 +19,7 @@ pub struct Picture {
     pub(crate) device: DeviceInfo,
 }
 
-/// Values of a channel by rows, from the top.
+/// Values of a channel in row-major order, top row first.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Channel {
     /// Values of `R`, `A`, `normal.X` and other measurements.
@@ -49,7 +49,8 @@ impl Picture {
         &self.device
     }
 
-    /// Returns the pixels in linear RGB by rows, from the top. If the image has alpha, they are premultiplied.
+    /// Returns the pixels as linear RGB in row-major order, top row first. If the image has alpha, the colors are
+    /// premultiplied.
     pub fn pixels(&self) -> Pixels {
         Pixels {
             width: self.width(),
@@ -58,21 +59,21 @@ impl Picture {
         }
     }
 
-    /// Returns the alpha values by rows, from the top, if the background is transparent. Filters with negative weights
-    /// may exceed 0 to 1.
+    /// Returns the alpha values in row-major order, top row first, if the background is transparent. With filters that
+    /// have negative weights, the values may be outside 0 ... 1.
     pub fn alpha(&self) -> Option<Vec<f32>> {
         let pixels = 0..self.film.sums.len();
         self.layout.alpha.then(|| pixels.map(|i| self.film.alpha(i)).collect())
     }
 
-    /// Returns the pixels as 8-bit RGB by rows, from the top, with the scene's view transform and exposure, as in a
-    /// PNG. Alpha is composited over black.
+    /// Returns the pixels as 8-bit RGB in row-major order, top row first, with the scene's view transform and exposure,
+    /// as in a PNG. Alpha is composited over black.
     pub fn rgb8(&self) -> Vec<u8> {
         self.film.means().flat_map(|mean| self.layout.view.rgb8(mean)).collect()
     }
 
-    /// Returns the pixels as 8-bit RGBA by rows, from the top, as in a PNG with alpha: straight colors, encoded as in
-    /// [`Picture::rgb8`], and linear alpha, which is 255 if the image has none.
+    /// Returns the pixels as 8-bit RGBA in row-major order, top row first, as in a PNG with alpha: straight colors,
+    /// encoded as in [`Picture::rgb8`], and linear alpha, which is 255 if the image has no alpha.
     pub fn rgba8(&self) -> Vec<u8> {
         let pixel = |(i, mean)| match self.layout.alpha {
             true => self.layout.view.rgba8(mean, self.film.alpha(i)),
@@ -109,7 +110,7 @@ impl Picture {
     ///
     /// Layers become channels of an EXR, and separate files such as `NAME.normal.png` for a PNG; JPEG and WebP have no
     /// layers. Alpha becomes a channel, except in a JPEG, which is composited over black. Existing files are replaced
-    /// by complete ones.
+    /// atomically.
     ///
     /// # Errors
     ///

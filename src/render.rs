@@ -54,14 +54,14 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
             .work(|backend, _| bands.render_next(backend, &mut |_, _, _| Ok(Flow::Continue), &mut || progress.made()))
     };
     while let Some(band) = next()? {
-        put(&mut film, &band.film);
+        copy_band(&mut film, &band.film);
     }
     Ok(prepared.picture(film))
 }
 
 /// Renders a scene progressively. `watch` is called at least about ten times per second with the current image, and
 /// returns whether to continue. All pixels get a few samples before any pixel gets more, except that an image too large
-/// for one film of the device is rendered part by part, from the top. The result is bit-identical to that of
+/// for one film of the device is rendered part by part, top to bottom. The result is bit-identical to the result of
 /// [`render`].
 ///
 /// # Errors
@@ -103,7 +103,7 @@ pub fn render_progressive(
                 };
                 match watch(&mut progress) {
                     Ok(flow) => Ok(flow.is_continue().into()),
-                    // A failure while the image is copied is handled like others.
+                    // Failures while the image is copied are handled like failures of the render.
                     Err(Error::Render(error @ (RenderError::Lost { .. } | RenderError::OutOfMemory { .. }))) => {
                         Err(error)
                     }
@@ -114,7 +114,7 @@ pub fn render_progressive(
                 }
             };
             let band = bands.render_next(backend, &mut look, &mut || progress.made())?;
-            Ok(band.map(|band| put(&mut whole, &band.film)))
+            Ok(band.map(|band| copy_band(&mut whole, &band.film)))
         })
     };
     let rendered = loop {
@@ -156,7 +156,7 @@ impl Progressive<'_> {
     ///
     /// The driver of the device reports an error or a loss.
     pub fn picture(&mut self) -> Result<Picture, Error> {
-        put(self.whole, &self.backend.film()?.part(self.band));
+        copy_band(self.whole, &self.backend.film()?.part(self.band));
         Ok(Picture {
             film: self.whole.clone(),
             hits: self.hits.to_vec(),
@@ -220,11 +220,11 @@ fn empty(region: Region, form: FilmLayout) -> Result<Film, RenderError> {
     Ok(Film::of(region, form))
 }
 
-/// Copies whole rows to the film.
-fn put(whole: &mut Film, band: &Film) {
+/// Copies the rows of a band to the film of the whole image.
+fn copy_band(whole: &mut Film, band: &Film) {
     let start = (band.region.y0 - whole.region.y0) as usize * whole.region.width() as usize;
     for (to, from) in whole.lists_mut().zip(band.lists()) {
-        // Lists that the form of the film lacks are empty.
+        // Lists that this film layout does not include are empty.
         if let Some(to) = to.get_mut(start..start + from.len()) {
             to.copy_from_slice(from);
         }
@@ -237,7 +237,7 @@ pub fn needs_first_hits(scene: &Packed, aovs: &[Aov]) -> bool {
     sources.any(|source| source == AovSource::FirstHit)
 }
 
-/// Returns the depth that a PNG shows at half brightness: that at the image center, or 1 without a hit.
+/// Returns the depth that a PNG maps to half brightness: the depth at the image center, or 1 if nothing is hit there.
 ///
 /// # Errors
 ///

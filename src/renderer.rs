@@ -14,7 +14,7 @@ use crate::error::{Error, RenderError};
 use crate::open::{Ready, adapter, cpu, faster_on_cpu};
 use crate::options::Options;
 
-/// Prefix of the message why the CPU was chosen.
+/// Prefix of messages that explain why the CPU is used.
 const ON_CPU: &str = "rendering on the CPU: ";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,13 +32,14 @@ pub struct FaultHandler<'a> {
     pub stopped: Box<dyn Fn() -> bool + 'a>,
 }
 
-/// Pauses before successive attempts to open a lost device, without progress between them.
+/// Pauses before successive attempts to open a lost device; the attempts are counted again after any progress.
 const PAUSES: [Duration; 3] = [Duration::ZERO, Duration::from_millis(500), Duration::from_secs(2)];
 
 /// Interval at which the stop callback is polled during a pause.
 const STOP_INTERVAL: Duration = Duration::from_millis(20);
 
-/// A counter of results that a loss of the device does not undo. Losses with progress between them do not end the work.
+/// Counts results that remain valid if the device is lost. The work is only given up after several losses without
+/// progress in between.
 #[derive(Clone, Debug, Default)]
 pub struct Progress(Arc<AtomicU64>);
 
@@ -60,7 +61,7 @@ pub struct Renderer<'a> {
     info: DeviceInfo,
     why: Option<String>,
     on_fault: FaultHandler<'a>,
-    /// The size of film by which the work was divided: a replacement device must support it.
+    /// The film size that was used to divide the work; a replacement device must support this size.
     needed_film: Option<u64>,
     /// The lost device and the reason, while no device is open.
     gone: Option<(String, String)>,
@@ -71,8 +72,8 @@ pub struct Renderer<'a> {
 }
 
 impl<'a> Renderer<'a> {
-    /// Opens a device for a scene. With [`Device::Auto`] the CPU renders if no adapter exists, if the scene is too large for it, or if it
-    /// is lost for good; `on_fault` reports the reason.
+    /// Opens a device for a scene. With [`Device::Auto`] the CPU renders if no adapter exists, if the scene is too
+    /// large for the adapter, or if the adapter is lost permanently; `on_fault` reports the reason.
     ///
     /// # Errors
     ///
@@ -124,7 +125,7 @@ impl<'a> Renderer<'a> {
         &self.info
     }
 
-    /// Returns the maximum size of a film in pixels, kept when another device replaces this one.
+    /// Returns the maximum size of a film in pixels. The value does not change if another device replaces this one.
     pub fn largest_film(&self) -> u64 {
         self.needed_film.unwrap_or_else(|| self.backend.largest_film())
     }
@@ -133,13 +134,13 @@ impl<'a> Renderer<'a> {
         self.progress.clone()
     }
 
-    /// Runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`] the CPU takes over for good if
-    /// that fails or memory is too small; with any choice if the driver ends loops early.
+    /// Runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`], the CPU takes over permanently
+    /// if reopening fails or memory is insufficient. With any device, the CPU takes over if the driver truncates loops.
     ///
     /// # Errors
     ///
-    /// The errors of the work; [`RenderError::Lost`] if the device cannot be opened again; [`RenderError::Cancelled`] if the renderer was
-    /// stopped while it waited.
+    /// Any error returned by `work`; [`RenderError::Lost`] if the device cannot be opened again;
+    /// [`RenderError::Cancelled`] if the renderer was stopped while it waited.
     pub fn work<T>(
         &mut self,
         mut work: impl FnMut(&mut dyn Backend, &DeviceInfo) -> Result<T, RenderError>,

@@ -308,7 +308,7 @@ fn an_image_in_memory_equals_a_file() {
             4,
             4,
             Texels::Bytes(Encoding::Srgb, colors),
-            "has 12 texels; its size, 4 x 4,",
+            "has 12 texels; its size is 4 x 4",
         ),
         (0, 1, Texels::Floats(Vec::new()), "must have a texel at least"),
         (

@@ -1,4 +1,4 @@
-//! Loads and renders a glTF file with all features after random changes of JSON values and of words of its buffer.
+//! Loads and renders a glTF file with all features after random changes to its JSON values and to words of its buffer.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

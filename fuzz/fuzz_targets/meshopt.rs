@@ -1,4 +1,4 @@
-//! Decodes compressed views of glTF: streams of another encoder with changed bytes, or arbitrary bytes.
+//! Decodes compressed glTF buffer views: streams of a reference encoder with some bytes changed, or arbitrary bytes.
 #![no_main]
 
 use std::sync::OnceLock;
@@ -42,7 +42,7 @@ fuzz_target!(|bytes: &[u8]| {
         let at = choices.below(last + 1);
         stream[at] = choices.byte();
     }
-    // The view has the positions of triangles, or their indices.
+    // The view contains the positions or the indices of triangles.
     let kind = if mode == "ATTRIBUTES" { "VEC3" } else { "SCALAR" };
     let component = if mode == "ATTRIBUTES" { 5126 } else { 5125 };
     let attributes = if mode == "ATTRIBUTES" {

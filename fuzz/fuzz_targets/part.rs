@@ -1,4 +1,4 @@
-//! Merges a part file with valid hashes after random changes of its header and of the words and values of its pieces.
+//! Merges a part file with valid hashes after random changes to its header and to the words and values of its pieces.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -77,7 +77,7 @@ fuzz_target!(|bytes: &[u8]| {
         let layout = parts.layout();
         let whole = layout.region;
         let _ = parts.read(&mut |_| Ok(()));
-        // The checks of the command line before it writes.
+        // The same checks as the command line performs before writing.
         let out = file(&format!("out.{ending}"), b"");
         let Some(format) = Format::of(&out) else { return };
         if format.check_size(whole.width(), whole.height()).is_err() {

@@ -1,4 +1,4 @@
-//! Parses, writes, re-parses, validates and renders scene files after random changes of their values.
+//! Parses, writes, re-parses, validates and renders scene files after random changes to their values.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

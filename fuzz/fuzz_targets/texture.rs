@@ -29,7 +29,7 @@ fuzz_target!(|bytes: &[u8]| {
     let mut assets = Assets::default();
     assets.encoded.insert("a".to_owned(), bytes.into());
     if let Ok(scene) = description.validate_with(&assets) {
-        // Importance tables of large environment maps take long.
+        // Building the importance tables of large environment maps takes too long.
         if bytes.len() < 1 << 16 {
             render(&scene);
         }

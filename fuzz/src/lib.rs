@@ -1,4 +1,5 @@
-//! Shared code of the fuzz targets: choices from the input bytes, files for readers that need a path, a small render.
+//! Shared code of the fuzz targets: decisions derived from the input bytes, temporary files for readers that need a
+//! path, and a small render.
 
 #[path = "../../crates/scene/src/gltf/changed.rs"]
 mod changed;
@@ -16,7 +17,7 @@ use wgray::{Device, Options, Overrides, Scene};
 pub use changed::changed;
 pub use everything::everything;
 
-/// Choices made by the input bytes; 0 once they are used up.
+/// Derives decisions from the input bytes; returns 0 once the bytes are used up.
 pub struct Choices<'a>(pub &'a [u8]);
 
 impl Choices<'_> {
@@ -32,14 +33,14 @@ impl Choices<'_> {
         u32::from_le_bytes(std::array::from_fn(|_| self.byte()))
     }
 
-    /// Returns a number below `count`, 0 for a count of 0.
+    /// Returns a number below `count`, or 0 if `count` is 0.
     pub fn below(&mut self, count: usize) -> usize {
         let wide = count > 256;
         let number = u16::from_le_bytes([self.byte(), if wide { self.byte() } else { 0 }]);
         usize::from(number) % count.max(1)
     }
 
-    /// Returns whether bytes are left.
+    /// Returns whether unused bytes are left.
     pub fn are_left(&self) -> bool {
         !self.0.is_empty()
     }
@@ -64,7 +65,8 @@ pub fn small() -> Overrides {
     }
 }
 
-/// Like [`small`] for models. The environment is constant: tables of the studio would dominate the time.
+/// Like [`small`], for models. The environment is constant, because computing the tables of the studio environment
+/// would dominate the time.
 pub fn small_model() -> Overrides {
     Overrides {
         environment: Some(EnvironmentDescription::new([0.5, 0.5, 0.5])),
@@ -72,7 +74,7 @@ pub fn small_model() -> Overrides {
     }
 }
 
-/// Renders a scene on the CPU: valid scenes must render without an error.
+/// Renders a scene on the CPU and asserts that there is no error.
 pub fn render(scene: &Scene) {
     let options = Options {
         device: Device::Cpu,
@@ -81,7 +83,7 @@ pub fn render(scene: &Scene) {
     wgray::render(scene, &options).expect("a valid scene renders");
 }
 
-/// Returns a .glb file of a JSON and a buffer.
+/// Builds a .glb file from a JSON document and a buffer.
 pub fn container(json: &serde_json::Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');

@@ -1,5 +1,5 @@
-//! The global allocator: the system allocator, except that an allocation failure that no caller handles ends the
-//! program with exit code 7. The standard library would abort and leave temporary files behind.
+//! The global allocator. It wraps the system allocator; an allocation failure that no caller handles ends the program
+//! with exit code 7. The standard library would abort instead, leaving temporary files behind.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::{self, Write as _};
@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use super::log;
 
+/// The system allocator, with a message when memory runs out.
 #[derive(Debug)]
 pub struct Allocator;
 
@@ -46,7 +47,7 @@ fn checked(memory: *mut u8, size: usize) -> *mut u8 {
 pub fn end(size: usize) -> ! {
     static ENDING: AtomicBool = AtomicBool::new(false);
     if ENDING.swap(true, Ordering::Relaxed) {
-        // Another thread prints the line and ends the program.
+        // Another thread is printing the message and ending the program.
         loop {
             std::thread::sleep(Duration::from_secs(1));
         }
@@ -68,11 +69,11 @@ pub fn end(size: usize) -> ! {
     std::process::exit(7)
 }
 
-/// Bytes of the signal stack that the standard library maps for each thread.
+/// Size in bytes of the signal stack that the standard library maps for each thread.
 const SIGNAL_STACK: usize = 8192;
 
-/// Ends the program likewise if a thread's signal stack has no memory: the standard library maps it directly, and
-/// panics.
+/// Ends the program in the same way if there is no memory for a thread's signal stack. The standard library maps this
+/// stack without the allocator, and panics on failure.
 pub fn catch_signal_stacks() {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {

@@ -125,7 +125,7 @@ fn image(scene: &Scene, packed: &Packed) -> String {
     )
 }
 
-/// Describes the shapes: their number, and the number and memory use of mesh instances.
+/// Describes the shapes: the number of shapes, and the number and memory use of mesh instances.
 fn shapes(scene: &Scene, packed: &Packed) -> String {
     let all = count(scene.shapes.len(), "shape");
     if packed.bvh.instances.is_empty() {

@@ -20,7 +20,7 @@ pub fn run(args: &Args) -> ExitCode {
     super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS)
 }
 
-/// Returns the command line definition with the completions that the arguments do not define themselves.
+/// Returns the command line definition, extended by completions that the arguments do not define.
 fn command() -> Command {
     let all = below(super::Cli::command());
     let names: Vec<String> = all

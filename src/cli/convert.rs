@@ -146,7 +146,7 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// Returns the name of a file with control characters replaced by spaces.
+/// Returns the file name, with control characters replaced by spaces.
 fn name_of(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()

@@ -100,7 +100,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.no_page && args.out.is_none() {
         return Err(Usage("--no-page requires --out FILE.png".to_string()).into());
     }
-    // Kept until the session has read the scene, so that its meshes are read only once.
+    // Kept alive until the session has read the scene, so that the meshes are read only once.
     let scene = args
         .out
         .as_ref()
@@ -160,7 +160,7 @@ fn listen_error(address: &str, error: &io::Error) -> anyhow::Error {
     }
 }
 
-/// URL schemes with a meaning of their own to browsers and operating systems.
+/// URL schemes that browsers and operating systems handle specially.
 const NON_EDITOR_SCHEMES: [&str; 14] = [
     "javascript",
     "data",
@@ -228,7 +228,7 @@ fn check_output(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow
     Ok(path.to_owned())
 }
 
-/// Returns the folder of the shaders; `None` for the built-in ones.
+/// Returns the folder of the shaders; `None` for the built-in shaders.
 fn shaders(given: Option<PathBuf>) -> anyhow::Result<Option<PathBuf>> {
     match given {
         Some(folder) if folder.is_dir() => Ok(Some(folder)),
@@ -324,7 +324,7 @@ impl Terminal {
         say(&format!("{} {head}\n{excerpt}", clock()));
     }
 
-    /// Returns an excerpt with the underlines of its errors in red.
+    /// Returns the excerpt with the error underlines in red.
     fn marked(self, excerpt: &str) -> String {
         let lines = excerpt.lines().map(|line| match line.find('^') {
             Some(at) if !line.starts_with(char::is_numeric) => {

@@ -6,7 +6,8 @@ use std::str::FromStr;
 
 use crate::cli::Usage;
 
-/// Largest frame number, and maximum number of frames, as all file names are checked first.
+/// Largest frame number, and maximum number of frames; the number is limited because all file names are checked before
+/// rendering.
 pub const MAX_NUMBER: u32 = 999_999_999;
 const MAX_COUNT: usize = 100_000;
 
@@ -73,14 +74,14 @@ fn number(text: &str) -> Result<u32, String> {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// The frame number; `None` without `--frames`.
+    /// The frame number; `None` if `--frames` is not given.
     pub number: Option<u32>,
-    /// Position in the run, from 1, and number of frames.
+    /// Position in the run, counted from 1, and the number of frames.
     pub place: (usize, usize),
 }
 
 impl Frame {
-    /// Returns the images of a run: without `frames`, one.
+    /// Returns the images of a run: one per frame, or a single image if `frames` is `None`.
     pub fn all(frames: Option<&Frames>) -> Vec<Frame> {
         let numbers = match frames {
             Some(frames) => frames.0.iter().copied().map(Some).collect(),
@@ -97,8 +98,8 @@ impl Frame {
         Frame { number, place: (1, 1) }
     }
 
-    /// Replaces `#` by the number, zero-padded to the number of `#`, except in folder names. Names of frames must
-    /// differ. Errors name `option`.
+    /// Replaces a group of `#` in the file name with the frame number, zero-padded to the length of the group. If there
+    /// are several frames, the name must contain a group, so that names differ. Error messages contain `option`.
     pub fn name(&self, option: &str, pattern: &Path) -> Result<PathBuf, Usage> {
         let Some(number) = self.number else {
             return Ok(pattern.to_owned());
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_take_the_place_of_their_marks() {
+    fn number_signs_are_replaced_by_the_frame_number() {
         let one = |number, count| Frame {
             number: Some(number),
             place: (1, count),

@@ -40,7 +40,7 @@ const SCENES: [&str; 7] = ["toml", "json", "gltf", "glb", "obj", "ply", "stl"];
 /// Maximum characters of a quoted argument.
 const MAX_WORD_LEN: usize = 200;
 
-/// Adds a hint, and escapes and shortens quoted arguments.
+/// Adds a hint to the error, and escapes and shortens quoted arguments.
 pub fn improve(mut error: clap::Error) -> clap::Error {
     if let Some(hint) = hint(&error) {
         error.remove(ContextKind::SuggestedArg);

@@ -34,7 +34,7 @@ pub enum Level {
     Note,
     /// The progress of a render.
     Progress,
-    /// Messages of `--verbose`, and the summary after a render.
+    /// Additional messages with `--verbose`, and the summary after a render.
     Info,
     Debug,
 }
@@ -66,7 +66,7 @@ pub fn is_json() -> bool {
     JSON.load(Ordering::Relaxed)
 }
 
-/// Returns the format that an invalid command line requests.
+/// Returns the message format that the arguments request, even if the command line is invalid.
 pub fn asked(arguments: impl Iterator<Item = std::ffi::OsString>) -> Format {
     let mut format = Format::default();
     let mut arguments = arguments.take_while(|argument| argument != "--");
@@ -98,7 +98,7 @@ pub fn print_with(level: Level, message: &str, facts: Facts) {
     struct Line<'a> {
         level: Level,
         message: &'a str,
-        /// Seconds since 1970 in UTC.
+        /// Unix time in seconds.
         time: f64,
         #[serde(flatten)]
         facts: Facts,
@@ -116,14 +116,15 @@ pub fn print_with(level: Level, message: &str, facts: Facts) {
     write(&serde_json::to_string(&line).unwrap_or_default());
 }
 
-/// Prints text that continues the previous message; a JSON message has it in its fields instead.
+/// Prints text that continues the previous message. JSON messages carry this information in their fields, so nothing is
+/// printed.
 pub fn print_continuation(text: &str) {
     if !is_json() {
         write(&escape_control_in_lines(text));
     }
 }
 
-/// Prints a line to standard error. A failure cannot be reported, and must not end a render.
+/// Prints a line to standard error. Ignores failures, because they cannot be reported and must not end a render.
 fn write(line: &str) {
     let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }

@@ -64,7 +64,8 @@ fn name_of(command: &Command) -> &str {
 fn page(command: &Command, program: &Command) -> io::Result<Vec<u8>> {
     let name = name_of(command);
     let man = Man::new(command.clone());
-    // Without a date, which reproducible builds need, `clap_mangen` would shift the other fields.
+    // Built here, because `clap_mangen` shifts the other fields if there is no date; reproducible builds need pages
+    // without a date.
     let (title, version) = (name.to_uppercase(), env!("CARGO_PKG_VERSION"));
     let mut text = format!(".TH {title} 1 \"\" \"wgray {version}\" \"User Commands\"\n").into_bytes();
     man.render_name_section(&mut text)?;
@@ -104,7 +105,7 @@ fn page(command: &Command, program: &Command) -> io::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// Returns the examples of a page with their purposes; the page of the program shows all.
+/// Returns the examples of a page, each with its purpose. The page of the program shows all examples.
 fn examples(name: &str) -> impl Iterator<Item = (&'static str, &'static str)> {
     let words = name.replace('-', " ");
     let pairs = EXAMPLES.lines().filter_map(|line| line.split_once(": "));
@@ -152,7 +153,7 @@ const FILES: &[(&str, &str)] = &[
     ),
 ];
 
-/// Purposes and commands.
+/// Examples, one per line: the purpose, then the command.
 const EXAMPLES: &str = "\
 Render a model, in a neutral studio if it has no lights: wgray render model.glb -o image.png
 Render an EXR with layers: wgray render a.toml --size 1920x1200 --spp 64 -o a.exr --aov normal,depth

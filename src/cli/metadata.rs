@@ -1,4 +1,4 @@
-//! Metadata of images: the program, the scene and the settings that made them.
+//! Metadata of images: the program, the scene and the settings of the render.
 
 use std::path::Path;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use wgray_render::records::Packed;
 /// Marks an incomplete image: `32 of 64 samples`.
 const PARTIAL: &str = "partial";
 
-/// Returns true if an image file is whole, with all samples.
+/// Returns true if an image file is complete and contains all samples.
 pub fn is_finished(path: &Path) -> bool {
     is_complete(path) && read_metadata(path).is_none_or(|metadata| metadata.get(PARTIAL).is_none())
 }
@@ -60,12 +60,12 @@ impl RenderMetadata {
         }
     }
 
-    /// Returns the metadata that does not depend on the device.
+    /// Returns the metadata that is independent of the device.
     pub fn lasting(&self) -> Metadata {
         self.metadata.clone()
     }
 
-    /// For fewer samples than requested; see [`RenderMetadata::on`].
+    /// Returns the metadata of an image with fewer samples than requested; see [`RenderMetadata::on`].
     pub fn partial(&self, device: &DeviceInfo, reproducible: bool, (samples, of): (u32, u32)) -> Metadata {
         let mut metadata = self.on(device, reproducible);
         metadata
@@ -74,7 +74,7 @@ impl RenderMetadata {
         metadata
     }
 
-    /// Includes the device, except under `--reproducible`.
+    /// Returns the metadata; includes the device unless `--reproducible` is given.
     pub fn on(&self, device: &DeviceInfo, reproducible: bool) -> Metadata {
         let mut metadata = self.metadata.clone();
         if !reproducible {

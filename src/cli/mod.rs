@@ -162,7 +162,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Parses the command line. Its `--help` lists all options, `-h` those without `hide_short_help`.
+/// Parses the command line. `--help` lists all options, `-h` only options without `hide_short_help`.
 fn parse() -> Result<Cli, clap::Error> {
     let shows_all = std::env::args_os().any(|word| word == "--help")
         || std::env::args_os().nth(1).is_some_and(|word| word == "help");
@@ -200,7 +200,7 @@ fn explain(error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Sets the environment variables of drivers, before other threads are started.
+/// Sets environment variables for drivers. Must run before other threads are started.
 fn prepare_environment(threads: Option<u16>) {
     let set = |name: &str, value: &std::ffi::OsStr| {
         // SAFETY: the process has only this thread so far.
@@ -210,7 +210,7 @@ fn prepare_environment(threads: Option<u16>) {
         set("LP_NUM_THREADS", threads.to_string().as_ref());
     }
     if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // Mesa warns if it is unset, although it is only used for windows.
+        // Mesa warns if this variable is unset, although only windows use it.
         set("XDG_RUNTIME_DIR", std::env::temp_dir().as_os_str());
     }
 }
@@ -222,12 +222,12 @@ fn start_threads(threads: Option<u16>) -> anyhow::Result<()> {
     Ok(pool.build_global().map_err(NoThreads)?)
 }
 
-/// Reads a scene file and applies the overrides.
+/// Loads a scene file with the overrides.
 fn load(path: &Path, overrides: &Overrides) -> anyhow::Result<Scene> {
     Scene::load_with(path, overrides).map_err(|error| plain(error.into()))
 }
 
-/// Returns a warning about a scene with its file, and with its line where it has one, as errors are located.
+/// Formats a warning about a scene with its location, in the same form as errors: the file, and the line if known.
 fn located(path: &Path, note: &Note) -> String {
     match (&note.file, note.line) {
         (None, Some(line)) => format!("{}:{line}: {}", path.display(), note.message),
@@ -235,7 +235,7 @@ fn located(path: &Path, note: &Note) -> String {
     }
 }
 
-/// Converts an error of the library, naming options as the command line does.
+/// Converts an error of the library, replacing field names by names of command line options.
 fn plain(error: Error) -> anyhow::Error {
     match error {
         Error::Option(problem) | Error::Scene(SceneError::Override(problem)) => option(&problem).into(),
@@ -328,7 +328,7 @@ fn facts_of<const N: usize>(facts: [(&str, Value); N]) -> Facts {
         .collect()
 }
 
-/// Returns the exit code of a command after it has printed: a closed pipe is not a failure, a full disk is.
+/// Returns the exit code of a command after its output was printed. A closed pipe is not a failure, but a full disk is.
 fn ended(printed: io::Result<()>, code: ExitCode) -> ExitCode {
     match printed.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -352,7 +352,7 @@ fn shader_errors(error: &anyhow::Error) -> &[ShaderError] {
     }
 }
 
-/// Returns true if the same command may succeed later or on another machine.
+/// Returns true if the same command may succeed later, or on another machine.
 fn may_succeed_later(error: &anyhow::Error) -> bool {
     match error.downcast_ref() {
         Some(Interrupted(signal)) => *signal == signal_hook::consts::SIGTERM,

@@ -11,13 +11,13 @@ pub fn whole<T: TryFrom<u32>>(range: RangeInclusive<u32>) -> impl Fn(&str) -> Re
     }
 }
 
-/// The library checks the range.
+/// Parses a number of samples. The library checks the range.
 pub fn samples(text: &str) -> Result<u32, String> {
     let number = text.parse();
     number.map_err(|_| "must be a whole number from 1 to 65536".to_owned())
 }
 
-/// The library checks the range, which depends on the integrator.
+/// Parses a number of bounces. The library checks the range, which depends on the integrator.
 pub fn bounces(text: &str) -> Result<u32, String> {
     let number = text.parse();
     number.map_err(|_| "must be a whole number, such as 8".to_owned())

@@ -21,7 +21,7 @@ pub struct Outputs {
 
 struct Picture {
     format: Format,
-    /// The image, then its separate AOVs, each with the option that requests it.
+    /// The image, then the AOVs in separate files; each with the option that requests the file.
     files: Vec<(String, Output)>,
 }
 
@@ -58,9 +58,9 @@ impl Files {
 /// Decides whether every layer must be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayerPolicy {
-    /// An output must support them.
+    /// At least one output must support the layers.
     Requested,
-    /// Outputs that support them write them.
+    /// The layers are written to the outputs that support them.
     Available,
 }
 
@@ -198,8 +198,8 @@ impl Outputs {
         Ok(())
     }
 
-    /// Returns true if all files exist and all images are complete. Image streams never exist; a statistics stream is
-    /// ignored.
+    /// Returns true if all files exist and all images are complete. Image streams count as missing; a statistics stream
+    /// is ignored.
     pub fn exist(&self) -> bool {
         let exists = |output: &Output| output.path().is_some_and(Path::is_file);
         let mut pictures = self.pictures.iter().flat_map(|picture| &picture.files);
@@ -218,7 +218,7 @@ impl Outputs {
         pictures.map(again).collect()
     }
 
-    /// Rejects `--preview` without an image that is a file.
+    /// Rejects `--preview` if no image is written to a regular file.
     pub fn check_preview(&self) -> Result<(), Usage> {
         match self.pictures.iter().any(Picture::is_rewritable) {
             true => Ok(()),
@@ -248,14 +248,15 @@ impl Outputs {
         Some(output.name())
     }
 
-    /// Returns the names of the images or the part, for messages.
+    /// Returns the names of the images or of the part, for messages.
     pub fn images(&self) -> Vec<String> {
         let pictures = self.pictures.iter().flat_map(|picture| &picture.files);
         let outputs = pictures.map(|(_, output)| output).chain(&self.part);
         outputs.map(|output| output.name().to_owned()).collect()
     }
 
-    /// Opens all destinations. A pipe blocks until it has a reader: signals must still end the program at once.
+    /// Opens all destinations. Opening a pipe blocks until it has a reader, so signals must still end the program
+    /// immediately.
     pub fn begin(mut self) -> io::Result<OpenOutputs> {
         let pictures = self.pictures.iter_mut().flat_map(|picture| &mut picture.files);
         for output in pictures

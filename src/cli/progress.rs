@@ -40,9 +40,9 @@ pub struct Progress {
     /// The frame number.
     frame: Option<u32>,
     start: Instant,
-    /// The initial fraction, read from a checkpoint.
+    /// The initial fraction; above 0 if the render was resumed from a checkpoint.
     first: Option<f64>,
-    /// The tenths (or hundredths) completed at the last printed line, and its time.
+    /// The tenths (or hundredths) that were completed when the last line was printed, and the time of this line.
     printed: (u32, Instant),
 }
 
@@ -127,7 +127,7 @@ impl Progress {
     }
 }
 
-/// Estimates the remaining time from the mean speed so far, once that is meaningful.
+/// Estimates the remaining time from the mean speed so far; `None` while the estimate would be unreliable.
 fn remaining(elapsed: Duration, first: f64, fraction: f64) -> Option<Duration> {
     let done = fraction - first;
     if elapsed < SETTLING || done < 0.01 || fraction >= 1.0 {
@@ -154,8 +154,8 @@ impl Drop for Progress {
     }
 }
 
-/// Runs work whose progress cannot be measured. On a terminal its name and time are shown once it takes longer than a
-/// second.
+/// Runs work whose progress cannot be measured. On a terminal, the name and the elapsed time of the work are shown
+/// after a second.
 pub fn named<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
     if mode != Mode::Auto || log::is_json() || !std::io::stderr().is_terminal() {
         return work();

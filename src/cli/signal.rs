@@ -1,4 +1,4 @@
-//! Signals, which end the program after it has removed its temporary files.
+//! Signal handling: the program removes its temporary files before it ends.
 
 use std::io;
 use std::sync::Arc;
@@ -37,8 +37,8 @@ pub fn exit_code(signal: i32) -> u8 {
     128_u8.saturating_add(u8::try_from(signal).unwrap_or(0))
 }
 
-/// Records the first signal; the second one ends the program at once. Signals ignored at the start stay ignored, for
-/// `nohup` and background jobs.
+/// Records the first signal; a second signal ends the program immediately. Signals that are ignored when the program
+/// starts stay ignored, as `nohup` and background jobs require.
 pub fn stop() -> io::Result<Stop> {
     stop_with(None)
 }
@@ -57,17 +57,17 @@ fn stop_with(terminated: Option<u8>) -> io::Result<Stop> {
     Ok(stop)
 }
 
-/// Signals that end the program at once, but are recorded from [`Signals::defer`] on.
+/// Signal handlers that end the program immediately. After [`Signals::defer`], the handlers only record the signal.
 pub struct Signals {
     /// The exit code after SIGTERM, if it differs from 143.
     terminated: Option<u8>,
-    /// True while SIGTERM ends the program with that code.
+    /// True while SIGTERM ends the program with the code of `terminated`.
     ends: Arc<AtomicBool>,
     stop: Option<Stop>,
 }
 
 impl Signals {
-    /// Registers handlers that end the program at once.
+    /// Registers handlers that end the program immediately.
     pub fn immediate(terminated: Option<u8>) -> io::Result<Signals> {
         let ends = Arc::new(AtomicBool::new(true));
         if let Some(code) = terminated.filter(|_| !is_ignored(SIGTERM)) {

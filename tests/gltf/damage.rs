@@ -121,7 +121,7 @@ fn triangles_with_invalid_positions_are_skipped() {
             }
             let note = &scene.notes[0];
             assert!(
-                note.message.starts_with(&what) && note.message.ends_with(" left out"),
+                note.message.starts_with(&what) && note.message.ends_with(" skipped"),
                 "{context}"
             );
             assert_eq!(strict.unwrap_err(), format!("{}: {what}", file.display()));
@@ -159,7 +159,7 @@ fn a_node_may_have_any_scale() {
         scene.notes,
         [
             "meshes[0].primitives[0].attributes.POSITION: 2 triangles have a vertex with a coordinate that is not finite or \
-             beyond 1e9; they are left out"
+             beyond 1e9; they are skipped"
         ]
     );
 }

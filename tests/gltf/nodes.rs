@@ -86,7 +86,7 @@ fn meshes_flattened_along_their_normal_are_kept() {
         let scene = flattened(scale);
         assert_corners(&scene, &quad_by(|p| p * by + 2.0 * DVec3::Z));
         assert!(
-            scene.notes.iter().all(|note| !note.message.contains("left out")),
+            scene.notes.iter().all(|note| !note.message.contains("skipped")),
             "{:?}",
             scene.notes
         );
@@ -99,7 +99,7 @@ fn meshes_flattened_along_their_normal_are_kept() {
             scene
                 .notes
                 .iter()
-                .any(|note| note.message.contains("1 of 1 instances of meshes are left out"))
+                .any(|note| note.message.contains("1 of 1 instances of meshes are skipped"))
         );
     }
 }

@@ -211,7 +211,7 @@ fn images_that_grow_a_thousandfold_are_told() {
     json["materials"] = (0..50).map(slots).collect();
     let primitive = |i: usize| json!({ "attributes": { "POSITION": 0 }, "material": i });
     json["meshes"][0]["primitives"] = (0..50).map(primitive).collect();
-    refused(&json, &binary, "texels together; of files of ");
+    refused(&json, &binary, "texels in total; for files of ");
     // 2 MB that decode to 2 GB. Large images of models are halved.
     let deep = blank(16_384, 16_384, png::ColorType::Rgba, png::BitDepth::Sixteen);
     binary.truncate(start);

@@ -1,4 +1,4 @@
-//! Invalid pixels: NaN, infinite or negative. A display shows them like black or white; here they are counted and
+//! Invalid pixels: NaN, infinite or negative. Displayed directly, they look black or white; here they are counted and
 //! marked.
 
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ pub enum BadPixel {
 }
 
 impl BadPixel {
-    /// Returns the worst kind among `values`; `None` if all are valid.
+    /// Returns the worst kind of invalid value among `values`; `None` if all values are valid.
     pub fn of(values: &[f32]) -> Option<BadPixel> {
         let faults = [
             (BadPixel::Nan, values.iter().any(|v| v.is_nan())),
@@ -34,7 +34,7 @@ impl BadPixel {
 /// Tiles along each side of an image; one location is listed per tile.
 const PARTS: usize = 8;
 
-/// The number of invalid pixels of an image.
+/// The numbers of invalid pixels of an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BadPixels {
     /// Pixels with a NaN.
@@ -48,7 +48,7 @@ pub struct BadPixels {
 }
 
 impl BadPixels {
-    /// Counts the invalid pixels, given by rows of this width, from the top.
+    /// Counts the invalid pixels of an image with this width. `faults` is in row-major order, top row first.
     pub fn count(faults: &[Option<BadPixel>], width: u32) -> BadPixels {
         let width = width as usize;
         let height = faults.len().div_ceil(width.max(1));
@@ -71,7 +71,8 @@ impl BadPixels {
     }
 }
 
-/// Returns the kind of each invalid pixel. `negative` values are valid under filters with negative lobes.
+/// Returns the kind of each invalid pixel. If `negative` is true, negative values are valid, as with filters that have
+/// negative lobes.
 pub fn faults<T: Sync, const N: usize>(
     pixels: &[T],
     negative: bool,
@@ -81,7 +82,7 @@ pub fn faults<T: Sync, const N: usize>(
     pixels.par_iter().with_min_len(1024).map(fault).collect()
 }
 
-/// Paints the marks over the bytes of an image.
+/// Marks the invalid pixels in the RGB bytes of an image.
 pub fn mark(rgb: &mut [u8], faults: &[Option<BadPixel>]) {
     for (pixel, fault) in rgb.chunks_exact_mut(3).zip(faults) {
         if let Some(fault) = fault {
@@ -95,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_worst_of_a_pixel_counts() {
+    fn the_worst_kind_of_value_in_a_pixel_is_reported() {
         let (nan, inf) = (f32::NAN, f32::INFINITY);
         for (values, fault) in [
             ([0.0, -0.0, f32::MAX], None),
@@ -126,6 +127,9 @@ mod tests {
         many[10..].fill(None);
         many[999] = Some(BadPixel::Nan);
         let counted = BadPixels::count(&many, 10);
-        assert!(counted.places.contains(&[9, 99]), "one that is alone is not left out");
+        assert!(
+            counted.places.contains(&[9, 99]),
+            "an isolated invalid pixel is missing"
+        );
     }
 }

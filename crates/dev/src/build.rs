@@ -1,5 +1,5 @@
-//! Compiles the kernels of a scene on a separate thread: a driver's compiler cannot be interrupted, and viewers must
-//! not wait for it.
+//! Compiles the kernels of a scene on a separate thread, because the compiler of a driver cannot be interrupted and
+//! viewers must not wait for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -16,16 +16,16 @@ use wgray_render::gpu::{AdapterChoice, Device, Forms, Gpu, Options, check_kernel
 use wgray_render::records::Packed;
 
 pub struct Request {
-    /// Repeated in the result, to recognize outdated ones.
+    /// Copied to the result, so that outdated results can be recognized.
     pub id: u64,
     /// The device; `None` opens a new one.
     pub device: Option<Device>,
     pub packed: Packed,
     pub shaders: Arc<Shaders>,
-    /// The last good shaders, used if `shaders` have errors.
+    /// The last shaders without errors, used if `shaders` have errors.
     pub fallback: Option<Arc<Shaders>>,
     pub constants: Constants,
-    /// When the change was noticed.
+    /// The time when the change was noticed.
     pub noticed: Instant,
 }
 
@@ -43,14 +43,15 @@ pub struct BuildResult {
     pub took: Duration,
 }
 
-/// The compiler thread. It ends after its current work when this is dropped.
+/// The compiler thread. When dropped, the thread ends after the current compilation.
 pub struct Builder {
     requests: Option<Sender<Request>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Builder {
-    /// Starts the thread, which passes its results to `done`. Requests overtaken before they began are dropped.
+    /// Starts the thread, which passes results to `done`. A request is dropped if a newer request arrives before its
+    /// compilation starts.
     pub fn start(
         choice: AdapterChoice,
         times: Times,
@@ -102,7 +103,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
         noticed,
     } = request;
     let start = Instant::now();
-    // Checks all kernels, including those of other views.
+    // Checks all kernels, including the kernels of other views.
     let refused = times.of("check shaders", || {
         check_kernels(&packed, &shaders, Forms::Buffers).err()
     });
@@ -110,7 +111,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
     let result = usable.map(|shaders| {
         guarded(|| {
             let device = device.map_or_else(|| choose(choice), Ok)?;
-            // Not baked: a changed scene needs no compilation.
+            // The scene is not baked into the kernel, so that changing the scene does not require compilation.
             let options = Options {
                 baked: false,
                 ..Options::best(&device)
@@ -134,7 +135,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
     }
 }
 
-/// Runs code that calls a driver. wgpu's panic at a lost device becomes an error.
+/// Runs code that calls a driver. If wgpu panics because the device is lost, returns an error.
 pub fn guarded<T>(work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<String>().map(String::as_str);

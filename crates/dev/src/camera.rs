@@ -9,22 +9,21 @@ use wgray_scene::CameraDescription;
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Move {
-    /// Orbits around the point looked at: angles to the right and upwards, in radians, by which the scene seems to
-    /// turn.
+    /// Orbits around the look-at point. The angles, in radians to the right and upwards, are those by which the scene
+    /// appears to rotate.
     Orbit(f64, f64),
-    /// Pans sideways: how far the scene moves to the right and upwards, in image heights.
+    /// Pans: the scene appears to move to the right and upwards by these distances, in image heights.
     Pan(f64, f64),
-    /// Approaches the point looked at: the logarithm of the factor by which the scene grows.
+    /// Moves towards the look-at point. The value is the logarithm of the factor by which the scene appears larger.
     Dolly(f64),
-    /// Moves without turning: to the right, upwards and forwards, in multiples of the distance to the point looked
-    /// at.
+    /// Moves without turning: to the right, upwards and forwards, in multiples of the distance to the look-at point.
     Fly(f64, f64, f64),
-    /// Turns on the spot: angles to the right and upwards, in radians.
+    /// Turns the camera without moving it: angles to the right and upwards, in radians.
     #[serde(rename = "look")]
     Turn(f64, f64),
 }
 
-/// The viewpoint of a camera, as a viewer keeps it.
+/// The viewpoint of a camera, as stored in a bookmark.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Viewpoint {
     /// The position.
@@ -33,7 +32,7 @@ pub struct Viewpoint {
     pub look_at: DVec3,
     /// The up direction.
     pub up: DVec3,
-    /// The vertical angle of view in degrees, or the height if orthographic; none for a panorama.
+    /// The vertical field of view in degrees, or the height of an orthographic view; `None` for a panorama.
     pub extent: Option<f64>,
 }
 
@@ -57,11 +56,11 @@ impl Viewpoint {
     }
 }
 
-/// Returns a camera of the same kind at another viewpoint.
+/// Returns a camera of the same kind at the given viewpoint.
 ///
 /// # Errors
 ///
-/// The rule that such a camera breaks.
+/// The rule that the resulting camera violates.
 pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<CameraDescription, String> {
     let Viewpoint {
         position,
@@ -85,14 +84,15 @@ pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<Camera
     }
 }
 
-/// Returns a camera that sees a whole sphere from the same direction, and orbits around its center.
+/// Returns a camera that sees the whole sphere from the same direction, and whose look-at point is the center of the
+/// sphere.
 pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraDescription {
     let View { position, look_at, .. } = view(camera);
     let back = (position - look_at).normalize_or_zero();
     let radius = radius.max(f64::MIN_POSITIVE);
     let mut viewpoint = Viewpoint::of(camera);
     let distance = match camera {
-        // The sphere touches the cone of view; a margin of a quarter of its size remains.
+        // At a factor of 1, the sphere touches the view cone; 1.25 adds a margin.
         CameraDescription::Perspective(c) => 1.25 * radius / (c.fov.to_radians() / 2.0).sin(),
         CameraDescription::Orthographic(_) => {
             viewpoint.extent = Some(2.5 * radius);
@@ -104,12 +104,13 @@ pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraD
     placed(camera, viewpoint).unwrap_or_else(|_| camera.clone())
 }
 
-/// Minimum angle between the view and the vertical, in radians.
+/// Minimum angle between the view direction and the vertical, in radians.
 const STEEPEST: f64 = 0.02;
-/// Significant digits of a camera, relative to its distance: more are invisible, and hard to read.
+/// Significant digits of camera coordinates, relative to the distance. Further digits have no visible effect and make
+/// the text hard to read.
 const DIGITS: i32 = 5;
 
-/// The position, the point looked at, and the height of the image at that point.
+/// The position, the look-at point, and the image height at the distance of the look-at point.
 struct View {
     position: DVec3,
     look_at: DVec3,
@@ -140,7 +141,7 @@ fn view(camera: &CameraDescription) -> View {
     }
 }
 
-/// Returns the moved camera, or the same if that is invalid.
+/// Returns the moved camera, or the unchanged camera if the moved one is invalid.
 pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
     let mut new = camera.clone();
     let View {
@@ -157,7 +158,7 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
             let turned = DQuat::from_axis_angle(up, -x) * offset;
             let right = DQuat::from_axis_angle(up, -x) * right;
             let angle = turned.angle_between(up);
-            // Looking from higher up means a smaller angle to the vertical.
+            // A higher viewpoint has a smaller angle to the vertical.
             let new_angle = (angle - y).clamp(STEEPEST, std::f64::consts::PI - STEEPEST);
             position = look_at + DQuat::from_axis_angle(right, new_angle - angle) * turned;
         }
@@ -201,11 +202,11 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
     if new.validate().is_ok() { new } else { camera.clone() }
 }
 
-/// Nearest and farthest distance to the look-at point that a dolly reaches, relative to that of the file's camera.
+/// Minimum and maximum distance to the look-at point after a dolly move, relative to the distance in the file's camera.
 const DOLLY_RANGE: [f64; 2] = [0.01, 1000.0];
 
-/// Dollies like [`moved`], but within bounds. At the near bound the look-at point moves along; at the far bound the
-/// camera stops.
+/// Dollies like [`moved`], but within bounds. At the near bound, the look-at point moves together with the camera; at
+/// the far bound, the camera stops.
 pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) -> CameraDescription {
     let size = |camera: &CameraDescription| match camera {
         CameraDescription::Orthographic(c) => c.height,
@@ -225,7 +226,7 @@ pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) ->
     near_end
 }
 
-/// Returns a moved camera with the edited values of the file's camera; `None` if it equals the file's.
+/// Applies the edits of the file's camera to a moved camera; returns `None` if the result equals the file's camera.
 pub fn merged(
     moved: &CameraDescription,
     old: &CameraDescription,
@@ -242,7 +243,7 @@ pub fn merged(
             take(&mut c.look_at, &old.look_at, &new.look_at);
             take(&mut c.up, &old.up, &new.up);
             take(&mut c.fov, &old.fov, &new.fov);
-            // A move does not change the lens.
+            // Moves never change the lens, so the file's values apply.
             (c.focal_length, c.aperture, c.f_number) = (new.focal_length, new.aperture, new.f_number);
             (c.focus_distance, c.blades, c.blade_rotation) = (new.focus_distance, new.blades, new.blade_rotation);
             c.path.clone_from(&new.path);
@@ -279,7 +280,7 @@ fn rounded(point: DVec3, scale: f64) -> DVec3 {
     DVec3::from(point.to_array().map(|x| round(x, scale)))
 }
 
-/// Rounds a number to few decimals, relative to lengths like `scale`.
+/// Rounds a number to about [`DIGITS`] significant digits, counted from the magnitude of `scale`.
 fn round(x: f64, scale: f64) -> f64 {
     let decimals = (DIGITS - scale.log10().floor() as i32).clamp(0, 15) as usize;
     let x = format!("{x:.decimals$}").parse().unwrap_or(x);
@@ -309,7 +310,7 @@ pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
     }
 }
 
-/// Returns the settings that no move changes, such as the lens.
+/// Returns the settings that moves do not change, such as the lens.
 fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
     let CameraDescription::Perspective(c) = camera else {
         return Vec::new();
@@ -334,7 +335,7 @@ pub enum Entry {
     Point(DVec3),
 }
 
-/// Returns a camera as the section of a scene file.
+/// Formats a camera as a section of a scene file.
 pub fn text(camera: &CameraDescription) -> String {
     let kind = match camera {
         CameraDescription::Perspective(_) => "",
@@ -380,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn an_orbit_keeps_distance_and_target() {
+    fn an_orbit_keeps_the_distance_and_the_look_at_point() {
         for (x, y) in [(0.3, 0.0), (0.0, 0.5), (-1.0, -0.7), (0.0, 9.0), (0.0, -9.0)] {
             for camera in [perspective(), orthographic()] {
                 let (old, new) = (view(&camera), view(&moved(&camera, Move::Orbit(x, y))));
@@ -393,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn the_scene_follows_the_hand() {
+    fn the_scene_moves_with_the_drag() {
         // A drag to the right moves the camera to the left; a drag down moves it up.
         let right = view(&moved(&perspective(), Move::Orbit(0.1, 0.0))).position;
         assert!(right.x < -0.3, "{right}");
@@ -415,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dolly_never_sticks_nor_leaves_the_scene() {
+    fn a_dolly_stays_within_its_distance_bounds() {
         let file = perspective();
         let distance = |camera: &CameraDescription| view(camera).position.distance(view(camera).look_at);
         let (mut near, mut far) = (file.clone(), file.clone());
@@ -426,7 +427,7 @@ mod tests {
         assert!((distance(&near) - 0.04).abs() < 1e-3, "{}", distance(&near));
         let further = dollied(&near, 0.1, &file);
         let step = view(&further).position.y - view(&near).position.y;
-        assert!((step - 0.04 * 0.095).abs() < 1e-3, "it moves on: {step}");
+        assert!((step - 0.04 * 0.095).abs() < 1e-3, "wrong step: {step}");
         assert!((distance(&further) - distance(&near)).abs() < 1e-4);
         assert!(distance(&dollied(&near, -0.1, &file)) > distance(&near));
         assert!(distance(&far) < 4001.0, "{}", distance(&far));
@@ -439,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn flying_turns_nothing_and_looking_moves_nothing() {
+    fn flying_keeps_the_direction_and_turning_keeps_the_position() {
         for file in [perspective(), orthographic()] {
             let old = view(&file);
             let far = old.position.distance(old.look_at);
@@ -466,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_framed_is_seen_whole_in_the_middle() {
+    fn a_framed_sphere_is_centered_and_fits_the_image() {
         let center = DVec3::new(10.0, -3.0, 2.0);
         for radius in [1e-6, 0.5, 1e6] {
             for file in [perspective(), orthographic()] {
@@ -478,7 +479,7 @@ mod tests {
                     seen.look_at
                 );
                 let (a, b) = (old.look_at - old.position, seen.look_at - seen.position);
-                assert!(a.angle_between(b) < 1e-2, "{radius}: it looks another way");
+                assert!(a.angle_between(b) < 1e-2, "{radius}: the view direction changed");
                 match new {
                     CameraDescription::Perspective(c) => {
                         let half = (radius / b.length()).asin().to_degrees();
@@ -492,7 +493,7 @@ mod tests {
     }
 
     #[test]
-    fn a_viewpoint_is_kept_and_taken_again() {
+    fn a_camera_can_be_restored_from_its_viewpoint() {
         for file in others().into_iter().chain([perspective(), orthographic()]) {
             let away = moved(&moved(&file, Move::Orbit(0.3, 0.2)), Move::Dolly(0.4));
             let kept = Viewpoint::of(&away);
@@ -503,11 +504,14 @@ mod tests {
             look_at: DVec3::new(0.0, -4.0, 1.0),
             ..Viewpoint::of(&perspective())
         };
-        assert!(placed(&perspective(), wrong).is_err(), "it looks at itself");
+        assert!(
+            placed(&perspective(), wrong).is_err(),
+            "a camera at its own look-at point is accepted"
+        );
     }
 
     #[test]
-    fn a_lens_and_a_panorama_move_and_stay_what_they_are() {
+    fn moves_keep_the_lens_and_the_kind_of_camera() {
         for file in others() {
             for by in [Move::Orbit(0.3, 0.2), Move::Pan(0.1, 0.2), Move::Dolly(0.5)] {
                 let new = moved(&file, by);
@@ -520,12 +524,12 @@ mod tests {
         let [wide, by_number, _] = others();
         let turned = moved(&wide, Move::Orbit(0.3, 0.2));
         let both = merged(&turned, &wide, &by_number).unwrap();
-        assert_eq!(settings(&both), settings(&by_number), "an edit changes the lens");
+        assert_eq!(settings(&both), settings(&by_number), "the edited lens is lost");
         assert_eq!(view(&both).position, view(&turned).position);
     }
 
     #[test]
-    fn a_camera_stays_valid_and_short() {
+    fn moved_cameras_are_valid_and_have_few_digits() {
         let mut camera = perspective();
         for i in 0..1000 {
             camera = moved(&camera, Move::Orbit(0.37, if i % 5 < 3 { 0.11 } else { -0.09 }));
@@ -543,7 +547,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edit_changes_what_it_changes_and_a_move_the_rest() {
+    fn edits_of_the_file_and_moves_are_merged() {
         let file = perspective();
         let turned = moved(&file, Move::Orbit(0.3, 0.2));
         let wide = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 60");
@@ -553,18 +557,30 @@ mod tests {
         let path = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45\npath.keys = [{ frame = 1, fov = 40 }]";
         let both = merged(&turned, &file, &camera(path)).unwrap();
         assert_eq!(view(&both).position, view(&turned).position);
-        assert_eq!(both.path(), camera(path).path(), "a path of the file is the camera's");
+        assert_eq!(both.path(), camera(path).path(), "the path of the file is lost");
         let elsewhere = camera("position = [0, -5, 1]\nlook_at = [0, 0, 1]\nfov = 45");
-        assert_eq!(merged(&turned, &file, &elsewhere), None, "the look_at has not moved");
-        assert_eq!(merged(&turned, &file, &turned), None, "it was saved");
+        assert_eq!(
+            merged(&turned, &file, &elsewhere),
+            None,
+            "a moved position replaces an edited position"
+        );
+        assert_eq!(
+            merged(&turned, &file, &turned),
+            None,
+            "a saved camera still differs from the file"
+        );
         assert_eq!(merged(&turned, &file, &orthographic()), None);
         let through = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nup = [1, 0, 0]\nfov = 45");
         let side = camera("position = [4, 0, 1]\nlook_at = [0, 0, 1]\nfov = 45");
-        assert_eq!(merged(&side, &file, &through), None, "it would look along its up");
+        assert_eq!(
+            merged(&side, &file, &through),
+            None,
+            "a view along the up direction is accepted"
+        );
     }
 
     #[test]
-    fn its_text_reads_back_as_the_same_camera() {
+    fn the_text_of_a_camera_parses_to_the_same_camera() {
         for camera in [perspective(), orthographic()].into_iter().chain(others()) {
             let camera = moved(&camera, Move::Orbit(0.1, 0.2));
             let text = format!("image = {{ width = 4, height = 4 }}\n{}", text(&camera));

@@ -1,5 +1,5 @@
-//! Progressive rendering of an image: coarse at first, then all pixels with few samples, then more. An interruption
-//! waits for one dispatch at most.
+//! Renders an image progressively: first at a coarse resolution, then all pixels with few samples, then with more
+//! samples. An interruption waits for at most one dispatch.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -18,14 +18,14 @@ use super::film_layer::FilmLayer;
 use super::picture::{Content, View};
 use super::pixel_values::means;
 
-/// Target duration of a dispatch: a save or a move of the camera waits this long.
+/// Target duration of a dispatch; a save or a camera move waits up to this long.
 const DISPATCH_DURATION: Duration = Duration::from_millis(30);
-/// Target duration of a coarse image: with the time to show it, 20 per second.
+/// Target render time of a coarse image; including the display time, about 20 images are shown per second.
 const COARSE: Duration = Duration::from_millis(30);
 /// Pixels of a coarse image while the speed is unknown.
 const COARSE_PIXELS: f64 = 10_000.0;
 const COARSEST: u32 = 32;
-/// Maximum number of displayed pixels, and maximum side: browsers show no larger images.
+/// Maximum number of displayed pixels, and maximum side length, because browsers do not show larger images.
 const MAX_PIXELS: u64 = 1 << 24;
 const MAX_SIDE: u32 = 1 << 14;
 /// Number of first hits per dispatch.
@@ -37,17 +37,17 @@ pub struct Canvas {
     scene: Packed,
     /// The camera of the full-size image.
     camera: Camera,
-    /// The scale of the finished film; above 1 if the image is too large.
+    /// The scale of the finished film; above 1 if the image is too large to display.
     finest: u32,
     /// True if the CPU also renders the image, for [`View::Compare`].
     compare: bool,
     stage: Stage,
     steps: Steps,
-    /// The last coarser films, of the GPU and of the CPU.
+    /// The most recent lower-resolution film, and the CPU's, if it renders too.
     under: Option<(Film, Option<Film>)>,
-    /// The film of the CPU in this stage.
+    /// The film of the CPU for this stage.
     cpu: Film,
-    /// The hits of the first rows.
+    /// The first hits of the rows rendered so far, top row first.
     hits: Vec<FirstHit>,
     shown: bool,
     limits: Limits,
@@ -57,7 +57,7 @@ pub struct Canvas {
 pub struct Limits {
     /// Maximum number of samples per pixel, at least 1.
     pub samples: u32,
-    /// The scale of the preview, at least 1: pixels of the image along each side of a displayed one.
+    /// The scale of the preview, at least 1: number of image pixels along each side of a displayed pixel.
     pub scale: u32,
 }
 
@@ -72,7 +72,7 @@ impl Default for Limits {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stage {
-    /// Pixels of the image along each side of a pixel of the film.
+    /// Number of image pixels along each side of a film pixel.
     scale: u32,
     width: u32,
     height: u32,
@@ -112,7 +112,7 @@ impl Canvas {
         scene.camera == self.camera && scene.same_but_camera(&self.scene)
     }
 
-    /// Starts to render a changed scene. Does nothing and returns false if it needs another kernel.
+    /// Starts to render a changed scene. If the scene needs a different kernel, does nothing and returns false.
     pub fn update(&mut self, scene: &Packed, view: View) -> Result<bool, RenderError> {
         let same_kernel = self.gpu.update(scene)?;
         if same_kernel {
@@ -122,7 +122,7 @@ impl Canvas {
         Ok(same_kernel)
     }
 
-    /// Sets the sliders' values, as bits. The image must be restarted.
+    /// Sets the slider values, given as bits. The caller must restart the image.
     pub fn set_sliders(&mut self, values: &[u32]) -> Result<(), RenderError> {
         self.gpu.set_sliders(values)
     }
@@ -226,7 +226,7 @@ impl Canvas {
         [self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale)]
     }
 
-    /// Returns true until there is something worth showing.
+    /// Returns true until the stage has a result that can be shown.
     pub fn is_new(&self) -> bool {
         !self.shown
     }
@@ -241,7 +241,7 @@ impl Canvas {
         }
     }
 
-    /// Makes one dispatch. Returns whether its result must be shown without delay.
+    /// Performs one dispatch. Returns whether the result must be shown without delay.
     pub fn step(&mut self, view: View) -> Result<bool, RenderError> {
         let show = match self.hits_of(view) {
             Some(_) => self.step_hits(view)?,
@@ -291,7 +291,7 @@ impl Canvas {
         Ok(first_pass || self.steps.is_done())
     }
 
-    /// Returns the current image, and its width and height.
+    /// Returns the current image with its width and height.
     pub fn content(&mut self, view: View) -> Result<(Content, [u32; 2]), RenderError> {
         if let Some(aov) = self.hits_of(view) {
             return Ok((self.hits_so_far(aov), self.finest_size()));
@@ -309,7 +309,7 @@ impl Canvas {
         }
         let film;
         let under = self.under.as_ref();
-        // Until the stage has a result, the coarser film is sent.
+        // Until the stage has a result, the lower-resolution film is sent.
         let (gpu, cpu, under) = match under.filter(|_| !self.stage.begun) {
             Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
             None => {
@@ -349,12 +349,12 @@ impl Canvas {
         [self.camera.width, self.camera.height]
     }
 
-    /// Returns width and height of the image that is shown in the end.
+    /// Returns the width and height of the finished image as displayed.
     pub fn finest_size(&self) -> [u32; 2] {
         self.size_at(self.finest)
     }
 
-    /// Returns the samples per pixel so far, and in the end.
+    /// Returns the current and the final number of samples per pixel.
     pub fn samples(&self) -> (u32, u32) {
         let so_far = if self.stage.scale == self.finest {
             self.steps.samples()
@@ -370,7 +370,7 @@ impl Canvas {
     }
 }
 
-/// Returns the smallest scale from `least` on at which an image can be shown.
+/// Returns the smallest scale, at least `least`, at which the image can be displayed.
 fn finest(width: u32, height: u32, largest_film: u64, least: u32) -> u32 {
     let most = largest_film.min(MAX_PIXELS);
     let fits = |scale: &u32| {
@@ -380,7 +380,7 @@ fn finest(width: u32, height: u32, largest_film: u64, least: u32) -> u32 {
     (least..).find(fits).unwrap_or(1) // an image of one pixel fits
 }
 
-/// Submits each dispatch to the GPU and the CPU, to compare films.
+/// Submits each dispatch to both the GPU and the CPU, so that their films can be compared.
 struct Both<'a> {
     gpu: &'a mut Gpu,
     cpu: Cpu<'a>,
@@ -437,7 +437,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_that_is_too_large_gets_smaller_as_little_as_it_can() {
+    fn large_images_get_the_smallest_scale_that_fits() {
         for (width, height, film, scale) in [
             (2048, 2048, 1 << 22, 1),
             (2049, 2048, 1 << 22, 2),

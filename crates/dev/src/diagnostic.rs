@@ -1,4 +1,4 @@
-//! Errors as the terminal and the page show them.
+//! Errors in the form in which the terminal and the page show them.
 
 use std::path::{Path, absolute};
 
@@ -25,7 +25,7 @@ pub struct Diagnostic {
     pub column: Option<usize>,
     /// The message.
     pub message: String,
-    /// The line with the location marked, between its neighbors, if there is a source.
+    /// The source line with the location marked, and its neighboring lines; `None` if there is no source text.
     pub excerpt: Option<String>,
 }
 
@@ -43,7 +43,7 @@ impl Diagnostic {
         }
     }
 
-    /// Returns the diagnostics of a scene that cannot be read, with the lines of its text.
+    /// Returns the diagnostics of a scene that cannot be read, with excerpts of its text.
     pub fn scene(error: &SceneError, text: &str) -> Vec<Diagnostic> {
         let layout = Layout::of(text).filter(|_| text.len() <= MAX_SEARCHED_BYTES);
         let (errors, more) = error.each();
@@ -54,7 +54,7 @@ impl Diagnostic {
         shown.chain(rest).collect()
     }
 
-    /// Returns the diagnostic of an error of one value, or of a whole file.
+    /// Returns the diagnostic of an error that concerns one value or the whole file.
     fn of_value(error: &SceneError, text: &str, layout: Option<&Layout>) -> Diagnostic {
         let (origin, line, column) = match error {
             SceneError::Syntax {
@@ -89,7 +89,7 @@ impl Diagnostic {
         }
     }
 
-    /// Returns the diagnostic of a shader's error, in a folder or built-in.
+    /// Returns the diagnostic of an error in a shader, which is in a folder or built in.
     pub fn shader(error: &ShaderError, shaders: &Shaders, folder: Option<&Path>) -> Diagnostic {
         let mut found = Diagnostic {
             place: Some(error.place.clone()),
@@ -116,7 +116,7 @@ impl Diagnostic {
         found
     }
 
-    /// Returns the excerpt's line with the location and its mark, for a terminal.
+    /// Returns the excerpt line with the error location and its mark, for a terminal.
     pub fn marked_line(&self) -> Option<String> {
         let lines: Vec<&str> = self.excerpt.as_ref()?.lines().collect();
         let mark = lines.iter().position(|line| line.starts_with(excerpt::NO_NUMBER))?;
@@ -128,7 +128,7 @@ fn whole_path(path: &Path) -> Option<String> {
     absolute(path).ok()?.to_str().map(str::to_string)
 }
 
-/// Returns the excerpt of a line, from 1, between its neighbors.
+/// Returns the excerpt of a line (counted from 1) together with its neighboring lines.
 fn around(text: &str, line: usize, excerpt: &str) -> String {
     let numbered = |line: usize| Some((line, text.lines().nth(line.checked_sub(1)?)?));
     let shown = |(line, content)| excerpt::numbered(line, content);
@@ -141,7 +141,7 @@ fn around(text: &str, line: usize, excerpt: &str) -> String {
 /// Texts above this size are not searched for the column of a value.
 const MAX_SEARCHED_BYTES: usize = 1 << 20;
 
-/// Returns column and length of the invalid value or unknown key, if on this line.
+/// Returns the column and length of the invalid value or unknown key if it is on this line.
 fn mark_of(layout: &Layout, text: &str, line: usize, problem: &Problem) -> Option<(usize, usize)> {
     let range = match (problem.is_unknown_key, problem.key.0.last()) {
         (true, Some(Segment::Key(key))) => layout.extent(&problem.key).map(|all| all.start..all.start + key.len()),
@@ -153,7 +153,8 @@ fn mark_of(layout: &Layout, text: &str, line: usize, problem: &Problem) -> Optio
     (before.matches('\n').count() + 1 == line).then_some((before[start..].chars().count() + 1, marked))
 }
 
-/// Returns a line, from 1, with its number and a mark (column and length), or wholly marked.
+/// Formats a line (counted from 1) with its number and a mark (column and length). Without a mark, the whole line is
+/// marked.
 fn excerpt_of(text: &str, line: usize, mark: Option<(usize, usize)>) -> Option<String> {
     let content = text.lines().nth(line.checked_sub(1)?)?;
     let indent = content.chars().take_while(|c| c.is_whitespace()).count();
@@ -225,7 +226,7 @@ mod tests {
             shown.marked_line().as_deref(),
             Some("    7 |   fovv = 40\n      |   ^^^^")
         );
-        // Without a value the whole line is marked.
+        // If there is no value, the whole line is marked.
         let missing = text.replace("width = 0\n", "");
         let shown = of(&Scene::parse(&missing, "s.toml").unwrap_err(), &missing);
         assert_eq!(shown.column, None);

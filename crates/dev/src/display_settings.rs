@@ -1,5 +1,4 @@
-//! Display settings: the view transform and the exposure of the scene or those chosen on the page, false colors, and
-//! marks.
+//! Display settings: view transform and exposure (from the scene or chosen on the page), false colors, and marks.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -8,7 +7,7 @@ use wgray_image::Pixels;
 use wgray_image::compare::color;
 use wgray_scene::{ViewSettings, ViewTransform};
 
-/// Display settings that override those of the scene.
+/// Overrides of the scene's display settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisplayOverrides {
@@ -21,7 +20,7 @@ pub struct DisplayOverrides {
 }
 
 impl DisplayOverrides {
-    /// Returns the overrides, if they are within their ranges.
+    /// Returns the overrides if all values are in range.
     pub fn checked(self) -> Result<DisplayOverrides, String> {
         if let Some(stops) = self.exposure {
             ViewSettings::check_exposure(stops).map_err(|rule| format!("exposure: {stops} {rule}"))?;
@@ -29,7 +28,7 @@ impl DisplayOverrides {
         Ok(self)
     }
 
-    /// Returns the settings of the scene with the overrides.
+    /// Applies the overrides to the settings of the scene.
     pub fn over(self, scene: ViewSettings) -> ViewSettings {
         ViewSettings {
             transform: self.transform.unwrap_or(scene.transform),
@@ -38,14 +37,14 @@ impl DisplayOverrides {
     }
 }
 
-/// The settings by which a frame is displayed.
+/// The settings with which a frame is displayed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DisplaySettings {
     /// The gain of the difference in [`View::Compare`](super::View::Compare).
     pub gain: f32,
     /// True if invalid pixels are marked.
     pub marks: bool,
-    /// True if negative values are valid, as under filters with negative lobes.
+    /// True if negative values are valid, as with filters that have negative lobes.
     pub negative: bool,
     /// The view transform and the exposure.
     pub view: ViewSettings,
@@ -53,7 +52,7 @@ pub struct DisplaySettings {
     pub false_color: bool,
 }
 
-/// The range of false colors in stops of luminance, after exposure: of radiance, and of standard errors.
+/// Range of the false colors in stops of luminance after exposure: for radiance, and for standard errors.
 const FALSE_COLORS: [f32; 2] = [-10.0, 6.0];
 const ERRORS: [f32; 2] = [-12.0, 0.0];
 
@@ -77,7 +76,7 @@ impl DisplaySettings {
         self.false_color(error, ERRORS)
     }
 
-    /// Uses the luminance of Rec. 709; zero gets the first color.
+    /// Uses the Rec. 709 luminance; a luminance of zero gets the first color.
     fn false_color(&self, [r, g, b]: [f32; 3], [first, last]: [f32; 2]) -> [u8; 3] {
         let stops = (0.2126 * r + 0.7152 * g + 0.0722 * b).log2() + self.view.exposure as f32;
         color(((stops - first) / (last - first) * 255.0 + 0.5) as u8) // saturates; NaN is 0
@@ -94,12 +93,12 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// Returns the scale of radiance under an exposure.
+    /// Returns the scale of radiance for this exposure.
     pub fn of(exposure: f64) -> Legend {
         Legend::over(FALSE_COLORS, exposure)
     }
 
-    /// Returns the scale of standard errors under an exposure.
+    /// Returns the scale of standard errors for this exposure.
     pub fn of_errors(exposure: f64) -> Legend {
         Legend::over(ERRORS, exposure)
     }
@@ -161,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_chosen_stands_for_the_scenes() {
+    fn chosen_settings_override_those_of_the_scene() {
         let scene = ViewSettings {
             transform: ViewTransform::Agx,
             exposure: 2.0,

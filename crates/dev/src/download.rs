@@ -1,4 +1,4 @@
-//! The displayed image as a file: a PNG of what is seen, or an EXR of the values.
+//! The displayed image as a file: a PNG as displayed, or an EXR with the linear values.
 
 use std::io::{self, Cursor};
 
@@ -11,7 +11,7 @@ use super::picture::{Content, Frame, png, png_of};
 use wgray_image::Pixels;
 use wgray_render::output::Channel;
 
-/// Encodes a frame as PNG, without marks; of a comparison the first image.
+/// Encodes a frame as PNG, without marks. For a comparison, encodes the first image.
 pub fn png_file(frame: &Frame) -> Vec<u8> {
     match &frame.content {
         Content::Color(pixels) | Content::Compare(pixels, _) => png_of(pixels, frame.look),
@@ -23,7 +23,7 @@ pub fn png_file(frame: &Frame) -> Vec<u8> {
     }
 }
 
-/// Encodes the values of a frame as EXR with 32-bit channels, named as by `wgray render`.
+/// Encodes the values of a frame as EXR with 32-bit channels, named as in files of `wgray render`.
 ///
 /// # Errors
 ///

@@ -1,5 +1,5 @@
 //! Edits of single values in the text of a scene file. Only the bytes of the value change: comments, layout, line
-//! ends and a byte-order mark stay. An absent key is added to its table, in the style of that table.
+//! endings and a byte-order mark are preserved. An absent key is added to its table, in the style of this table.
 
 use std::ops::Range;
 
@@ -8,33 +8,33 @@ use toml_edit::{Document, InlineTable, Item, Table, Value as Written};
 
 use wgray_scene::{KeyPath, Pieces, Segment};
 
-/// A replacement of a part of a text.
+/// Replacement text for a byte range.
 type Edit = (Range<usize>, String);
 
-/// Returns a text in which a key has a value, or is absent; the same text if nothing changes.
+/// Returns the text with the key set to the value, or removed if `value` is `None`.
 ///
 /// # Errors
 ///
-/// Why the value cannot be placed.
+/// The reason why the value cannot be set.
 pub fn edited(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
     edited_in(&Pieces::of(text), path, value)
 }
 
-/// Like [`edited`], for a text whose pieces are known.
+/// Like [`edited`], for a text that is already split into pieces.
 ///
 /// # Errors
 ///
-/// Why the value cannot be placed.
+/// The reason why the value cannot be set.
 pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
     let piece = pieces.find(path);
     let edits = edits(&piece.text, &piece.path, value).map_err(|why| format!("{path}: {why}"))?;
     let mut whole: Vec<Edit> = Vec::with_capacity(edits.len());
     for (range, new) in edits {
-        // Only the start is mapped: the end may belong to the next piece.
+        // Only the start is mapped to the whole text, because the end may belong to the next piece.
         let start = piece.place(range.start);
         whole.push((start..start + range.len(), new));
     }
-    // From the end: offsets of earlier edits stay valid.
+    // Edits are applied from the end, so that the offsets of the remaining edits stay valid.
     whole.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
     let mut text = pieces.whole().to_owned();
     for (range, new) in whole {
@@ -43,7 +43,7 @@ pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Resu
     Ok(text)
 }
 
-/// A text in which keys and values can be located.
+/// Parsed text in which keys and values can be located.
 pub struct Layout<'a>(Document<&'a str>);
 
 impl<'a> Layout<'a> {
@@ -57,7 +57,7 @@ impl<'a> Layout<'a> {
         let way = NodePath::along(self.0.as_table(), &path.0);
         way.rest.is_empty().then_some(())?;
         let mut found = None;
-        // A key stands before its value; the header of a table belongs to the table.
+        // The key precedes its value; a table's header is part of the table.
         if let Some(Node::Table(parent)) = way.nodes.iter().rev().nth(1)
             && let Some(Segment::Key(key)) = path.0.last()
             && !matches!(way.nodes.last()?, Node::Table(table) if !table.is_dotted())
@@ -176,7 +176,7 @@ fn edits(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<Vec<Edit>,
     }
 }
 
-/// Adds the edits that replace one value by another; none if they are equal.
+/// Adds the edits that replace the old value; no edits if the values are equal.
 fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> {
     let is_same = match (old, new) {
         (Written::Array(before), Value::Array(after)) if before.len() == after.len() => {
@@ -197,7 +197,7 @@ fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> 
     Some(())
 }
 
-/// Returns the edits that add a key to the table at the end of a path, after its last key.
+/// Returns the edits that add a key to the table at the end of a path, after the table's last key.
 fn addition(text: &str, way: &NodePath, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
     let here = *way.nodes.last().ok_or("has no place")?;
     // A table of dotted keys repeats the same prefix before each key.
@@ -247,7 +247,7 @@ fn addition(text: &str, way: &NodePath, path: &[Segment], key: &str, value: &str
     }
 }
 
-/// Returns the edit that adds an absent section: after that of the camera or the image.
+/// Returns the edit that adds a missing section, after the section of the camera or of the image.
 fn new_section(text: &str, root: &Table, name: &str, value: &str) -> Edit {
     let mut place = None;
     if let Some(item) = root.get("camera").or(root.get("image")) {
@@ -263,7 +263,7 @@ fn new_section(text: &str, root: &Table, name: &str, value: &str) -> Edit {
     behind_line(text, at, &format!("{ends}[{name}]{ends}{inner}"))
 }
 
-/// Returns the edit that adds a line after the one that contains a byte.
+/// Returns the edit that inserts a line after the line that contains the byte `at`.
 fn behind_line(text: &str, at: usize, line: &str) -> Edit {
     let end = line_end(text, at);
     (end..end, format!("{}{line}", line_break(text, at)))
@@ -279,13 +279,13 @@ pub fn line_start(text: &str, at: usize) -> usize {
     }
 }
 
-/// Returns the end of the line that contains a byte, without its line break.
+/// Returns the end of the line that contains the byte `at`, without the line break.
 pub fn line_end(text: &str, at: usize) -> usize {
     let end = text[at..].find('\n').map_or(text.len(), |newline| at + newline);
     if text[at..end].ends_with('\r') { end - 1 } else { end }
 }
 
-/// Returns the line break of a line; the last line gets that of the first.
+/// Returns the line break of a line. For the last line, returns the line break of the first line.
 fn line_break(text: &str, at: usize) -> &'static str {
     let own = text[at..].find('\n').map(|newline| at + newline);
     match own.or(text.find('\n')) {
@@ -294,7 +294,7 @@ fn line_break(text: &str, at: usize) -> &'static str {
     }
 }
 
-/// Returns the edits that remove the key at the end of a path, and the table if it becomes empty.
+/// Returns the edits that remove the key at the end of a path, and its table if the table becomes empty.
 fn removal(text: &str, way: &NodePath, path: &[Segment]) -> Result<Edit, String> {
     let refused = || Err("can only be removed in the scene file".to_owned());
     let mut depth = path.len();
@@ -343,7 +343,7 @@ fn removal(text: &str, way: &NodePath, path: &[Segment]) -> Result<Edit, String>
     }
 }
 
-/// Returns the range of the keys in a table's own body, without those under other headers.
+/// Returns the range of the keys in a table's own body, without keys under other headers.
 fn own(table: &Table) -> Option<Range<usize>> {
     let mut found = None;
     for (key, item) in table.iter() {

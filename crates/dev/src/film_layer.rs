@@ -1,4 +1,4 @@
-//! Layers of the film as images: means over the samples of a pixel, and the variance from adaptive sampling.
+//! Film layers as images: means over the samples of a pixel, and the variance from adaptive sampling.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -9,19 +9,19 @@ use wgray_image::{Pixels, to_8_bits};
 use wgray_render::film::{Film, Layer, variance_of_mean};
 use wgray_render::output::Aov;
 
-/// A layer of a film, as written by `wgray render --aov`.
+/// A film layer, as written by `wgray render --aov`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmLayer {
     /// The layer.
     pub aov: Aov,
-    /// Three values per pixel. The variance is 0 below two samples.
+    /// Three values per pixel. The variance is 0 if there are fewer than two samples.
     pub values: Pixels,
     /// For normals: the fraction of each pixel's samples that hit anything. Empty for other layers.
     pub covered: Vec<f32>,
 }
 
 impl FilmLayer {
-    /// Returns a layer of a film. Rows without samples show `under`, a smaller film.
+    /// Returns a layer of a film. Rows without samples show `under`, a film of lower resolution.
     pub fn of(aov: Aov, film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> FilmLayer {
         let covered = match aov {
             Aov::ShadingNormal => of_film(film, under, has_samples, &Film::alpha),
@@ -38,7 +38,7 @@ impl FilmLayer {
         }
     }
 
-    /// Returns whether the layer is a part of the image's radiance.
+    /// Returns whether the layer is a component of the image's radiance.
     pub fn is_light(&self) -> bool {
         matches!(self.aov, Aov::Direct | Aov::Indirect | Aov::Emission)
     }
@@ -48,8 +48,8 @@ impl FilmLayer {
         self.aov == Aov::ShadingNormal
     }
 
-    /// Returns the displayed bytes: radiance like the image, albedo by the display's curve, variance as standard error
-    /// in false colors.
+    /// Returns the displayed bytes: radiance is displayed like the image, albedo with the display's curve only, and
+    /// variance as standard error in false colors.
     pub fn bytes(&self, look: &DisplaySettings) -> Vec<u8> {
         let values = &self.values.colors;
         match self.aov {
@@ -73,7 +73,7 @@ impl FilmLayer {
         }
     }
 
-    /// Returns the values of pixel `i` by name.
+    /// Returns the named values of pixel `i`.
     pub fn pixel(&self, i: usize, look: &DisplaySettings) -> Option<Vec<(&'static str, String)>> {
         let value = *self.values.colors.get(i)?;
         let name = match self.aov {
@@ -94,7 +94,7 @@ fn standard_error(variance: [f32; 3]) -> [f32; 3] {
     variance.map(f32::sqrt)
 }
 
-/// Returns the values of a pixel; 0 if the film does not have them.
+/// Returns the values of a pixel; 0 if the film does not contain the layer.
 fn value(aov: Aov, film: &Film, i: usize) -> [f32; 3] {
     match aov {
         Aov::Variance => match film.moments.get(i).filter(|moments| moments.w >= 2.0) {
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn each_layer_is_its_own_and_variances_need_two_samples() {
+    fn layers_have_their_own_values_and_variances_need_two_samples() {
         let all = |_| true;
         for (aov, number) in [
             (Aov::Emission, 1.0),
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn light_follows_the_exposure_and_albedo_does_not() {
+    fn the_exposure_affects_light_but_not_albedo() {
         let bytes = |aov, exposure: f64| {
             let mut look = DisplaySettings::default();
             look.view.exposure = exposure;

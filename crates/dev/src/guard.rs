@@ -1,5 +1,5 @@
-//! The check of requests. Another page must not reach the session through the user's browser: neither by DNS rebinding
-//! (foreign Host) nor by a WebSocket (foreign Origin).
+//! Checks requests. Other web pages in the user's browser must not reach the session, neither by DNS rebinding (foreign
+//! Host) nor by a WebSocket (foreign Origin).
 
 use std::net::IpAddr;
 
@@ -8,9 +8,9 @@ use axum::http::{HeaderMap, HeaderName, Uri, header};
 
 #[derive(Clone, Debug)]
 pub struct Guard {
-    /// The host name that it listens on, unless that is an address.
+    /// The host name that the server listens on; `None` if it listens on an IP address.
     pub name: Option<String>,
-    /// True if it listens on loopback only.
+    /// True if the server listens only on loopback.
     pub loopback: bool,
 }
 
@@ -27,7 +27,7 @@ impl Guard {
             return Err("this Host is not allowed"); // the target is a whole URL, of another host
         }
         match (one(headers, header::ORIGIN), headers.contains_key(header::ORIGIN)) {
-            // A tunnel or a proxy may use https.
+            // The scheme is not compared, because a tunnel or a proxy may use https.
             (Some(origin), _) => {
                 let authority = origin
                     .strip_prefix("http://")
@@ -45,7 +45,7 @@ impl Guard {
         }
     }
 
-    /// Only known names, as names can be redirected, unlike addresses. Any port, for tunnels.
+    /// Accepts only known names, because names, unlike addresses, can be redirected. Accepts any port, for tunnels.
     fn knows(&self, host: &Authority) -> bool {
         if host.as_str().contains('@') {
             return false;
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn elsewhere_addresses_and_the_told_name_count() {
+    fn other_servers_accept_addresses_and_their_own_name() {
         let guard = Guard {
             name: Some("studio".to_string()),
             loopback: false,
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn the_origin_is_the_host() {
+    fn the_origin_must_equal_the_host() {
         let guard = Guard {
             name: None,
             loopback: true,
@@ -138,7 +138,10 @@ mod tests {
         let host = "localhost:7878";
         assert!(checked(&guard, host, Some("http://localhost:7878"), true));
         assert!(checked(&guard, host, Some("https://localhost:7878"), true));
-        assert!(!checked(&guard, host, None, true), "a socket without an origin");
+        assert!(
+            !checked(&guard, host, None, true),
+            "a socket without an origin is accepted"
+        );
         for origin in [
             "http://localhost:3000",
             "http://127.0.0.1:7878",
@@ -178,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_or_doubled_host_is_refused() {
+    fn a_missing_or_duplicate_host_is_rejected() {
         let guard = Guard {
             name: None,
             loopback: true,

@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// The lowest exponent: bins cover 2^-12 to 2^8. Values outside are counted in the first or the last bin.
+/// The lowest exponent: bins cover 2^-12 to 2^8. Positive values outside this range are counted in the first or the
+/// last bin.
 const FIRST: i32 = -12;
 const LAST: i32 = 8;
 /// Bins per stop.
@@ -12,14 +13,14 @@ const OF_A_STOP: i32 = 4;
 const BOUNDS: [f32; 3] = [1.189_207_1, std::f32::consts::SQRT_2, 1.681_792_9];
 const BINS: usize = ((LAST - FIRST) * OF_A_STOP) as usize;
 
-/// The number of pixels per value, for red, green and blue.
+/// Histograms of the red, green and blue values of all pixels.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Histogram {
     /// The stop at which the first bin starts.
     pub first: i32,
     /// The number of bins per stop.
     pub of_a_stop: i32,
-    /// Red, green and blue. Values that are not positive numbers are not counted.
+    /// Counts for red, green and blue. Only positive values are counted.
     pub counts: [Vec<u32>; 3],
     /// The number of values per channel that are brighter than white.
     pub above_white: [u32; 3],
@@ -28,7 +29,7 @@ pub struct Histogram {
 type Counts = [(Vec<u32>, u32); 3];
 
 impl Histogram {
-    /// Counts linear colors. After an exposure in stops 1 is white.
+    /// Counts linear colors. White is the value 1 after applying the exposure in stops.
     pub fn of(colors: &[[f32; 3]], exposure: f64) -> Histogram {
         let white = (-exposure).exp2() as f32;
         let none = || [(); 3].map(|()| (vec![0; BINS], 0));
@@ -59,7 +60,7 @@ impl Histogram {
     }
 }
 
-/// Returns the bin of a float's bits: by exponent, and mantissa among the bounds.
+/// Returns the bin of a value, derived from the exponent of the float and a comparison of the mantissa with the bounds.
 fn bin(value: f32) -> Option<usize> {
     if value.is_nan() || value <= 0.0 {
         return None;
@@ -75,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_is_in_the_bin_of_its_stop() {
+    fn bins_are_quarters_of_stops() {
         for (value, stop) in [(1.0, 0), (0.5, -1), (0.18, -3), (3.9, 1), (4.0, 2), (255.0, 7)] {
             let bin = bin(value).unwrap() as i32;
             assert_eq!(bin.div_euclid(OF_A_STOP) + FIRST, stop, "{value}");

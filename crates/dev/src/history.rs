@@ -1,4 +1,4 @@
-//! The changes of the scene file by this session, for undo and redo.
+//! The changes that this session made to the scene file, for undo and redo.
 
 use wgray_scene::KeyPath;
 
@@ -13,16 +13,16 @@ pub struct Step {
     pub at: KeyPath,
     /// True if the camera was saved.
     pub is_camera: bool,
-    /// Changes of the same gesture are one step.
+    /// Changes with the same gesture number form one step.
     gesture: Option<u64>,
-    /// The offset of the change, and the bytes there before and after it.
+    /// The offset of the change, and the bytes at this offset before and after the change.
     start: usize,
     before: Vec<u8>,
     after: Vec<u8>,
 }
 
 impl Step {
-    /// Returns a change with no text yet.
+    /// Creates a step whose texts are not set yet.
     pub fn new(what: String, at: KeyPath, gesture: Option<u64>) -> Step {
         Step {
             what,
@@ -35,7 +35,7 @@ impl Step {
         }
     }
 
-    /// Completes the step by the difference of two texts.
+    /// Sets the texts of the step from the difference between two versions of the file.
     fn between(mut self, before: &str, after: &str) -> Step {
         let (a, b) = (before.as_bytes(), after.as_bytes());
         self.start = a.iter().zip(b).take_while(|(a, b)| a == b).count();
@@ -53,7 +53,7 @@ impl Step {
     }
 }
 
-/// The changes of a file that no other program has changed since.
+/// Undo and redo steps of a file; cleared when another program changes the file.
 #[derive(Debug, Default)]
 pub struct History {
     done: Vec<Step>,
@@ -75,7 +75,7 @@ impl History {
         }
     }
 
-    /// Drops all steps after another program's change. Returns whether there were any.
+    /// Drops all steps, because another program changed the file. Returns whether there were any steps.
     pub fn forget(&mut self) -> bool {
         let History { done, undone } = std::mem::take(self);
         !(done.is_empty() && undone.is_empty())
@@ -95,14 +95,14 @@ impl History {
         }
     }
 
-    /// Notes that the file has the text of [`Self::turned`].
+    /// Records that the text of [`Self::turned`] was written to the file.
     pub fn turn(&mut self, again: bool) {
         let (from, to) = match again {
             false => (&mut self.done, &mut self.undone),
             true => (&mut self.undone, &mut self.done),
         };
         to.extend(from.pop());
-        // Later changes of the gesture must not be merged with a redone step.
+        // Later changes with the same gesture number must not be merged with a redone step.
         self.done
             .iter_mut()
             .last()
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_are_taken_back_and_made_again() {
+    fn changes_are_undone_and_redone() {
         let mut history = History::default();
         let texts = ["é = 1", "é = 12", "é = 3", "ü = 3"];
         for pair in texts.windows(2) {
@@ -132,19 +132,22 @@ mod tests {
             history.turn(false);
             assert_eq!(text, *wanted);
         }
-        assert!(history.turned(&text, false).is_none(), "there is no more");
+        assert!(
+            history.turned(&text, false).is_none(),
+            "more steps were undone than exist"
+        );
         for wanted in &texts[1..3] {
             text = history.turned(&text, true).unwrap();
             history.turn(true);
             assert_eq!(text, *wanted);
         }
-        // Another change drops the undone ones.
+        // A new change drops the undone changes.
         history.add(step("x", None), texts[2], "x");
         assert!(history.last(true).is_none());
         assert_eq!(history.turned("x", false).as_deref(), Some(texts[2]));
         assert!(
             history.turned("y", false).is_none(),
-            "this is not the text that was written"
+            "a change by another program was undone"
         );
     }
 

@@ -1,4 +1,5 @@
-//! The development mode: a scene and its shaders are watched, rendered again whenever they are saved, and shown on a page.
+//! The development mode: watches a scene and its shaders, renders again whenever a file is saved, and shows the image
+//! on a web page.
 //!
 //! ```text
 //! files ── watch ──> Snapshot ──> painter ──> builder (compiles)

@@ -37,11 +37,11 @@ pub enum Report {
     },
     /// A note about the scene.
     Note(String),
-    /// The image is too large to display: its size, and the size that is shown.
+    /// The image is too large to display: the full size, and the displayed size.
     Smaller([u32; 2], [u32; 2]),
-    /// The camera or a value was saved to the scene file; or the error.
+    /// The camera or a value was saved to the scene file, or could not be saved.
     Wrote(String, Result<(), String>),
-    /// A change of the scene file was undone or redone; or the error.
+    /// A change of the scene file was undone or redone, or this failed.
     Turned(String, Result<(), String>),
 }
 
@@ -62,7 +62,7 @@ pub struct Set {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
-    /// Starts a drag of the camera: the moves that follow are one step of its history.
+    /// Starts a camera drag: the following moves are one step of the viewpoint history.
     Grab,
     /// Moves the camera.
     Move(Move),
@@ -74,7 +74,7 @@ pub enum Command {
     Back,
     /// Returns to the next viewpoint.
     Forth,
-    /// Resets the camera to that of the scene file.
+    /// Resets the camera to the camera of the scene file.
     ResetCamera,
     /// Saves the camera to the scene file.
     SaveCamera,
@@ -110,7 +110,7 @@ pub enum Command {
     Pause(bool),
     /// Renders the image again.
     Restart,
-    /// Sets the maximum number of samples per pixel; absent for that of the scene.
+    /// Sets the maximum number of samples per pixel; if absent, uses the number of the scene.
     Samples(Option<NonZeroU32>),
     /// Sets the scale of the preview.
     Preview(Preview),
@@ -118,7 +118,7 @@ pub enum Command {
     Keep,
 }
 
-/// The scale of the preview: pixels of the image along each side of a displayed pixel.
+/// The scale of the preview: number of image pixels along each side of a displayed pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(try_from = "u32", into = "u32")]
 pub struct Preview(u32);
@@ -147,7 +147,7 @@ impl TryFrom<u32> for Preview {
     }
 }
 
-/// Everything that the page shows beside the images, sent as JSON.
+/// Everything that the page shows except the images, sent as JSON.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct State {
     /// The scene file.
@@ -166,19 +166,19 @@ pub struct State {
     pub camera: String,
     /// The viewpoint of the camera, for bookmarks.
     pub viewpoint: Option<Viewpoint>,
-    /// True if the camera differs from the file's.
+    /// True if the camera differs from the camera in the file.
     pub camera_moved: bool,
     /// Number of valid scenes so far.
     pub scenes: u64,
     /// The last change of the scene file, which can be undone: `camera`, `materials.red.color`.
     pub undo: Option<String>,
-    /// Why nothing can be undone: another program's change of the file dropped the history.
+    /// The reason if nothing can be undone because another program changed the file.
     pub undo_blocked: Option<String>,
-    /// Why the scene file cannot be edited here, if that is so: it is glTF or JSON.
+    /// The reason if the page cannot edit the scene file, for example because it is glTF or JSON.
     pub read_only: Option<String>,
     /// The last change that was undone, which can be redone.
     pub redo: Option<String>,
-    /// True if there is a previous and a next viewpoint.
+    /// The availability of a previous and of a next viewpoint.
     pub steps: [bool; 2],
     /// The display settings that the viewer overrides.
     pub look: DisplayOverrides,
@@ -190,17 +190,18 @@ pub struct State {
     pub samples: (Option<NonZeroU32>, u32),
     /// The scale of the preview.
     pub preview: Preview,
-    /// The images to compare with, beside the CPU's: before the last change, and the reference by name.
+    /// The available images to compare with, other than the CPU's: whether an image from before the last change exists,
+    /// and the name of the reference.
     pub comparable: (bool, Option<String>),
-    /// Why the selected comparison cannot be shown.
+    /// The reason if the selected comparison cannot be shown.
     pub no_comparison: Option<String>,
-    /// The difference of the two images of a comparison.
+    /// The difference between the two images of a comparison.
     pub apart: Option<Apart>,
     /// The current errors.
     pub problems: Vec<Diagnostic>,
     /// The sliders of the shaders.
     pub sliders: Vec<SliderState>,
-    /// The views that the scene does not provide, and why.
+    /// The views that the scene does not provide, each with the reason.
     pub missing_views: Vec<(View, &'static str)>,
     /// The template of links to an editor, with `{file}`, `{line}` and `{column}`; absent if there are no links.
     pub editor: Option<String>,
@@ -214,7 +215,7 @@ pub struct State {
     pub executed: u64,
     /// The number of the last frame.
     pub frame: u64,
-    /// True if more frames follow without any event.
+    /// True if more frames will follow without a new event.
     pub busy: bool,
     /// The last notice.
     pub notice: Option<Notice>,
@@ -225,7 +226,7 @@ pub struct State {
 pub struct Notice {
     /// The number of the notice.
     pub number: u64,
-    /// The command that it answers, as a count like [`State::executed`].
+    /// The command that the notice answers, as a count like [`State::executed`].
     pub command: u64,
     /// The text; empty if the previous notice no longer applies.
     pub text: String,
@@ -234,13 +235,14 @@ pub struct Notice {
 }
 
 pub enum Event {
-    /// The files changed: the new state, when that was noticed, and the number of this session's writes before.
+    /// The files changed: the new state, the time when the change was noticed, and the number of writes by this session
+    /// before then.
     Files(Box<Snapshot>, Instant, u64),
     /// Changed files of the scene are being read, or turned out to be unchanged.
     Reading(bool),
     BuildResult(Box<BuildResult>),
     Command(Command),
-    /// A viewer gave an image to compare with.
+    /// A viewer uploaded an image to compare with.
     Reference(Reference),
     Measured(Apart),
     Viewers,

@@ -1,4 +1,4 @@
-//! The object at a pixel, and its part of the scene file: lines, values, and the values that are allowed.
+//! The object at a pixel, and its part of the scene file: source lines, values, and allowed values.
 
 use std::sync::Arc;
 
@@ -12,13 +12,13 @@ use wgray_render::cpu::geometry::pixel_first_hit;
 use wgray_render::records::{Camera, NO_INDEX, Packed};
 use wgray_scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDescription, fields};
 
-/// Maximum number of lines that are shown of a table.
+/// Maximum number of displayed lines per table.
 const MAX_LINES: usize = 40;
 const MAX_LISTED: usize = 50;
-/// Maximum number of tables with an object: materials, textures, a mesh.
+/// Maximum number of tables that are shown with an object: materials, textures, a mesh.
 const MAX_GROUPS: usize = 12;
 
-/// The scene and the camera, which answer questions about objects.
+/// The scene and the camera, for queries about objects.
 #[derive(Clone, Debug)]
 pub struct SceneView {
     pub(super) loaded: Arc<Loaded>,
@@ -33,18 +33,18 @@ pub struct Object {
     pub name: String,
     /// The scene file.
     pub file: String,
-    /// The pixel of the question.
+    /// The pixel of the query.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<[u32; 2]>,
-    /// The material at that pixel, or in the question.
+    /// The material at the pixel, or the material named in the query.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// The object and what it refers to: its material, and the textures of that.
+    /// The object and the tables it refers to: its material, and the textures of the material.
     pub groups: Vec<Group>,
     /// A note.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
-    /// Why there is no object.
+    /// The reason if there is no object.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gone: Option<String>,
 }
@@ -52,17 +52,17 @@ pub struct Object {
 /// A table of the scene file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Group {
-    /// Its path.
+    /// The path of the table.
     pub name: String,
-    /// Its type, if it has one.
+    /// The `type` of the table; empty if it has none.
     pub kind: String,
-    /// Its first line in the file, from 1; 0 if it is not in the file.
+    /// The first line of the table in the file, counted from 1; 0 if the table is not in the file.
     pub line: usize,
-    /// The lines, without those after the first few.
+    /// The first lines of its source text; `more` counts the rest.
     pub text: String,
     /// Number of further lines.
     pub more: usize,
-    /// Its values.
+    /// The values of the table.
     pub fields: Vec<Field>,
 }
 
@@ -71,14 +71,14 @@ pub struct Group {
 pub struct ObjectList {
     /// The text.
     pub part: String,
-    /// Names, each with the type or material.
+    /// Names, each with its type or material.
     pub objects: Vec<(String, String)>,
     /// Number of further objects.
     pub more: usize,
 }
 
 impl Object {
-    /// Returns the answer while no scene is loaded.
+    /// Returns the answer to queries while no scene is loaded.
     pub(super) fn none(name: &str, at: Option<[u32; 2]>) -> Object {
         Object {
             name: name.to_owned(),
@@ -127,7 +127,7 @@ impl SceneView {
         object
     }
 
-    /// Returns the object of a name; this one of its materials comes first.
+    /// Returns the object with this name; `material` comes first among its materials.
     pub fn object(&self, name: &str, material: Option<&str>) -> Object {
         let (own, brought) = match material {
             Some(name) if self.loaded.description.materials.contains_key(name) => (material, None),
@@ -297,7 +297,7 @@ impl SceneView {
             add(&|| format!("lights[{i}]"), String::new());
         }
         for (i, shape) in all.shapes.iter().enumerate() {
-            add(&|| format!("shapes[{i}]"), about(shape));
+            add(&|| format!("shapes[{i}]"), description_of(shape));
         }
         for (i, instance) in all.instances.iter().enumerate() {
             add(&|| format!("instances[{i}]"), instance.mesh.clone());
@@ -348,7 +348,7 @@ fn is_there(all: &Description, path: &KeyPath) -> bool {
     }
 }
 
-/// Returns the objects that a table refers to: materials, textures, a mesh.
+/// Returns the paths of the objects that a table refers to: materials, textures, a mesh.
 fn named_by(group: &Group) -> Vec<KeyPath> {
     let mut found = Vec::new();
     for field in &group.fields {
@@ -367,8 +367,8 @@ fn named_by(group: &Group) -> Vec<KeyPath> {
     found
 }
 
-/// Returns the lines of a range and the comments directly above it: first line number, text, and number of omitted
-/// lines.
+/// Returns the lines of a range, including the comments directly above: the first line number, the text, and the number
+/// of omitted lines.
 fn lines(text: &str, start: usize, end: usize) -> (usize, String, usize) {
     let mut start = line_start(text, start);
     while let Some(above) = text[..start].strip_suffix('\n') {
@@ -384,7 +384,7 @@ fn lines(text: &str, start: usize, end: usize) -> (usize, String, usize) {
     (number, shown.join("\n"), whole.lines().count() - shown.len())
 }
 
-/// Returns the object of the file for a shape of the scene, by index, and a note.
+/// Returns the name of the object in the file that contains the scene's shape with this index, and a note.
 fn place_of(loaded: &Loaded, number: usize) -> (String, Option<String>) {
     let all = &loaded.description;
     let gltf: Vec<(usize, bool)> = (all.shapes.iter().enumerate())
@@ -434,8 +434,8 @@ fn place_of(loaded: &Loaded, number: usize) -> (String, Option<String>) {
     }
 }
 
-/// Returns the type of a shape, and its file or material.
-fn about(shape: &ShapeDescription) -> String {
+/// Describes a shape: its type, and its file or material.
+fn description_of(shape: &ShapeDescription) -> String {
     let table = serde_json::to_value(shape).unwrap_or_default();
     let text = |key: &str| table[key].as_str();
     let name = text("file").or(text("material")).unwrap_or_default();

@@ -47,7 +47,7 @@ pub enum View {
     Variance,
     /// The number of samples.
     Samples,
-    /// Radiance, another image of it, and their difference.
+    /// Radiance, a second image, and their difference.
     Compare(Against),
 }
 
@@ -57,9 +57,9 @@ pub enum View {
 pub enum Against {
     /// The image of the CPU.
     Cpu,
-    /// The image before the last saved change of the scene or the shaders.
+    /// The image from before the last saved change of the scene or the shaders.
     Before,
-    /// An image that was set as the reference, or a file of a viewer.
+    /// The reference: an image that was kept, or a file that a viewer uploaded.
     Reference,
 }
 
@@ -80,12 +80,12 @@ impl View {
         View::Variance,
     ];
 
-    /// Returns the layer of the first hits that it shows, if any.
+    /// Returns the first-hit layer that the view shows, if any.
     pub fn of_hits(self, integrator: Integrator) -> Option<Aov> {
         self.aov().filter(|aov| aov.source(integrator) == AovSource::FirstHit)
     }
 
-    /// Returns the layer of the film that it shows, other than color.
+    /// Returns the film layer that the view shows, if it is not color.
     pub fn of_film(self, integrator: Integrator) -> Option<Aov> {
         self.aov().filter(|aov| aov.source(integrator) != AovSource::FirstHit)
     }
@@ -109,7 +109,7 @@ impl View {
         }
     }
 
-    /// Returns whether the CPU also renders it.
+    /// Returns whether the CPU also renders this view.
     pub fn is_by_both(self) -> bool {
         self == View::Compare(Against::Cpu)
     }
@@ -120,11 +120,11 @@ impl View {
 pub enum Content {
     /// [`View::Color`]
     Color(Pixels),
-    /// [`View::Samples`], and the number in the end.
+    /// [`View::Samples`]: the sample counts, and the final number.
     Samples(Vec<u32>, u32),
     /// The views of first hits.
     Hits(Aov, Vec<FirstHit>),
-    /// [`View::Compare`]: the image, and the other one of the same size.
+    /// [`View::Compare`]: the image, and a second image of the same size.
     Compare(Pixels, Pixels),
     /// The views of film layers.
     Film(FilmLayer),
@@ -145,12 +145,12 @@ impl Content {
     }
 }
 
-/// The description of a frame that is sent before its images.
+/// The description of a frame, sent before the images.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Header {
     /// The number of the frame.
     pub number: u64,
-    /// The number of changes of scene, shaders and camera shown.
+    /// The number of changes of scene, shaders and camera up to this frame.
     pub revision: u64,
     /// The view.
     pub view: View,
@@ -158,23 +158,23 @@ pub struct Header {
     pub width: u32,
     /// Height of the full-size image.
     pub height: u32,
-    /// Width and height of the images that are sent.
+    /// Width and height of the transmitted images.
     pub sent: [u32; 2],
-    /// Width and height of the finished image: less than in full if that is too large to display.
+    /// Width and height of the finished image; smaller than the full size if that is too large to display.
     pub finest: [u32; 2],
-    /// Samples per pixel so far.
+    /// Current number of samples per pixel.
     pub samples: u32,
-    /// Samples per pixel in the end.
+    /// Final number of samples per pixel.
     pub total: u32,
     /// True if the image is finished.
     pub done: bool,
-    /// True if it shows first hits, with 1 ray per pixel.
+    /// True if the frame shows first hits, with one ray per pixel.
     pub first_hits: bool,
     /// Samples per second.
     pub speed: Option<f64>,
     /// Seconds from the last change to its first frame.
     pub latency: Option<f64>,
-    /// Under [`View::Compare`], the number of pixels that differ in any bit, and the largest difference.
+    /// With [`View::Compare`], the number of pixels that differ in any bit, and the largest difference.
     pub differing: Option<(usize, f32)>,
     /// The names of the two images of [`View::Compare`].
     pub sides: Option<[String; 2]>,
@@ -182,7 +182,7 @@ pub struct Header {
     pub histogram: Option<Histogram>,
     /// The scale of false colors, if they are shown.
     pub legend: Option<Legend>,
-    /// The invalid pixels of each image that can have them.
+    /// The invalid pixels of each image whose view can have invalid pixels.
     pub faults: Vec<(&'static str, BadPixels)>,
     /// Names and sizes in bytes of the images that follow.
     pub parts: Vec<(&'static str, usize)>,
@@ -197,24 +197,24 @@ pub struct Frame {
     pub pictures: Vec<Vec<u8>>,
     /// The values.
     pub content: Content,
-    /// The names behind the numbers in the values.
+    /// The names for the indices in the values.
     pub names: Names,
     /// The display settings.
     pub look: DisplaySettings,
 }
 
-/// The names of shapes and materials in the scene file.
+/// The names of shapes and materials in the scene file, for display.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    /// Number of shapes; instances of meshes follow them.
+    /// Number of shapes; the indices of mesh instances follow.
     pub shapes: u32,
-    /// Number of instances; lights follow them.
+    /// Number of mesh instances; the indices of lights follow.
     pub instances: u32,
     pub materials: Vec<String>,
 }
 
 impl Frame {
-    /// Encodes the images of `content`, and completes the header.
+    /// Encodes the images of `content` and completes the header.
     pub fn new(mut header: Header, content: Content, names: Names, look: DisplaySettings) -> Frame {
         let [width, height] = header.sent;
         let mut found = Vec::new();
@@ -289,7 +289,7 @@ impl Frame {
         }
     }
 
-    /// Returns the values of a pixel of the full-size image by name; `None` outside it.
+    /// Returns the named values of a pixel of the full-size image; `None` outside of the image.
     pub fn pixel(&self, x: u32, y: u32) -> Option<Vec<(&'static str, String)>> {
         let Header {
             width, height, sent, ..
@@ -356,7 +356,7 @@ fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static
     vec![(name, numbers(values)), ("bits", bits(values))]
 }
 
-/// Returns the differences, `gain` times as large, with a visible minimum.
+/// Returns the differences multiplied by `gain`; any difference yields at least a visible minimum.
 fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
     const LEAST: f32 = 0.2;
     let pairs: Vec<_> = gpu.colors.iter().copied().zip(cpu.colors.iter().copied()).collect();
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn every_difference_is_seen() {
+    fn every_difference_is_visible() {
         let a = pixels(&[[0.5; 3], [0.0; 3], [1.0; 3], [1.0; 3], [0.0; 3]]);
         let b = pixels(&[
             [0.5; 3],

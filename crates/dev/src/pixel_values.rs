@@ -1,11 +1,11 @@
-//! The values of pixels: of films as images, as text and as bytes.
+//! Conversion of pixel values: films to images, and values to text and bytes.
 
 use glam::Vec3;
 use rayon::prelude::*;
 use wgray_image::Pixels;
 use wgray_render::film::{Film, mean};
 
-/// Returns the means of a film's sums. Rows without samples show `under`, a smaller film.
+/// Returns the means of a film's sums. Rows without samples show `under`, a film of lower resolution.
 pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
     Pixels {
         width: film.region.width(),
@@ -14,7 +14,7 @@ pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bo
     }
 }
 
-/// Returns a value of each pixel of a film, or, in rows without samples, of a smaller one.
+/// Returns one value per pixel of a film. In rows without samples, the values come from a film of lower resolution.
 pub(super) fn of_film<T: Default + Send>(
     film: &Film,
     under: Option<&Film>,
@@ -35,7 +35,7 @@ pub(super) fn of_film<T: Default + Send>(
     pixels.map(of_pixel).collect()
 }
 
-/// Maps an image to another size of it.
+/// Maps the pixels of an image to the pixels of a resized version.
 pub(super) struct ScaledImage {
     pub from: [u32; 2],
     pub to: [u32; 2],
@@ -60,7 +60,7 @@ pub(super) fn bits<const N: usize>(values: [f32; N]) -> String {
     values.map(|v| format!("{:08x}", v.to_bits())).join("  ")
 }
 
-/// Bytes without a view transform.
+/// Converts colors to bytes without a view transform.
 pub(super) fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
     let byte = |v: f32| (v * 255.0 + 0.5) as u8; // saturates
     pixels
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_coarse_picture_shows_where_the_film_is_empty() {
+    fn rows_without_samples_show_the_coarser_film() {
         let mut under = Film::new(Region::whole(1, 1));
         under.sums[0] = Vec4::new(1.0, 0.0, 0.0, 1.0);
         let mut film = Film::new(Region::whole(1, 2));

@@ -1,4 +1,4 @@
-//! Images to compare with, given by viewers or kept, and the difference of two images.
+//! Reference images, kept or uploaded by viewers, and the difference between two images.
 
 use std::sync::Arc;
 
@@ -13,18 +13,18 @@ use wgray_scene::{ViewSettings, ViewTransform};
 /// Maximum number of pixels of a viewer's file, a little more than 7680 x 4320.
 const MAX_PIXELS: u64 = 1 << 25;
 
-/// An image to compare with.
+/// A reference image.
 #[derive(Clone, Debug)]
 pub struct Reference {
-    /// The name: that of a file, or a description.
+    /// The name of the file, or a description.
     pub name: String,
     /// Linear colors.
     pub pixels: Arc<Pixels>,
 }
 
 impl Reference {
-    /// Decodes an image file: OpenEXR or Radiance as linear values; for PNG, JPEG and WebP the display's curve is
-    /// inverted.
+    /// Decodes an image file: the values of OpenEXR and Radiance files are linear; for PNG, JPEG and WebP, the curve of
+    /// the view transform is inverted.
     ///
     /// # Errors
     ///
@@ -56,7 +56,7 @@ impl Reference {
         })
     }
 
-    /// Returns the pixels in another size; `None` if the image does not have this full size.
+    /// Returns the pixels at the size `sent`; `None` if the size of the image is not `whole`.
     pub fn at(&self, whole: [u32; 2], sent: [u32; 2]) -> Option<Pixels> {
         let Pixels { width, height, .. } = *self.pixels;
         if [width, height] != whole {
@@ -78,7 +78,7 @@ impl Reference {
     }
 }
 
-/// Returns the linear value of a displayed one. For AgX and PBR Neutral only the curve of sRGB can be inverted.
+/// Converts a display value to a linear value. For AgX and PBR Neutral, only the sRGB curve can be inverted.
 fn light_of(value: f64, transform: ViewTransform) -> f64 {
     match transform {
         ViewTransform::Gamma22 => value.powf(2.2),
@@ -86,19 +86,19 @@ fn light_of(value: f64, transform: ViewTransform) -> f64 {
     }
 }
 
-/// The difference of two images.
+/// The difference between two images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Apart {
     /// The frame that was measured.
     pub frame: u64,
     /// The root mean square error of the linear values; `None` if it is not finite.
     pub rmse: Option<f64>,
-    /// HDR-FLIP, as `wgray diff` measures it.
+    /// HDR-FLIP, as measured by `wgray diff`.
     pub flip: Option<f64>,
 }
 
 impl Apart {
-    /// Measures two images of one size.
+    /// Measures the difference between two images of equal size.
     pub fn of(frame: u64, first: &Pixels, second: &Pixels) -> Apart {
         let squares = first.colors.iter().flatten().zip(second.colors.iter().flatten());
         let sum: f64 = squares.map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_png_is_read_as_the_light_that_is_shown_so() {
+    fn a_png_is_decoded_to_the_light_that_it_displays() {
         for transform in [ViewTransform::Gamma22, ViewTransform::Srgb] {
             let view = ViewSettings {
                 transform,
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reference_fits_its_size_alone() {
+    fn a_reference_only_fits_images_of_its_size() {
         let colors = (0..16).map(|i| [i as f32; 3]).collect();
         let reference = Reference {
             name: "r".to_owned(),
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn how_far_apart_is_measured() {
+    fn differences_between_images_are_measured() {
         let a = pixels(vec![[0.5; 3]; 64 * 64], 64);
         let b = pixels(vec![[0.75; 3]; 64 * 64], 64);
         let same = Apart::of(3, &a, &a);

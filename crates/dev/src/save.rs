@@ -1,4 +1,4 @@
-//! Atomic writes, and the text of the camera in a scene file.
+//! Atomic file writes, and replacement of the camera in the text of a scene file.
 
 use std::fs;
 use std::io::Write;
@@ -12,18 +12,18 @@ use super::camera::{Entry, entries};
 use super::edit::edited;
 use wgray_scene::{CameraDescription, Description, KeyPath, Segment};
 
-/// Maximum time that a program needs to write a file.
+/// Assumed maximum time that a program takes to write a file.
 const SAVING: Duration = Duration::from_millis(100);
-/// Maximum wait for another program's save.
+/// Maximum time to wait until another program has saved the file.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Replaces a file atomically: a reader sees the old or the new content.
+/// Replaces a file atomically: a reader sees either the old or the new content.
 pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
     written(path, content)?.persist(path)?;
     Ok(())
 }
 
-/// Like [`replace`], but fails unless the file has the known content.
+/// Like [`replace`], but fails if the content of the file is not `known`.
 pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Result<()> {
     let file = written(path, content)?;
     if fs::read(path)? != known {
@@ -35,7 +35,8 @@ pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Resu
     Ok(())
 }
 
-/// Waits until a file has not changed for a short time: another program would write the rest to the replaced file.
+/// Waits until a file has not changed for a short time. If the file were replaced while another program is writing it,
+/// the rest of the other program's data would be lost.
 ///
 /// # Errors
 ///
@@ -58,7 +59,7 @@ pub fn wait_settled(path: &Path) -> Result<(), String> {
     }
 }
 
-/// Writes a temporary file next to `path`, with its permissions.
+/// Writes a temporary file next to `path`, with the permissions of `path`.
 fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = path
         .parent()
@@ -80,11 +81,11 @@ fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFi
     Ok(file)
 }
 
-/// Returns the text of a scene file with another camera. Unchanged values are not touched.
+/// Replaces the camera in the text of a scene file. Unchanged values are not touched.
 ///
 /// # Errors
 ///
-/// The message for the user: the file is not a scene that this camera fits.
+/// A message for the user, if the file is not a scene or the camera does not fit it.
 pub fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Result<String, String> {
     let mend = |error| format!("fix the file first: {error}");
     let before = Description::parse_camera(text, origin).map_err(mend)?;
@@ -177,12 +178,12 @@ mod tests {
         assert_eq!(
             fs::read_dir(folder.path()).unwrap().count(),
             1,
-            "nothing is left behind"
+            "a temporary file is left behind"
         );
     }
 
     #[test]
-    fn what_somebody_else_has_saved_stays() {
+    fn changes_by_other_programs_are_not_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("s.toml");
         fs::write(&file, "theirs").unwrap();
@@ -192,7 +193,7 @@ mod tests {
         replace_known(&file, b"theirs", b"ours").unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), "ours");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        // A file that keeps changing ends the wait.
+        // If the file keeps changing, the wait ends with an error.
         let changed = |ago: Duration| {
             let file = fs::File::options().write(true).open(&file).unwrap();
             file.set_modified(SystemTime::now() - ago).unwrap();
@@ -226,13 +227,13 @@ mod tests {
         let unix = with_camera(SCENE, "s.toml", &new).unwrap();
         let dos = |text: &str| format!("\u{feff}{}", text.replace('\n', "\r\n"));
         assert_eq!(with_camera(&dos(SCENE), "s.toml", &new).unwrap(), dos(&unix));
-        // Also with both kinds in one file.
+        // Also tests a file that contains both kinds of line endings.
         let mixed = |text: &str| text.replacen("# degrees\n", "# degrees\r\n", 1);
         assert_eq!(with_camera(&mixed(SCENE), "s.toml", &new).unwrap(), mixed(&unix));
     }
 
     #[test]
-    fn a_camera_of_dotted_keys_stays_one() {
+    fn a_camera_of_dotted_keys_is_edited_in_place() {
         let text = "image = { width = 4, height = 4 }\ncamera.position = [0, 1, 0]\ncamera.look_at = [0, 0, 0]\n\
             camera.fov = 40 # wide";
         let new = camera("position = [0, 1.5, 0]\nlook_at = [0, 0, 0]\nup = [1, 0, 0]\nfov = 40");
@@ -242,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_stays_and_the_camera_is_saved_beside_it() {
+    fn saving_the_camera_keeps_its_path() {
         let path = "path.keys = [{ frame = 1, position = [0, 1, 0] }, { frame = 9, position = [0, 3, 1] }]\n";
         let text = format!("image = {{ width = 4, height = 4 }}\n[camera]\nlook_at = [0, 0, 0]\nfov = 40\n{path}");
         let mut new = Description::parse(&text, "s.toml").unwrap().camera;

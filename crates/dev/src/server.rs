@@ -1,4 +1,4 @@
-//! The HTTP server of the page: its files, the image as a file, and the WebSocket of each viewer.
+//! The HTTP server: the files of the page, the image as a file, and the WebSocket of each viewer.
 
 use std::collections::VecDeque;
 use std::io;
@@ -33,7 +33,7 @@ use super::viewer;
 
 /// Maximum number of concurrent viewers.
 const VIEWERS: usize = 16;
-/// Maximum number of requests that are received or answered at once.
+/// Maximum number of requests that are received or answered concurrently.
 const MAX_REQUESTS: usize = 64;
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
 /// Maximum size of a viewer's message in bytes; a command is far smaller.
@@ -49,7 +49,7 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Opens an address such as `127.0.0.1:7878` or `localhost:0`; port 0 selects a free one.
+    /// Opens an address such as `127.0.0.1:7878` or `localhost:0`; port 0 selects a free port.
     ///
     /// # Errors
     ///
@@ -72,7 +72,7 @@ impl Listener {
         self.listener.local_addr()
     }
 
-    /// Serves a session without end.
+    /// Serves a session; only returns on errors.
     ///
     /// # Errors
     ///
@@ -97,14 +97,14 @@ impl Listener {
     }
 }
 
-/// A connection on which no whole request head has arrived yet.
+/// A connection on which no complete request header has arrived yet.
 struct Unread {
     task: AbortHandle,
     has_head: Arc<AtomicBool>,
 }
 
-/// Answers requests, each on its own connection and in bounded time. A new connection may replace the one that has
-/// waited longest for a request.
+/// Answers requests, each on a separate connection and in limited time. If there are too many connections, a new one
+/// replaces the connection that has waited longest for a request.
 async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::Result<()> {
     let requests = Arc::new(Semaphore::new(MAX_REQUESTS));
     let mut unread: VecDeque<Unread> = VecDeque::new();
@@ -132,7 +132,7 @@ async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::R
         let task = tokio::spawn(async move {
             let mut http = http1::Builder::new();
             let connection = http.keep_alive(false).serve_connection(TokioIo::new(stream), service);
-            // A failure ends the connection.
+            // On failure, the connection ends.
             let _answered = tokio::time::timeout(REQUEST_TIMEOUT, connection.with_upgrades()).await;
             drop(place);
         });
@@ -209,7 +209,7 @@ async fn picture_exr(State(shared): State<Shared>) -> Response {
     picture(shared, "image/x-exr", exr_file).await
 }
 
-/// Receives a reference file of the viewer's machine.
+/// Receives a reference file from the viewer's machine.
 async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>, body: Bytes) -> Response {
     let frame = shared.frames.borrow().clone();
     let view = frame.map(|frame| frame.look.view).unwrap_or_default();
@@ -225,7 +225,7 @@ async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>,
     }
 }
 
-/// Refuses requests of other pages, and forbids loading anything from elsewhere.
+/// Rejects requests from other origins and prevents the browser from loading external resources.
 async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     // Requests that change anything must come from the page itself.
     let acts = request.uri().path() == "/socket" || request.method() != Method::GET;

@@ -37,34 +37,34 @@ pub struct Settings {
     pub report: Box<dyn Fn(Report) + Send>,
 }
 
-/// Maximum number of events that wait for the end of a dispatch.
+/// Maximum number of events in the queue while a dispatch runs.
 const WAITING: usize = 256;
 
-/// A running session; it ends when this is dropped.
+/// A running session; ends when dropped.
 pub struct Session {
     events: SyncSender<Event>,
     asked: Arc<Mutex<u64>>,
     /// The newest state.
     pub state: watch::Receiver<Arc<State>>,
-    /// The newest image, once there is one. A slow receiver misses some.
+    /// The newest frame, if any. A slow receiver skips frames.
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
     /// The timings.
     pub times: Times,
-    /// The scene and the camera, once there are any.
+    /// The scene and the camera, once a scene is loaded.
     pub seen: watch::Receiver<Option<Arc<SceneView>>>,
     viewers: Viewers,
     watch: Option<Watch>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// Counts the viewers.
+/// The number of viewers.
 #[derive(Clone)]
 pub struct Viewers {
     looking: Arc<AtomicUsize>,
     events: SyncSender<Event>,
 }
 
-/// A viewer, until this is dropped.
+/// A viewer; counted until dropped.
 pub struct Viewer(Viewers);
 
 impl Viewers {
@@ -94,7 +94,7 @@ pub enum StartError {
     /// The operating system does not allow watching files.
     #[error("files cannot be watched: {0}")]
     Watch(#[from] notify::Error),
-    /// The operating system does not start a thread.
+    /// The operating system cannot start a thread.
     #[error(transparent)]
     System(#[from] std::io::Error),
 }
@@ -104,7 +104,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// No device, a scene file that does not exist, and errors of the operating system.
+    /// There is no device, the scene file does not exist, or the operating system reports an error.
     pub fn start(settings: Settings) -> Result<Session, StartError> {
         let Settings {
             sources,
@@ -174,7 +174,7 @@ impl Session {
         let _ = self.events.send(Event::Command(command)); // the thread lives as long as the session
     }
 
-    /// Returns a function that gives reference images from other threads without blocking, or returns false if the
+    /// Returns a function that submits reference images from any thread. It does not block, but returns false if the
     /// session is busy.
     pub fn references(&self) -> impl Fn(Reference) -> bool + Send + Sync + 'static {
         let events = self.events.clone();
@@ -186,8 +186,8 @@ impl Session {
         self.viewers.clone()
     }
 
-    /// Returns a function that sends commands from other threads without blocking, and returns the number that
-    /// [`State::executed`] then reaches, or `None` if the session is busy.
+    /// Returns a function that sends commands from any thread. It does not block, and returns the value that
+    /// [`State::executed`] has after the command, or `None` if the session is busy.
     pub fn commands(&self) -> impl Fn(Command) -> Option<u64> + Send + Sync + 'static {
         let (events, asked) = (self.events.clone(), self.asked.clone());
         move |command| {
@@ -211,7 +211,7 @@ impl Drop for Session {
     }
 }
 
-/// Handles all pending events first: an event waits for one dispatch at most.
+/// Handles all pending events before each dispatch, so that an event waits for at most one dispatch.
 fn run(mut painter: Painter, inbox: Receiver<Event>) {
     loop {
         let event = if painter.has_work() {
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_device_is_opened_anew() {
+    fn a_lost_device_is_reopened() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         for (name, text) in built_in() {
@@ -298,7 +298,7 @@ mod tests {
         .unwrap();
         let (first, wanted) = finished(&session, 0);
 
-        // Lost while idle: the next move notices it, and is shown nevertheless.
+        // The device is lost while idle: the loss is detected at the next move, and the move is still shown.
         session.events.send(Event::Lose).unwrap();
         session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         let (second, _) = finished(&session, first);
@@ -310,9 +310,9 @@ mod tests {
             Report::Problem(problem) => Some(problem.kind),
             _ => None,
         });
-        assert_eq!(lost, Some("device"), "it was lost indeed");
+        assert_eq!(lost, Some("device"), "the device was not lost");
 
-        // Lost while a kernel with wrong shaders is compiled: the last good ones are used.
+        // The device is lost while a kernel with invalid shaders is compiled: the last good shaders are used.
         let good = Shaders::built_in().text("kernels/render.wgsl").to_string();
         session.events.send(Event::Lose).unwrap();
         fs::write(path("shaders/kernels/render.wgsl"), good.replace("= sum;", "= sun;")).unwrap();
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_does_not_exist_is_an_error_at_once() {
+    fn a_missing_scene_file_is_an_error() {
         let sources = Sources {
             scene: "/nowhere/scene.toml".into(),
             overrides: Overrides::default(),

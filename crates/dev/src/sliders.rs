@@ -1,4 +1,4 @@
-//! The values that viewers give to sliders of shaders.
+//! Slider values of shaders, as set by viewers.
 
 use std::collections::BTreeMap;
 use std::path::{Path, absolute};
@@ -15,19 +15,20 @@ pub struct SliderState {
     pub slider: Slider,
     /// The absolute path of the file, for an editor; `None` for built-in shaders.
     pub path: Option<String>,
-    /// The value that is rendered.
+    /// The current value.
     pub value: Value,
 }
 
 /// The values of a session, by file and name.
 #[derive(Default)]
 pub struct Sliders {
-    /// Moved values, each with the file's at that time: a later edit of the file takes precedence.
+    /// Changed values, each with the value in the file at the time of the change: a later edit of the file takes
+    /// precedence.
     moved: BTreeMap<(String, String), (Value, Value)>,
 }
 
 impl Sliders {
-    /// Returns whether the value changed, or why it cannot be moved.
+    /// Moves a slider. Returns whether the value changed, or the reason why the slider cannot be moved.
     pub fn slide(&mut self, sliders: &[Slider], file: &str, name: &str, value: Value) -> Result<bool, String> {
         let slider = sliders.iter().find(|slider| slider.file == file && slider.name == name);
         let slider = slider.ok_or_else(|| format!("{file}: no slider `{name}` exists"))?;
@@ -39,7 +40,7 @@ impl Sliders {
         Ok(before != value)
     }
 
-    /// Resets all sliders, or one, given by file and name.
+    /// Resets all sliders, or one slider, given by file and name.
     pub fn reset(&mut self, one: Option<(String, String)>) {
         match one {
             Some(one) => drop(self.moved.remove(&one)),
@@ -55,7 +56,7 @@ impl Sliders {
             .unwrap_or(slider.default)
     }
 
-    /// Returns the bits of the values, as a kernel reads them.
+    /// Returns the values as bits, in the form that a kernel reads.
     pub fn bits(&self, sliders: &[Slider]) -> Vec<u32> {
         sliders.iter().map(|slider| slider.bits(self.value(slider))).collect()
     }

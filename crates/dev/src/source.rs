@@ -22,7 +22,7 @@ use wgray_scene::{
 pub struct Sources {
     /// The scene file.
     pub scene: PathBuf,
-    /// Values that override those of the scene file.
+    /// Overrides of values in the scene file.
     pub overrides: Overrides,
     /// The folder of the shaders; `None` for the built-in ones.
     pub shaders: Option<PathBuf>,
@@ -33,13 +33,13 @@ pub struct Sources {
 pub struct Loaded {
     /// The text of the scene file; empty for a binary file.
     pub text: String,
-    /// The description, with the values of overriding options.
+    /// The description, with the overrides applied.
     pub description: Description,
     pub camera: CameraDescription,
     pub scene: Scene,
     /// The packed scene, as the backends read it.
     pub packed: Packed,
-    /// The locations of the parts of the text, once they are needed.
+    /// The locations of the parts of the text, computed on first use.
     places: OnceLock<Places>,
 }
 
@@ -62,7 +62,7 @@ impl Loaded {
         self
     }
 
-    /// Returns the pieces of the text, scanned only once.
+    /// Returns the pieces of the text, which is scanned only once.
     pub(crate) fn pieces(&self) -> Pieces<'_> {
         Pieces::known(&self.text, self.places.get_or_init(|| Places::of(&self.text)))
     }
@@ -83,7 +83,7 @@ pub fn constants(packed: &Packed, view: View) -> Constants {
     (specialization, integrator, packed.sampling.adaptive)
 }
 
-/// Returns what a kernel shows for a view: color, if the view needs another kernel.
+/// Returns the view that a kernel shows if `view` is selected: color, if `view` needs a different kernel.
 pub fn shown((specialization, integrator, adaptive): &Constants, view: View) -> View {
     match view.aov().map(|aov| aov.source(*integrator)) {
         Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
@@ -92,7 +92,7 @@ pub fn shown((specialization, integrator, adaptive): &Constants, view: View) -> 
     }
 }
 
-/// Returns whether two kernels differ in their views only.
+/// Returns whether two kernels differ only in the views that they support.
 pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
     let of_scene = |(specialization, integrator, ..): &Constants| {
         let layers = 0;
@@ -107,18 +107,19 @@ pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
     of_scene(a) == of_scene(b)
 }
 
-/// The state of all files at one moment.
+/// The state of all files at one point in time.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     pub scene: Result<Arc<Loaded>, Vec<Diagnostic>>,
     pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
     /// Time spent on reading the files, and on packing the scene.
     pub took: [Duration; 2],
-    /// All files of the scene with their states, which decide whether to read again.
+    /// All files of the scene with their states, which determine whether the scene is read again.
     pub files: Vec<(PathBuf, FileStamp)>,
 }
 
-/// The state of a file: a scene file's content; else length and modification time, as files may be large.
+/// The state of a file: the content of a scene file; for other files, which may be large, the length and modification
+/// time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileStamp {
     /// The file cannot be read.
@@ -138,7 +139,7 @@ impl FileStamp {
 }
 
 impl Sources {
-    /// Returns the states of models, meshes and textures, in a snapshot and now.
+    /// Returns the states of models, meshes and textures: in the snapshot, and now.
     pub fn assets(&self, snapshot: &Snapshot) -> [Vec<FileStamp>; 2] {
         let texts = usize::from(!is_model(&self.scene));
         let files = || snapshot.files.iter().skip(texts);
@@ -146,7 +147,7 @@ impl Sources {
         [then, files().map(|(path, _)| self.stamp(path)).collect()]
     }
 
-    /// Returns why the scene file cannot be edited here, if that is so.
+    /// Returns the reason if the scene file cannot be edited on the page.
     pub fn read_only(&self) -> Option<String> {
         let kind = match &self.scene {
             scene if is_gltf(scene) => "glTF",
@@ -159,11 +160,12 @@ impl Sources {
         ))
     }
 
+    /// Reads the shaders and the scene.
     pub fn read(&self) -> Snapshot {
         self.read_scene(self.read_shaders())
     }
 
-    /// Reads what has changed since a snapshot, if anything. Calls `begin` before reading a scene.
+    /// Reads the files that have changed since a snapshot, if any. Calls `begin` before reading a scene.
     pub fn reread(&self, last: &Snapshot, begin: impl FnOnce()) -> Option<Snapshot> {
         let start = Instant::now();
         let shaders = match (self.read_shaders(), &last.shaders) {
@@ -187,7 +189,7 @@ impl Sources {
                 begin();
                 let mut new = self.read_scene(shaders);
                 if new.files.len() == 1 {
-                    // The scene may be half written: keeps watching the files of the last one.
+                    // The scene file may be incomplete, so the files of the last scene are still watched.
                     new.files.extend(
                         last.files
                             .iter()
@@ -212,7 +214,7 @@ impl Sources {
 
     fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>) -> Snapshot {
         let start = Instant::now();
-        // States first: a file that changes meanwhile is read again.
+        // The states are determined before reading, so that a file that changes in the meantime is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
         let mut named = BTreeSet::new();
         let (mut text, origin) = (String::new(), self.scene.display().to_string());
@@ -263,6 +265,7 @@ impl Sources {
         })
     }
 
+    /// Returns the paths of the shader files in the folder of `--shaders`.
     pub fn shader_files(&self) -> impl Iterator<Item = PathBuf> {
         let folder = self.shaders.iter();
         folder.flat_map(|folder| compose::built_in().map(move |(name, _)| folder.join(name)))

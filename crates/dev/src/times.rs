@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use wgray_render::gpu::Dispatch;
 
-/// Number of times that the median is taken over.
+/// Number of measurements over which the median is computed.
 const KEPT: usize = 33;
-/// The period that shares refer to.
+/// The period over which shares are computed.
 const WINDOW: Duration = Duration::from_secs(1);
-/// Maximum number of measurements within that time.
+/// Maximum number of measurements within this period.
 const MOST: usize = 2048;
 
 /// The stages of a frame, in order.
@@ -28,7 +28,7 @@ pub const PARTS: [&str; 9] = [
     "send",
 ];
 
-/// Timings that several threads record; a clone is another handle.
+/// Timings that several threads record; a clone is a handle to the same timings.
 #[derive(Clone, Debug, Default)]
 pub struct Times(Arc<Mutex<Vec<TimeRecord>>>);
 
@@ -45,11 +45,11 @@ pub struct Time {
     pub last: f64,
     /// The median of the last measurements.
     pub median: f64,
-    /// The share of the last second, from 0 to 1; more if several threads do the same.
+    /// The fraction of the last second, from 0 to 1; more if several threads work at the same stage.
     pub share: f64,
     /// Samples of a kernel's last dispatch.
     pub samples: u64,
-    /// True if the device measured the times; else they include notifying the host.
+    /// True if the device measured the times; otherwise the times include notifying the host.
     pub by_device: bool,
 }
 
@@ -57,7 +57,7 @@ pub struct Time {
 struct TimeRecord {
     time: Time,
     last: VecDeque<Duration>,
-    /// End and duration of the last measurements.
+    /// End time and duration of the last measurements.
     ended: VecDeque<(Instant, Duration)>,
 }
 
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn of_the_last_second_counts_what_lies_in_it() {
+    fn the_share_only_includes_time_within_the_last_second() {
         let now = Instant::now() + Duration::from_secs(5);
         let mut kept = TimeRecord::new("send", false);
         for (ago, took) in [(3000, 500), (800, 500), (100, 50), (0, 20)] {

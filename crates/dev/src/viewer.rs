@@ -1,4 +1,4 @@
-//! The WebSocket of one viewer: commands and questions come in, states, answers and frames go out.
+//! The WebSocket of one viewer: receives commands and queries, sends states, answers and frames.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -19,28 +19,28 @@ use super::times::Time;
 use wgray_image::sanitize::escape_control;
 use wgray_scene::cut;
 
-/// Maximum number of unacknowledged frames: one is drawn while the next arrives. More would delay everything on a slow
-/// connection.
+/// Maximum number of unacknowledged frames: one frame is drawn while the next one arrives. More frames would delay all
+/// messages on a slow connection.
 const MAX_FRAMES_IN_FLIGHT: usize = 2;
-/// Minimum time between states while that many frames are in flight, for slow connections.
+/// Minimum time between states while [`MAX_FRAMES_IN_FLIGHT`] frames are in flight, as on slow connections.
 const STATE_INTERVAL: Duration = Duration::from_millis(100);
 /// Maximum number of answers that wait to be sent.
 const MAX_ANSWERS: usize = 64;
 const SEND_TIMEOUT: Duration = Duration::from_secs(30);
-/// Interval between reports of timings, while they change.
+/// Interval between reports of timings, while the timings change.
 const TIMES_INTERVAL: Duration = Duration::from_millis(500);
-/// Interval between pings. A viewer that sends nothing for three intervals is gone.
+/// Interval between pings. A viewer that sends nothing for three intervals is disconnected.
 const PING_INTERVAL: Duration = Duration::from_secs(15);
 
 #[derive(Debug, PartialEq)]
 enum Request {
-    /// Acknowledges this frame and all before it. There is no answer.
+    /// Acknowledges this frame and all earlier frames. There is no answer.
     Acknowledge(u64),
     Question(Question),
     Command(Command),
 }
 
-/// A message that changes nothing.
+/// A query, which changes nothing.
 #[derive(Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Question {
@@ -77,7 +77,7 @@ impl Request {
         };
         let name =
             name.ok_or("a message must be the name of a command, or an object with that name as its only key")?;
-        // From the text: a JSON value hides duplicate keys.
+        // Parsed from the text, because a JSON value hides duplicate keys.
         let parsed = match name.as_str() {
             "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::Acknowledge(shown)),
             name if QUESTIONS.contains(&name) => serde_json::from_str(message).map(Request::Question),
@@ -112,7 +112,7 @@ enum Reply<'a> {
     Times(&'a [Time]),
 }
 
-/// Serves a viewer until it leaves or fails. Sending never blocks receiving commands.
+/// Serves a viewer until it disconnects or an error occurs. Sending never blocks the receipt of commands.
 pub(super) async fn serve(socket: WebSocket, shared: &Shared) -> Option<()> {
     let (sink, stream) = socket.split();
     let (answer, answers) = mpsc::channel(MAX_ANSWERS);
@@ -123,7 +123,7 @@ pub(super) async fn serve(socket: WebSocket, shared: &Shared) -> Option<()> {
     }
 }
 
-/// Receives messages, acts on them and passes their answers on.
+/// Receives and handles messages, and passes the answers on for sending.
 async fn receive(
     mut stream: SplitStream<WebSocket>,
     answers: &mpsc::Sender<Reply<'static>>,
@@ -152,7 +152,7 @@ async fn receive(
     }
 }
 
-/// Sends what changes: the newest state and the newest frame, not every one.
+/// Sends updates: the newest state and the newest frame, skipping older ones.
 async fn send(
     mut sink: SplitSink<WebSocket, Message>,
     mut answers: mpsc::Receiver<Reply<'static>>,
@@ -235,7 +235,7 @@ async fn answer(question: Question, shared: &Shared) -> Reply<'static> {
     }
 }
 
-/// Looks something up in the scene, which may be large, on another thread. Returns `nothing` without a scene.
+/// Runs a query on the scene, which may be large, on a separate thread. Returns `nothing` if no scene is loaded.
 async fn of_scene<T: Send + 'static>(
     shared: &Shared,
     nothing: impl Fn() -> T,
@@ -251,7 +251,8 @@ fn text(reply: &Reply) -> Option<Message> {
     Some(Message::Text(serde_json::to_string(reply).ok()?.into()))
 }
 
-/// Returns a frame as a message: length of the header (four bytes, little-endian), header as JSON, images.
+/// Returns a frame as a message: the length of the header (four bytes, little-endian), the header as JSON, and the
+/// images.
 fn bytes(frame: &Frame) -> Option<Vec<u8>> {
     let header = serde_json::to_vec(&frame.header).ok()?;
     let mut bytes = u32::try_from(header.len()).ok()?.to_le_bytes().to_vec();

@@ -14,12 +14,12 @@ use notify::{RecommendedWatcher, RecursiveMode, Watcher as _};
 use super::messages::Event;
 use super::source::{FileStamp, Loaded, Snapshot, Sources};
 
-/// Files are read after this time without a change: an editor's save is several events.
+/// Files are read after this time without a change, because saving in an editor causes several events.
 const QUIET: Duration = Duration::from_millis(20);
 /// Files are read after this time at the latest.
 const PATIENCE: Duration = Duration::from_millis(150);
 
-/// A scene's error is reported after this time without a change: the scene may be half written.
+/// An error in the scene is reported after this time without a change, because the scene file may be incomplete.
 const DOUBT: Duration = Duration::from_millis(100);
 /// Maximum delay of an error while files keep changing.
 const DOUBTS: Duration = Duration::from_secs(1);
@@ -27,16 +27,16 @@ const DOUBTS: Duration = Duration::from_secs(1);
 /// Incomplete or large models, meshes and textures are read after this time without a change: a program may be writing
 /// them.
 const GROWTH_QUIET: Duration = Duration::from_millis(300);
-/// They are read after this time at the latest.
+/// Such files are read after this time at the latest.
 const GROWTH_PATIENCE: Duration = Duration::from_secs(10);
-/// Total size, in bytes, from which such files are large.
+/// Minimum total size in bytes at which models, meshes and textures count as large.
 const LARGE: u64 = 1 << 20;
 
-/// The scene file's changes by this session, which need not be read again.
+/// Changes of the scene file that this session made and that need not be read again.
 #[derive(Default)]
 pub struct Writes {
     pub count: u64,
-    /// The scene after the last change and its files, until the watcher has taken them over.
+    /// The scene after the last change, and its files, until the watcher has taken them over.
     pub known: Option<KnownScene>,
 }
 
@@ -45,7 +45,7 @@ pub type KnownScene = (Arc<Loaded>, Vec<(PathBuf, FileStamp)>);
 enum Wake {
     /// The content of a file may have changed.
     Content,
-    /// Files or folders may have come, gone or been renamed.
+    /// Files or folders may have been created, deleted or renamed.
     Names,
     Stop,
 }
@@ -63,14 +63,14 @@ impl Wake {
     }
 }
 
-/// A running watch, which ends when this is dropped.
+/// A running watch; ends when dropped.
 pub struct Watch {
     stop: std::sync::mpsc::Sender<Wake>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
 impl Watch {
-    /// Reports [`Event::Reading`] and [`Event::Files`] until `report` returns false. `first` is the known state.
+    /// Reports [`Event::Reading`] and [`Event::Files`] until `report` returns false. `first` is the initial state.
     pub fn start(
         sources: Sources,
         first: Snapshot,
@@ -176,7 +176,7 @@ fn run(
                 again = Some((wake, noticed));
                 continue;
             }
-            // The scene may use other files; a change since their known states is noticed.
+            // The scene may now use different files. Changes since their recorded states are noticed.
             folders.follow(sources, &new);
             last = new.clone();
             reads = false;
@@ -203,7 +203,7 @@ fn wait_settled(
             Ok(Wake::Names) => names = true,
             Ok(Wake::Content) | Err(RecvTimeoutError::Timeout) => {}
         }
-        // Other files in these folders may change all the time.
+        // Other files in these folders may change continually.
         let new = stamps();
         if new != known {
             (known, since) = (new, Instant::now());
@@ -235,7 +235,7 @@ impl Folders {
             if self.watched.contains_key(&path) {
                 continue;
             }
-            // A folder that vanishes at this moment causes an event in its parent.
+            // If a folder is deleted at this moment, its parent reports an event.
             match self.watcher.watch(&path, mode) {
                 Ok(()) => drop(self.watched.insert(path, mode)),
                 Err(error) => tracing::warn!("{} cannot be watched: {error}", path.display()),
@@ -250,15 +250,15 @@ impl Folders {
     }
 }
 
-/// Returns the folders to watch, by canonical path: the shaders' with everything below it, and those of all files and
-/// link targets. The scene's folder may be a home folder: nothing below it is watched.
+/// Returns the folders to watch, by canonical path: the shader folder including its subfolders, and the folders of all
+/// files and link targets. Subfolders of the scene's folder are not watched, because it may be a home folder.
 fn wanted(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, RecursiveMode> {
     let files = snapshot
         .files
         .iter()
         .map(|(path, _)| path.clone())
         .chain(sources.shader_files());
-    // The shaders' folder may be renamed, which its parent notices.
+    // The parent of the shader folder is watched as well, to notice if the folder is renamed.
     let paths = files.chain(sources.shaders.clone());
     let paths = paths
         .flat_map(|path| [fs::canonicalize(&path).ok(), Some(path)])

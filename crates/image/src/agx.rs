@@ -11,14 +11,14 @@ use glam::{DMat3, DVec3};
 
 pub(super) type Rgb = [f64; 3];
 
-/// Linear Rec. 709 to Rec. 2020, by rows: ITU-R BT.2087-0, section 2.
+/// Linear Rec. 709 to Rec. 2020 in row-major order: ITU-R BT.2087-0, section 2.
 const TO_REC2020: [[f64; 3]; 3] = [
     [0.627_403_9, 0.329_283_0, 0.043_313_1],
     [0.069_097_3, 0.919_540_4, 0.011_362_3],
     [0.016_391_4, 0.088_013_3, 0.895_595_3],
 ];
 
-/// Moves the primaries inwards and rotates them, against hue shifts of bright saturated colors.
+/// Moves the primaries inwards and rotates them, which reduces hue shifts of bright saturated colors.
 const INSET: [[f64; 3]; 3] = [
     [0.856_627_153_315_983, 0.095_121_240_538_158_8, 0.048_251_606_145_858_3],
     [0.137_318_972_929_847, 0.761_241_990_602_591, 0.101_439_036_467_562],
@@ -38,7 +38,7 @@ const STOPS_BELOW: f64 = 10.0;
 const STOPS_ABOVE: f64 = 6.5;
 /// Exponent that decodes the output of the curve to linear display light.
 const POWER: f64 = 2.4;
-/// Slope of the curve at middle gray, and the power of its shoulder and toe.
+/// Slope of the curve at middle gray, and the exponent of its shoulder and toe.
 const SLOPE: f64 = 2.4;
 const BEND: f64 = 1.5;
 /// Fraction of the hue shift of the curve that is kept.
@@ -60,13 +60,13 @@ fn matrix(rows: [[f64; 3]; 3]) -> DMat3 {
     DMat3::from_cols_array_2d(&rows).transpose()
 }
 
-/// Position of a value in the dynamic range, logarithmic, 0 to 1.
+/// Logarithmic position of a value in the dynamic range, 0 to 1.
 fn place(value: f64) -> f64 {
     let stops = (value / MIDDLE).log2(); // -inf for 0
     ((stops + STOPS_BELOW) / (STOPS_BELOW + STOPS_ABOVE)).clamp(0.0, 1.0)
 }
 
-/// Sigmoid from (0, 0) to (1, 1), steepest at middle gray, which it keeps.
+/// Sigmoid from (0, 0) to (1, 1), steepest at middle gray; middle gray is a fixed point.
 fn curve(x: f64) -> f64 {
     let Halves { below, above } = &*HALVES;
     let (middle, grey) = pivot();
@@ -100,13 +100,13 @@ static HALVES: LazyLock<Halves> = LazyLock::new(|| {
     }
 });
 
-/// One half of the sigmoid, relative to middle gray.
+/// One branch of the sigmoid, relative to middle gray.
 fn bent(x: f64, scale: f64) -> f64 {
     let x = SLOPE * x / scale;
     scale * x / (1.0 + x.powf(BEND)).powf(1.0 / BEND)
 }
 
-/// Returns the hue of HSV in turns, 0 to 1; 0 for grays. A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978.
+/// Returns the HSV hue in turns, 0 to 1; 0 for grays. A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978.
 fn hue(color: DVec3) -> f64 {
     let (most, spread) = (color.max_element(), color.max_element() - color.min_element());
     let [r, g, b] = color.into();
@@ -127,7 +127,7 @@ fn mixed(from: f64, to: f64, share: f64) -> f64 {
     from + share * arc
 }
 
-/// Returns the color with the same value and saturation, and this hue.
+/// Replaces the HSV hue of the color; value and saturation are kept.
 fn with_hue(color: DVec3, hue: f64) -> DVec3 {
     let (most, spread) = (color.max_element(), color.max_element() - color.min_element());
     let part = |number: f64| {

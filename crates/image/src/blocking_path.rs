@@ -4,8 +4,8 @@ use std::fs::{self, FileType};
 use std::io;
 use std::path::Path;
 
-/// Rejects devices, and named pipes, which block until a writer opens them. Anonymous pipes (standard input, `<(...)`
-/// of a shell) have a writer, and missing files fail when opened: both are accepted.
+/// Rejects devices and named pipes; opening a named pipe blocks until a writer opens it. Accepts anonymous pipes
+/// (standard input, `<(...)` of a shell), which have a writer, and missing files, which fail when opened.
 pub fn reject(path: &Path) -> io::Result<()> {
     let Ok(data) = fs::metadata(path) else { return Ok(()) };
     let refused = |rule| Err(io::Error::new(io::ErrorKind::InvalidInput, rule));
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pipes_with_names_and_devices_are_refused() {
+    fn named_pipes_and_devices_are_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
@@ -66,7 +66,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn pipes_without_names_are_read() {
+    fn anonymous_pipes_are_accepted() {
         use std::os::fd::AsRawFd as _;
         let (reader, _writer) = io::pipe().unwrap();
         reject(Path::new(&format!("/proc/self/fd/{}", reader.as_raw_fd()))).unwrap();

@@ -1,7 +1,7 @@
-//! The transfer function of sRGB (IEC 61966-2-1:1999, sections 5.2 and 5.3). `cpu/texel.rs` has that of the kernels, in
-//! 32 bits.
+//! The transfer function of sRGB (IEC 61966-2-1:1999, sections 5.2 and 5.3). `cpu/texel.rs` implements the 32-bit
+//! version of the kernels.
 
-/// Returns the linear value of an encoded one, both from 0 to 1.
+/// Converts an sRGB-encoded value to a linear value; both are in 0 ... 1.
 pub fn srgb_to_linear(x: f64) -> f64 {
     if x <= 0.04045 {
         x / 12.92
@@ -10,7 +10,7 @@ pub fn srgb_to_linear(x: f64) -> f64 {
     }
 }
 
-/// Returns the encoded value of a linear one, both from 0 to 1.
+/// Converts a linear value to an sRGB-encoded value; both are in 0 ... 1.
 pub fn linear_to_srgb(x: f64) -> f64 {
     if x <= 0.003_130_8 {
         x * 12.92

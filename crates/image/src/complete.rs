@@ -1,4 +1,4 @@
-//! Detects truncated image files, whose writer was killed or whose disk was full, by their last bytes.
+//! Detects truncated image files by their last bytes: the writer may have been killed, or the disk may have been full.
 
 use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
@@ -11,7 +11,8 @@ const PNG_END: &[u8] = b"\0\0\0\0IEND\xae\x42\x60\x82";
 /// The marker at the end of a JPEG file (ITU-T T.81, B.1.1.3).
 const JPEG_END: &[u8] = &[0xff, 0xd9];
 
-/// Returns true if a file is a PNG, JPEG, WebP or OpenEXR image with the end of its format. Pixels are not decoded.
+/// Returns true if a file is a PNG, JPEG, WebP or OpenEXR image that ends as its format requires. Pixels are not
+/// decoded.
 pub fn is_complete(path: &Path) -> bool {
     let complete = || {
         let mut file = File::open(path).ok()?;

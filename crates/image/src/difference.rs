@@ -7,7 +7,7 @@ use super::Pixels;
 pub struct Difference {
     /// Pixels that are not bit-identical; signed zeros and NaN payloads differ.
     pub unequal: usize,
-    /// Largest difference of two values; NaN if any difference is NaN.
+    /// Largest difference between two values; NaN if any difference is NaN.
     pub largest: f32,
     /// Pixels with a difference that exceeds the tolerance or is NaN.
     pub beyond: usize,

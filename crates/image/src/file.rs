@@ -1,5 +1,5 @@
-//! Atomic file output. Regular files are written under a temporary name in the same folder, then renamed. Pipes and
-//! devices get all bytes at the end.
+//! Atomic file output. Regular files are written under a temporary name in the same folder, then renamed. For pipes and
+//! devices, all bytes are copied at the end.
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -10,12 +10,12 @@ use tempfile::{Builder, NamedTempFile};
 use super::output::{Destination, Output, named, open};
 use super::temporary;
 
-/// An unfinished output, deleted when dropped. Its errors name the output.
+/// An unfinished output, deleted when dropped. Its error messages contain the name of the output.
 #[derive(Debug)]
 pub struct Pending {
     name: String,
     output: BufWriter<Spool>,
-    /// The first error, for encoders that ignore one.
+    /// The first error. It is stored because some encoders ignore errors.
     failure: Option<(io::ErrorKind, String)>,
 }
 
@@ -80,7 +80,7 @@ impl Pending {
         &self.name
     }
 
-    /// Flushes all bytes to the disk. Only the rename or the copy is left for [`Pending::finish`].
+    /// Flushes all bytes to the disk. [`Pending::finish`] then only renames or copies the file.
     pub fn complete(&mut self) -> io::Result<()> {
         self.flush()?;
         if let Some((kind, message)) = &self.failure {
@@ -178,7 +178,7 @@ impl Name {
         format!(".wgray-{process}@{}-", self.host)
     }
 
-    /// Returns true for this program's files of this machine and target.
+    /// Returns true if the file name was made by this program on this machine for this target.
     fn fits(&self, file_name: &str) -> bool {
         let number = file_name.strip_prefix(".wgray-").and_then(|rest| rest.split_once('@'));
         let Some(Ok(process)) = number.map(|(number, _)| number.parse()) else {
@@ -213,9 +213,9 @@ pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
     }
     loop {
         let file = builder.tempfile_in(folder)?;
-        // Without file locks, no other process can lock it to delete it either.
+        // If file locks are not supported, no other process can lock the file in order to delete it.
         let _ = file.as_file().lock();
-        // Another process may have deleted it before it was locked.
+        // Another process may have deleted the file before it was locked.
         if file.path().exists() {
             temporary::register(file.path());
             return Ok(file);
@@ -235,7 +235,7 @@ fn remove_stale(folder: &Path, name: &Name) {
         if !fits || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
-        // A process that still writes it holds the lock.
+        // A process that is still writing the file holds the lock.
         let Ok(file) = File::options().write(true).open(entry.path()) else {
             continue;
         };

@@ -1,5 +1,5 @@
-//! Images without a renderer: regions, colour and view transforms, atomic files, comparison; and the handling of memory
-//! and paths that every layer of wgray shares.
+//! Image handling that does not need a renderer: regions, colour and view transforms, atomic files, comparison. Also
+//! contains the handling of memory and paths that all crates of wgray share.
 
 mod agx;
 pub mod blocking_path;

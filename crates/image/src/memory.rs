@@ -1,5 +1,5 @@
-//! Allocations that may fail. The global allocator can end the program in an orderly way, as in `wgray`, if it knows
-//! which failures the caller handles: [`is_fallible`].
+//! Allocations that may fail. The global allocator asks [`is_fallible`] whether the caller handles a failure. If not,
+//! it can end the program in an orderly way.
 
 use std::cell::Cell;
 
@@ -7,7 +7,7 @@ thread_local! {
     static FALLIBLE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `allocate`, which returns allocation failures as errors, like [`Vec::try_reserve`].
+/// Runs `allocate`, which must return allocation failures as errors, like [`Vec::try_reserve`].
 pub fn fallible<T>(allocate: impl FnOnce() -> T) -> T {
     struct Restore(bool);
     impl Drop for Restore {
@@ -37,7 +37,7 @@ mod tests {
         assert!(!fallible(|| std::thread::spawn(is_fallible).join().unwrap()));
     }
 
-    /// A bare `try_reserve` would end the program.
+    /// If an allocation with `try_reserve` is not marked, its failure ends the program.
     #[test]
     fn every_fallible_allocation_is_marked() {
         let workspace = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));

@@ -1,11 +1,11 @@
-//! Output targets, checked before rendering: a regular file, which is replaced at the end, or a pipe, a device or
-//! standard output, which is written directly.
+//! Output targets, checked before rendering: regular files, which are replaced at the end; pipes, devices and standard
+//! output, which are written directly.
 
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A target to write to. Its errors name it.
+/// A target to write to. Its error messages contain its name.
 #[derive(Debug)]
 pub struct Output {
     name: String,
@@ -37,7 +37,7 @@ pub(super) enum Stream {
     Error,
 }
 
-/// Identity of a file, whatever its name.
+/// Identity of a file, independent of its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Identity {
     /// Device and inode.
@@ -71,7 +71,7 @@ impl Identity {
     }
 }
 
-/// Maximum number of symbolic links to follow, that of Linux.
+/// Maximum number of symbolic links to follow, as in Linux.
 const LINKS: usize = 40;
 
 impl Output {
@@ -96,8 +96,8 @@ impl Output {
         }
     }
 
-    /// Opens a pipe or a device now, not in [`Pending::start`](super::Pending::start). A pipe blocks until it has a
-    /// reader.
+    /// Opens a pipe or a device now instead of in [`Pending::start`](super::Pending::start). Opening a pipe blocks
+    /// until it has a reader.
     ///
     /// # Errors
     ///
@@ -109,11 +109,11 @@ impl Output {
         Ok(())
     }
 
-    /// Resolves the same file again, to write it once more.
+    /// Resolves the same file again, so that it can be rewritten.
     ///
     /// # Errors
     ///
-    /// The errors of [`Output::find`], and anything that is not a regular file.
+    /// The errors of [`Output::find`]; also fails if the output is not a regular file.
     pub fn again(&self) -> io::Result<Output> {
         let again = match &self.place {
             Destination::File { path, .. } => place(path),
@@ -147,8 +147,8 @@ impl Output {
         }
     }
 
-    /// Returns true if both outputs are the same file, pipe or stream, under any names; never for character devices,
-    /// which can be shared.
+    /// Returns true if both outputs are the same file, pipe or stream, even under different names. Returns false for
+    /// character devices, which can be shared.
     pub fn is_same(&self, other: &Output) -> bool {
         let same_path = self.path().is_some() && self.path() == other.path();
         let same_stream = match (&self.place, &other.place) {
@@ -159,7 +159,7 @@ impl Output {
         same_path || same_stream || identities.is_some_and(|(a, b)| a.is(&b))
     }
 
-    /// Returns true if writing would change an input file, under any of its names.
+    /// Returns true if writing would change an input file, even if the paths differ.
     pub fn is_input(&self, path: &Path) -> bool {
         let same_path = self.path().is_some() && fs::canonicalize(path).ok().as_deref() == self.path();
         let input = fs::metadata(path).ok().map(|data| Identity::of(&data));

@@ -1,5 +1,5 @@
 //! Conversion of panics in libraries to errors. wgpu 30 panics when it waits for a lost device, and when some of its
-//! objects are dropped then.
+//! objects are dropped after the device was lost.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -11,8 +11,8 @@ thread_local! {
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Returns true if [`catch_panic`] would catch a panic of this thread: hooks like [`install_quiet_hook`] can stay
-/// silent.
+/// Returns true if [`catch_panic`] would catch a panic of this thread. Panic hooks, such as the hook of
+/// [`install_quiet_hook`], need not print such panics.
 pub fn is_contained() -> bool {
     DEPTH.try_with(Cell::get).is_ok_and(|depth| depth > 0)
 }
@@ -31,7 +31,7 @@ pub fn install_quiet_hook() {
 ///
 /// # Errors
 ///
-/// The message of its panic. Values that the closure modified may only be dropped then.
+/// The panic message, if the closure panics. In this case, values that the closure modified may only be dropped.
 pub fn catch_panic<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
     let _inside = Inside::enter();
     catch_unwind(AssertUnwindSafe(calls)).map_err(|panic| message(panic.as_ref()))
@@ -45,7 +45,7 @@ fn message(panic: &(dyn Any + Send)) -> String {
     lines.filter(|line| !line.is_empty()).collect::<Vec<_>>().join(": ")
 }
 
-/// The thread is inside of [`catch_panic`].
+/// Marks the thread as inside [`catch_panic`].
 struct Inside;
 
 impl Inside {
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn panics_are_contained_inside_alone() {
+    fn is_contained_is_true_only_inside_catch_panic() {
         assert!(!is_contained());
         let inner = catch_panic(|| {
             let deeper = catch_panic(|| panic!("deeper"));
@@ -131,8 +131,11 @@ mod tests {
     }
 
     #[test]
-    fn a_drop_that_panics_is_contained_where_others_are_not() {
+    fn catch_panic_on_drop_ignores_panics_of_destructors() {
         drop(CatchPanicOnDrop::new(Bad));
-        assert!(catch_unwind(|| drop(Bad)).is_err(), "the control does not panic");
+        assert!(
+            catch_unwind(|| drop(Bad)).is_err(),
+            "dropping without the wrapper did not panic"
+        );
     }
 }

@@ -7,6 +7,6 @@ pub struct Pixels {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Linear RGB, row by row from the top.
+    /// Linear RGB in row-major order, top row first.
     pub colors: Vec<[f32; 3]>,
 }

@@ -7,7 +7,7 @@ use std::fmt;
 pub struct Region {
     /// First column.
     pub x0: u32,
-    /// First row, from the top.
+    /// First row, counted from the top.
     pub y0: u32,
     /// One past the last column.
     pub x1: u32,
@@ -36,7 +36,7 @@ impl Region {
         self.y1.saturating_sub(self.y0)
     }
 
-    /// Returns true if it has no pixels.
+    /// Returns true if the region has no pixels.
     pub fn is_empty(&self) -> bool {
         self.pixels() == 0
     }
@@ -46,7 +46,7 @@ impl Region {
         u64::from(self.width()) * u64::from(self.height())
     }
 
-    /// Returns the region with its neighboring pixels, which may lie outside of the image.
+    /// Returns the region enlarged by one pixel on each side. The added pixels may lie outside of the image.
     pub fn with_neighbors(&self) -> Region {
         Region {
             x0: self.x0.saturating_sub(1),

@@ -1,9 +1,10 @@
-//! Escaping of untrusted text for terminals: controls and direction marks are printed as `\u{1b}`.
+//! Escaping of untrusted text for terminals: control characters and direction marks are printed as escapes such as
+//! `\u{1b}`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// Returns true for controls and direction marks (Unicode UAX 9).
+/// Returns true for control characters and direction marks (Unicode UAX 9).
 fn acts(c: char) -> bool {
     let turns = ['\u{61c}', '\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'];
     c.is_control()
@@ -12,12 +13,12 @@ fn acts(c: char) -> bool {
         || ('\u{2066}'..='\u{2069}').contains(&c)
 }
 
-/// Escapes a text, including line breaks.
+/// Escapes text, including line breaks.
 pub fn escape_control(text: &str) -> Cow<'_, str> {
     shown(text, &[])
 }
 
-/// Escapes a text of several lines; line breaks and tabs are kept.
+/// Escapes text with several lines; line breaks and tabs are kept.
 pub fn escape_control_in_lines(text: &str) -> Cow<'_, str> {
     shown(text, &['\n', '\t'])
 }

@@ -1,4 +1,4 @@
-//! The paths of temporary files, for programs that end without unwinding.
+//! Records the paths of temporary files, so that a program that ends without unwinding can delete them.
 
 use std::path::Path;
 use std::sync::{Mutex, TryLockError};
@@ -10,7 +10,7 @@ type Name = std::path::PathBuf;
 
 static NAMES: Mutex<Vec<Name>> = Mutex::new(Vec::new());
 
-/// Number of names from which those of deleted files are dropped.
+/// Number of names at which the names of deleted files are removed from the list.
 const PRUNE_FROM: usize = 64;
 
 pub(super) fn register(path: &Path) {
@@ -19,13 +19,14 @@ pub(super) fn register(path: &Path) {
     if names.len() >= PRUNE_FROM {
         names.retain(exists);
     }
-    // `fallible`: a failure that ended the program here would hold the lock of `remove_temporary_files`.
+    // Marked `fallible`: otherwise a failed allocation would end the program here, while this thread holds the lock
+    // that `remove_temporary_files` needs.
     if crate::memory::fallible(|| names.try_reserve(1)).is_ok() {
         names.push(name);
     }
 }
 
-/// Removes the files that are not complete, without allocating.
+/// Removes the unfinished files, without allocating.
 pub fn remove_temporary_files() {
     const ATTEMPTS: usize = 1000;
     for _ in 0..ATTEMPTS {

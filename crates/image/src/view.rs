@@ -57,7 +57,7 @@ pub struct ViewSettings {
 }
 
 impl ViewSettings {
-    /// Maximum exposure in stops, up or down. It keeps light far from the limits of 64-bit floats.
+    /// Maximum magnitude of the exposure in stops. It keeps light values far from the limits of 64-bit floats.
     pub const MAX_STOPS: f64 = 100.0;
 
     /// Returns the exposure, or the rule that it violates.
@@ -75,8 +75,8 @@ impl ViewSettings {
         transformed(self.transform, self.exposed(linear))
     }
 
-    /// Returns the light that is displayed as this color, 0 to 1 each. Approximate for colors outside the range of the
-    /// transform.
+    /// Returns the light that is displayed as this color, whose components are 0 to 1. The result is approximate for
+    /// colors outside the range of the transform.
     pub fn light_of(&self, display: [f64; 3]) -> [f64; 3] {
         let factor = self.exposure.exp2();
         inverse(self.transform, display).map(|light| light / factor)
@@ -128,8 +128,8 @@ fn transformed(transform: ViewTransform, light: Rgb) -> Rgb {
     }
 }
 
-/// Returns the light that is displayed as a color. If no light is, returns the nearest of the result of [`solution`]
-/// and the multiples of the linear color.
+/// Returns the light that is displayed as a color. If no such light exists, returns the candidate that is displayed
+/// closest to the color: the result of [`solution`], or a multiple of the linear color.
 fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
     const EXACT: f64 = 0.5 / 255.0;
     let distance = |light: &Rgb| {
@@ -147,12 +147,12 @@ fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
     all.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(found)
 }
 
-/// Solves `transformed(transform, light) == display` by coordinate-wise bisection: each channel increases with its own
-/// light.
+/// Solves `transformed(transform, light) == display` by coordinate-wise bisection: each display channel increases with
+/// the light of this channel.
 fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
     /// Maximum light of a channel. PBR Neutral only approaches white.
     const MAX_LIGHT: f64 = 1e3;
-    /// A displayed value that is rounded to white in 8 bits.
+    /// A display value that rounds to white in 8 bits.
     const NEARLY_WHITE: f64 = 1.0 - 0.25 / 255.0;
     const SWEEPS: usize = 100;
     const BISECTIONS: usize = 60;
@@ -181,8 +181,8 @@ fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
     light
 }
 
-/// Encodes a linear value in 8 bits by [`ViewTransform::Gamma22`]: clamped to [0, 1], raised to the power 1/2.2, times
-/// 255, rounded to the nearest integer. NaN yields 0.
+/// Encodes a linear value in 8 bits with [`ViewTransform::Gamma22`]: clamped to [0, 1], raised to the power 1/2.2,
+/// times 255, rounded to the nearest integer. NaN yields 0.
 pub fn encode(linear: f32) -> u8 {
     to_8_bits(gamma22(sane(linear)))
 }
@@ -291,7 +291,7 @@ mod tests {
         assert!(apart(srgb, [1.0, 0.214_041_14, 0.0]) < 1e-8, "{srgb:?}");
     }
 
-    /// Checks each branch of the curve and the point where they meet.
+    /// Checks both branches of the curve and the point where the branches meet.
     #[test]
     fn srgb_matches_the_standard() {
         for (linear, shown) in [
@@ -310,9 +310,9 @@ mod tests {
         assert!(apart(gamma, [0.735_356_98; 3]) > 1e-3, "another curve passes");
     }
 
-    /// Checks the formulas of the specification: grays lose 0.04 up to 0.8, and grays up to 0.08 become x² / 0.16.
-    /// Primaries up to 0.76 are kept. Above, the peak becomes 1 - 0.0576 / (x - 0.52) and the other channels move
-    /// towards it.
+    /// Checks the formulas of the specification: grays up to 0.08 become x² / 0.16, and grays from 0.08 to 0.8 are
+    /// reduced by 0.04. Primaries up to 0.76 are unchanged. For brighter colors, the peak becomes 1 - 0.0576 / (x -
+    /// 0.52), and the other channels move towards the peak.
     #[test]
     fn pbr_neutral_matches_the_specification() {
         let neutral = view(ViewTransform::KhronosPbrNeutral);
@@ -327,7 +327,8 @@ mod tests {
             let (found, expected) = (neutral.display(light), srgb.display(linear));
             assert!(apart(found, expected) < 1e-6, "{light:?}: {found:?}, {expected:?}");
         }
-        // x = 2 has a peak of 2, displayed as 1 - 0.0576 / 1.48. The weight of white is 1 - 1 / (0.15 (2 - that) + 1).
+        // x = 2 has a peak of 2, which is displayed as p = 1 - 0.0576 / 1.48. The weight of white is 1 - 1 / (0.15 (2 -
+        // p) + 1).
         let peak = 1.0 - 0.0576 / 1.48;
         let white = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
         let expected = srgb.display([peak as f32, (peak * white) as f32, (peak * white) as f32]);
@@ -335,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn colors_that_are_not_displayed_exactly_have_a_near_one() {
+    fn colors_out_of_range_have_an_approximate_inverse() {
         let distance = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>();
         for transform in [ViewTransform::KhronosPbrNeutral, ViewTransform::Agx] {
             let view = view(transform);
@@ -355,7 +356,7 @@ mod tests {
         assert!(red > 0.85 && green < 0.15 && blue < 0.15, "{red} {green} {blue}");
     }
 
-    /// Reference values of `benches/peers/view_check.py`: its numpy formula, and Blender's tables.
+    /// Reference values from `benches/peers/view_check.py`, computed with its numpy formula and with Blender's tables.
     #[test]
     fn agx_matches_blender() {
         let agx = view(ViewTransform::Agx);
@@ -423,7 +424,7 @@ mod tests {
         }
     }
 
-    /// Any rendered value must map to 0 ... 1.
+    /// All rendered values must map to 0 ... 1.
     #[test]
     fn every_value_has_a_display_value() {
         let values = [

@@ -6,7 +6,7 @@ use crate::problem::{At as _, Problem};
 use crate::scene::{Camera, Scene};
 
 impl CameraPath {
-    /// Keys of problems are relative to `camera`.
+    /// Returns the camera at a frame. The keys of problems are relative to `camera`.
     pub(crate) fn at(&self, frame: f64) -> Result<Camera, Problem> {
         let camera = self.description(frame).validate_frame();
         camera.map_err(|problem| Problem::new(format!("at frame {frame}, {problem}")).at("path"))
@@ -14,12 +14,13 @@ impl CameraPath {
 }
 
 impl Scene {
-    /// Returns the camera at a frame; [`Scene::camera`] if it is not animated. Frames may be fractional, and outside of
-    /// the path.
+    /// Returns the camera at a frame; [`Scene::camera`] if it is not animated. Frames may be fractional, and may lie
+    /// outside of the path.
     ///
     /// # Errors
     ///
-    /// A camera without a valid view, such as a path through its target point, and a frame that is not finite.
+    /// The camera has no valid view, for example because its path passes through the target point, or the frame is not
+    /// finite.
     pub fn camera_at(&self, frame: f64) -> Result<Camera, SceneError> {
         let Some(path) = &self.camera_path else {
             return Ok(self.camera);

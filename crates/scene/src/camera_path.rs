@@ -8,7 +8,7 @@ use super::{CameraDescription, CameraKeyDescription, Interpolation};
 /// The path of a scene's camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
-    /// Values without keys.
+    /// The camera; provides the values that have no keys.
     still: CameraDescription,
     interpolation: Interpolation,
     position: Vec<Key<DVec3>>,
@@ -23,7 +23,7 @@ pub struct CameraPath {
 }
 
 impl CameraPath {
-    /// Returns the path of a validated camera, or `None` without keys.
+    /// Returns the path of a validated camera; `None` if the camera has no path.
     pub(super) fn of(camera: &CameraDescription) -> Option<CameraPath> {
         let path = camera.path()?;
         let (first, last) = (path.keys.first()?, path.keys.last()?);
@@ -46,7 +46,7 @@ impl CameraPath {
         })
     }
 
-    /// Returns the frames of the first and last key. Outside, the camera is constant.
+    /// Returns the frames of the first and last key. Before and after these frames, the camera is constant.
     pub fn frames(&self) -> (f64, f64) {
         self.frames
     }
@@ -55,7 +55,7 @@ impl CameraPath {
         self.place = Some((origin.to_owned(), line));
     }
 
-    /// Returns the camera at a frame, not validated.
+    /// Returns the camera at a frame without validating it.
     pub(crate) fn description(&self, frame: f64) -> CameraDescription {
         let mut camera = self.still.clone();
         let at = |keys: &[Key<f64>]| value(keys, frame, self.interpolation);

@@ -88,7 +88,7 @@ fn one() -> f64 {
     1.0
 }
 
-/// Returns the default folder that must contain all files: the parent of the scene's, because they are named
+/// Returns the default folder that must contain all files: the parent of the scene's folder, because files are named
 /// `../assets/...`.
 pub fn asset_root(folder: &Path) -> PathBuf {
     let folder = match folder.as_os_str().is_empty() {
@@ -123,7 +123,7 @@ pub fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Descripti
 pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) -> SceneError {
     let problems = problems.map(|problem| Problem {
         key: key_in_file(text, &problem.key, defines),
-        // The file names the type "specular".
+        // In the file, this type is named "specular".
         message: problem.message.replace("\"conductor\"", "\"specular\""),
         ..problem
     });
@@ -195,7 +195,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
         .put(&[], &mut table, |_| false)
         .map_err(|problem| ReadFault::Values(problem.into()))?;
     let in_json = |problem: Problem| {
-        // It is worded for TOML.
+        // The message is written for TOML.
         let shown = find(text, &problem.key).filter(|value| value.starts_with('{'));
         let message = match (problem.message.rsplit_once(" must be "), shown) {
             (Some((_, rule)), Some(shown)) => format!("{} must be {rule}", cut(&one_line(shown))),
@@ -211,7 +211,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
     parse::read_for(table, Integrator::Path).map_err(|problems| ReadFault::Values(problems.map(in_json)))
 }
 
-/// Validates values that the conversion to +Z up changes: errors show the file's numbers.
+/// Validates the values that the conversion to +Z up changes, so that errors show the numbers of the file.
 fn check(course: &Course) -> Result<(), Problems> {
     let Course {
         cam_config,
@@ -363,7 +363,7 @@ fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
     })
 }
 
-/// Returns the text of the value at a path, or of its innermost ancestor that exists.
+/// Returns the text of the value at a path, or of the innermost existing ancestor.
 fn find<'a>(text: &'a str, path: &KeyPath) -> Option<&'a str> {
     let whole: &RawValue = serde_json::from_str(text).ok()?;
     let mut value = whole.get();
@@ -390,7 +390,7 @@ fn begin(text: &str, path: &KeyPath) -> usize {
     find(text, path).map_or(0, |value| value.as_ptr() as usize - text.as_ptr() as usize)
 }
 
-/// Returns line and column, from 1, of a byte offset.
+/// Returns the line and column, both counted from 1, of a byte offset.
 fn place(text: &str, at: usize) -> (usize, usize) {
     let before = text.get(..at).unwrap_or_default();
     let line = before.rsplit('\n').next().unwrap_or_default();

@@ -18,11 +18,11 @@ pub(super) const MAX_IMAGE_SIDE: u32 = 16_384;
 /// Memory limit of a decoder besides the image, in bytes.
 const BESIDE: usize = 64 << 20;
 
-/// Limit of the decoded values in bytes, and its increase per byte of the file, which may be 16,384 x 16,384 zeros;
-/// decoders use as much again.
+/// Limit on the decoded size in bytes: a constant, plus an allowance per byte of the file. A small file may decode to
+/// 16,384 x 16,384 zeros. Decoders need the same amount of memory again.
 const LARGEST: (u64, u64) = (256 << 20, 32);
 
-/// Limit in bytes of the texels that an EXR file does not store; it increases with the file size like [`LARGEST`].
+/// Limit in bytes on the texels that an EXR file does not store; increases with the file size like [`LARGEST`].
 const BLANK: u64 = 64 << 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +44,7 @@ const FORMATS: [(Format, &str); 6] = [
 ];
 
 impl Format {
-    /// Returns the format by the first bytes of a file, or `None` if it is not supported.
+    /// Detects the format from the first bytes of a file; `None` if the format is not supported.
     pub fn of(bytes: &[u8]) -> Option<Format> {
         let format = match bytes.starts_with(ktx2::IDENTIFIER) {
             true => Format::Ktx2,
@@ -54,7 +54,7 @@ impl Format {
         is_supported.then_some(format)
     }
 
-    /// Returns the format of an extension, supported or not.
+    /// Returns the format that belongs to the extension of a file name, whether or not the format is supported.
     pub fn of_name(file: &str) -> Option<Format> {
         let ending = Path::new(file).extension()?;
         match ending.eq_ignore_ascii_case("ktx2") {
@@ -89,20 +89,20 @@ impl Header {
 
 pub(super) enum DecodeError {
     Image(ImageError),
-    /// A violated rule of the caller.
+    /// The caller's rule for headers is violated.
     Rule(String),
-    /// A violated size limit; the message follows the file's name.
+    /// A size limit is violated. The message follows the file's name.
     Large(String),
-    /// A violated rule of the format; the message follows the file's name.
+    /// A rule of the format is violated. The message follows the file's name.
     Damaged(String),
     Channels(Channels),
 }
 
-/// The channels of an EXR file without supported ones.
+/// The channels of an EXR file that has no supported channels.
 pub(super) struct Channels {
-    /// The names in all layers.
+    /// The channel names in all layers.
     pub names: Vec<String>,
-    /// True if the pixels have any number of values per channel ("deep" data).
+    /// True if the pixels have a variable number of values per channel ("deep" data).
     pub are_deep: bool,
 }
 
@@ -144,7 +144,7 @@ pub(super) fn decode(
     if format == ImageFormat::Png {
         return decode_png(bytes, fits);
     }
-    // Texels stored in an EXR file; the display window may differ.
+    // Number of texels that an EXR file stores; the display window may have a different size.
     let stored = Cell::new(0);
     if format == ImageFormat::OpenExr
         && let Some(image) = gray_exr(
@@ -178,7 +178,7 @@ pub(super) fn decode(
     Ok(DynamicImage::from_decoder(decoder)?)
 }
 
-/// Rejects an image too large for its file.
+/// Rejects an image that is too large for the size of its file.
 fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Result<(), DecodeError> {
     let bytes = u64::from(width) * u64::from(height) * bytes_of_texel;
     let length = file.len() as u64;
@@ -225,7 +225,7 @@ fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Res
     file.decode().map_err(DecodeError::Damaged)
 }
 
-/// Uses the PNG crate directly, to skip color profiles and texts of unknown decompressed size.
+/// Uses the PNG crate directly, because it can skip color profiles and texts, whose decompressed size is unknown.
 fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);

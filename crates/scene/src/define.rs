@@ -25,7 +25,7 @@ impl Define {
     ///
     /// # Errors
     ///
-    /// An invalid path, an empty value, and a value that starts like TOML but is not.
+    /// The path is invalid, or the value is empty or starts like TOML but is invalid.
     pub fn new(key: &str, value: &str) -> Result<Define, Problem> {
         let (path, rest) = read_key(key, unreadable)?;
         match rest {
@@ -54,7 +54,7 @@ impl FromStr for Define {
 }
 
 impl Define {
-    /// Returns true if the override sets this key, a part of it or a table around it.
+    /// Returns true if the override sets this key, a part of its value, or a table that contains it.
     pub(super) fn overrides_key(&self, key: &KeyPath) -> bool {
         self.key.0.iter().zip(&key.0).all(|(own, step)| is_step(own, step))
     }
@@ -82,7 +82,7 @@ fn unreadable(text: &str) -> Problem {
 impl FromStr for KeyPath {
     type Err = Problem;
 
-    /// Parses a path in the syntax of a scene file: `materials."dark red".color`, `shapes[2].radius`.
+    /// Parses a path with the syntax of a scene file: `materials."dark red".color`, `shapes[2].radius`.
     fn from_str(text: &str) -> Result<KeyPath, Problem> {
         match read_key(text, no_path)? {
             (path, "") => Ok(path),
@@ -102,10 +102,11 @@ fn too_deep(text: &str) -> Problem {
     Problem::new(format!("{} must have at most {MAX_SEGMENTS} steps", cut(text)))
 }
 
-/// Parses the path at the start of a text. The rest is empty or starts with `=`. `unreadable` makes the error.
+/// Parses the path at the start of a text. Also returns the rest, which is empty or starts with `=`. `unreadable`
+/// creates the error.
 fn read_key(text: &str, unreadable: fn(&str) -> Problem) -> Result<(KeyPath, &str), Problem> {
     let mut path = Vec::new();
-    // The tokens that are valid next: a name, or a separator of names.
+    // The tokens that are valid next: a name, or a separator between names.
     let (mut name, mut between) = (true, false);
     let mut rest = "";
     let mut tokens = Source::new(text).lex();
@@ -174,7 +175,7 @@ fn read_value(text: &str) -> Result<Value, String> {
     }
 }
 
-/// Compares segments; an index may be written as a name.
+/// Compares segments; an index may also be written as a name.
 pub(super) fn is_step(written: &Segment, step: &Segment) -> bool {
     match (written, step) {
         (Segment::Key(name), Segment::Index(number)) => index(name) == Some(*number),
@@ -344,7 +345,7 @@ radius = 0.5
                 error_of(define)
             );
         }
-        // Errors in values of the file name the file.
+        // Errors in values from the file are reported at their location in the file.
         let bad = SCENE.replace("radius = 0.5", "radius = -1");
         let message = parse(&bad, &["shapes[0].radius=2", "camera.fov=50"])
             .unwrap_err()

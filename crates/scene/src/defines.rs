@@ -1,4 +1,4 @@
-//! Application of the overrides of a scene file to its tables.
+//! Applies the overrides of a scene file to its tables.
 
 use toml::{Table, Value};
 
@@ -16,10 +16,11 @@ impl Problems {
     }
 }
 
-/// Overrides that are applied while a file is parsed; their paths attribute errors to them.
+/// Overrides that are applied while a file is parsed. Their paths are recorded, so that errors can be attributed to
+/// them.
 pub(super) struct Defines<'a> {
     given: &'a [Define],
-    /// Applied and failed ones.
+    /// Overrides that were applied or have failed.
     put: Vec<Put>,
 }
 
@@ -27,7 +28,7 @@ struct Put {
     number: usize,
     /// The key, with indices for list elements.
     path: Vec<Segment>,
-    /// Path length of the outermost table or value created or replaced.
+    /// Path length of the outermost table or value that was created or replaced.
     own: usize,
 }
 
@@ -44,7 +45,7 @@ impl<'a> Defines<'a> {
         self.put.clear();
     }
 
-    /// Returns true if an override set the value of this key or of a table around it.
+    /// Returns true if an override set the value of this key, or of a table that contains it.
     pub fn has_set(&self, key: &KeyPath) -> bool {
         let key = key.0.as_slice();
         self.put.iter().any(|put| {
@@ -54,7 +55,8 @@ impl<'a> Defines<'a> {
         })
     }
 
-    /// Applies the overrides of the table at this path; with an empty path, those for which `is_elsewhere` is false.
+    /// Applies the overrides of the table at this path; with an empty path, the overrides for which `is_elsewhere` is
+    /// false.
     pub fn put(
         &mut self,
         at: &[Segment],
@@ -105,15 +107,15 @@ impl<'a> Defines<'a> {
     }
 }
 
-/// Returns true for a sample count, short for a table.
+/// Returns true if the path leads to a sample count, which may be written as a plain number instead of a table.
 fn is_samples(path: &[Segment]) -> bool {
     let names = ["pixel_samples", "light_samples"];
     matches!(path, [Segment::Key(section), Segment::Key(key)] if section == "render" && names.contains(&key.as_str()))
 }
 
 /// Sets a value in a tree of tables and lists. Creates missing tables, except named textures, materials and meshes.
-/// Appends the path of the value or failure to `path`. Returns the path length of the outermost created table, else of
-/// the value.
+/// Appends the path of the value or failure to `path`. Returns the path length of the outermost table that was created,
+/// or of the value if none was.
 fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
     let mut own = None;
     let mut value = root;

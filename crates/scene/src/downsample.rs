@@ -10,7 +10,7 @@ use wgray_image::color::{linear_to_srgb, srgb_to_linear};
 pub struct Level {
     /// Columns.
     pub width: usize,
-    /// Rows from the top.
+    /// Rows, top row first.
     pub rows: Vec<Vec<DVec3>>,
 }
 
@@ -42,7 +42,7 @@ impl Level {
     }
 }
 
-/// Returns an image at half its size in linear light. `row` maps rows of the result to rows of the image.
+/// Returns the image at half size, in linear light. `row` maps row indices to rows of `image`.
 pub fn half_of(image: &Image, row: impl Fn(usize) -> usize + Sync) -> Level {
     let (width, height) = (image.width as usize, image.height as usize);
     match &image.texels {
@@ -64,7 +64,7 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
     let (new_width, new_height) = ((width / 2).max(1), (height / 2).max(1));
     let lines = (0..new_height).into_par_iter().with_min_len(16);
     let rows = if width.is_multiple_of(2) && height.is_multiple_of(2) {
-        // Even sizes: the sum below, in the same order, with constant weights.
+        // For even sizes: the same sum as below, in the same order, but with constant weights.
         let color = |i: usize, j: usize| {
             let texel = |x: usize, y: usize| texel(2 * i + x, 2 * j + y) * 0.25;
             DVec3::ZERO + texel(0, 0) + texel(1, 0) + texel(0, 1) + texel(1, 1)
@@ -88,7 +88,8 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
     Level { width: new_width, rows }
 }
 
-/// Returns the texels among `from` that each of `to` (the half, rounded down, at least 1) covers, with their weights.
+/// For each of `to` texels, returns the texels among `from` that it covers, with their weights. `to` is half of `from`,
+/// rounded down, and at least 1.
 fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     let size = from as f64 / to as f64;
     let cover = |i: usize| {
@@ -103,7 +104,7 @@ fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     (0..to).map(cover).collect()
 }
 
-/// Halves width and height, rounded down, at least 1.
+/// Returns the image with half the width and height, rounded down, but at least 1.
 pub(super) fn halved(image: &Image) -> Image {
     let Level { width, rows } = half_of(image, |row| row);
     let height = rows.len();

@@ -10,7 +10,7 @@ use super::validate::{color, view};
 use super::{Description, EnvironmentDescription, EnvironmentName};
 use wgray_image::color::srgb_to_linear;
 
-/// The background of the camera in place of the environment.
+/// The background that the camera sees instead of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Background {
@@ -18,11 +18,11 @@ pub enum Background {
     Transparent,
     /// This radiance, in linear RGB.
     Color(DVec3),
-    /// The radiance that the scene's view transform and exposure display as this color, 0 to 1 each.
+    /// The radiance that the scene's view transform and exposure display as this color, whose components are 0 to 1.
     Display(DVec3),
 }
 
-/// Replaces the environment. Its visibility to the camera is kept.
+/// Replaces the environment. Its visibility to the camera does not change.
 pub(super) fn surround(description: &mut Description, environment: &EnvironmentDescription) {
     let before = description.environment.take();
     let (visible, background) = before.map_or((true, None), |before| (before.visible, before.background));
@@ -35,7 +35,7 @@ pub(super) fn surround(description: &mut Description, environment: &EnvironmentD
 }
 
 impl Background {
-    /// Shows this to the camera. Does not change the light.
+    /// Makes this the background that the camera sees. Does not change the light.
     pub(super) fn show(self, description: &mut Description) -> Result<(), Problem> {
         let seen = match self {
             Background::Transparent => return transparent(description),
@@ -77,7 +77,8 @@ fn transparent(description: &mut Description) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Returns a problem of the environment as one of the option.
+/// Converts a problem with the environment into a problem with the `--environment` option; `None` if the option does
+/// not set the key.
 pub(super) fn of_option(problem: &Problem) -> Option<Problem> {
     let key = problem.key.to_string();
     let is_of_option = matches!(key.strip_prefix("environment"), Some("" | ".color" | ".file"));
@@ -87,7 +88,7 @@ pub(super) fn of_option(problem: &Problem) -> Option<Problem> {
 impl FromStr for Background {
     type Err = String;
 
-    /// `none` or `transparent`, or a color.
+    /// Parses `none`, `transparent`, or a color.
     fn from_str(text: &str) -> Result<Background, String> {
         if text == "none" || text == "transparent" {
             return Ok(Background::Transparent);
@@ -101,7 +102,7 @@ impl FromStr for Background {
 impl FromStr for EnvironmentDescription {
     type Err = String;
 
-    /// A built-in environment, a color, or an image relative to the current folder.
+    /// Parses the name of a built-in environment, a color, or the path of an image, relative to the current folder.
     fn from_str(text: &str) -> Result<EnvironmentDescription, String> {
         let own = EnvironmentName::ALL.into_iter().find(|name| name.name() == text);
         if let Some(name) = own {
@@ -131,13 +132,13 @@ const COLOR_NAMES: [(&str, &str); 4] = [
     ("white", "#ffffff"),
 ];
 
-/// Returns the linear RGB of a name or hexadecimal digits (by sRGB's curve), or of three linear numbers.
+/// Parses a color to linear RGB: a name or hexadecimal digits (sRGB-encoded), or three linear numbers.
 fn color_of(text: &str) -> Option<DVec3> {
     let linear = |shown: DVec3| DVec3::from_array(shown.to_array().map(srgb_to_linear));
     display_of(text).map(linear).or_else(|| linear_of(text))
 }
 
-/// Returns the display values, 0 to 1, of a name, `#rrggbb` or `#rgb`, with or without `#`.
+/// Parses a name, `#rrggbb` or `#rgb`, with or without `#`, to display values, 0 to 1.
 fn display_of(text: &str) -> Option<DVec3> {
     let named = COLOR_NAMES.into_iter().find(|(name, _)| *name == text);
     let hex = named.map_or(text, |(_, hex)| hex);
@@ -183,7 +184,8 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         assert_eq!(shown("1,0.25, 20"), [1.0, 0.25, 20.0]);
         assert_eq!("#ff0000".parse(), Ok(Background::Display(DVec3::X)));
         assert_eq!("1,0,0".parse(), Ok(Background::Color(DVec3::X)));
-        // IEC 61966-2-1 by hand: 0x80 is 128 / 255 = 0.50196, and ((0.50196 + 0.055) / 1.055)^2.4 = 0.21586.
+        // Computed by hand from IEC 61966-2-1: 0x80 is 128 / 255 = 0.50196, and ((0.50196 + 0.055) / 1.055)^2.4 =
+        // 0.21586.
         let [r, g, b] = shown("#8000Ff");
         assert!((r - 0.21586).abs() < 1e-5 && g == 0.0 && b == 1.0, "{r} {g} {b}");
         assert_eq!("none".parse(), Ok(Background::Transparent));
@@ -205,7 +207,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
     }
 
     #[test]
-    fn surroundings_are_named_coloured_or_files() {
+    fn environments_are_names_colours_or_files() {
         let around = |text: &str| text.parse::<EnvironmentDescription>().unwrap();
         assert_eq!(around("studio"), EnvironmentDescription::named(EnvironmentName::Studio));
         assert_eq!(around("sky"), EnvironmentDescription::named(EnvironmentName::Sky));
@@ -225,7 +227,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
     }
 
     #[test]
-    fn other_surroundings_light_and_other_backgrounds_are_seen() {
+    fn overrides_replace_the_light_and_the_visible_background() {
         let path = "render = { integrator = 'path', alpha = true, background = [1, 2, 3] }\n";
         let color = |color: [f64; 3]| Some(Background::Color(color.into()));
         let with = |environment: Option<&str>, background| Overrides {
@@ -253,7 +255,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         let opaque = path.replace("alpha = true, ", "");
         let clear = with(None, Some(Background::Transparent));
         assert_eq!(found(&opaque, &clear), (Some((light, true, None)), true));
-        // Also without an environment, or with an invisible one.
+        // Also if there is no environment, or if it is invisible.
         let dark = "render.integrator = 'path'\n";
         assert_eq!(
             found(dark, &with(None, color(red))),
@@ -276,7 +278,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
     }
 
     #[test]
-    fn a_display_color_is_what_the_view_shows() {
+    fn a_display_color_is_displayed_unchanged() {
         for (transform, exposure) in [
             ("agx", 0.0),
             ("khronos-pbr-neutral", 1.5),
@@ -306,7 +308,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
     }
 
     #[test]
-    fn bad_surroundings_are_told_as_the_options_that_they_are() {
+    fn invalid_environments_and_backgrounds_name_their_option() {
         let message = |more: &str, environment: Option<&str>, background: Option<&str>| {
             let overrides = Overrides {
                 environment: environment.map(|text| text.parse().unwrap()),
@@ -348,7 +350,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
             assert!(matches!(error, SceneError::Override(_)), "{error}");
             assert!(error.to_string().starts_with(wanted), "{error}: {wanted}");
         }
-        // Errors in values of the file name the file.
+        // Errors in values from the scene file are reported at their location in that file.
         let error = message(
             &format!("{path}materials.a = {{ type = 'glass', ior = 0 }}\n"),
             Some("sky"),

@@ -7,7 +7,7 @@ use crate::gltf::GltfError;
 use crate::mesh::MeshError;
 use crate::problem::{ErrorPlace, MAX_PROBLEMS, Problem, Problems};
 
-/// An error of loading a scene. Every message starts with its location.
+/// An error of loading a scene. Every message starts with the location of the error.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -42,7 +42,7 @@ pub enum SceneError {
         /// The problem.
         problem: Problem,
     },
-    /// Several values of the file are invalid, in its order, each with a line of the message.
+    /// Several values of the file are invalid. The errors are in file order; the message has a line for each.
     #[error("{}", self.lines())]
     Several {
         /// The first errors.
@@ -64,7 +64,7 @@ pub enum SceneError {
         /// The format, and what to do.
         message: String,
     },
-    /// A value that overrides one of the file is invalid; the key is the field of [`Overrides`](super::Overrides).
+    /// An override is invalid; the key is the field of [`Overrides`](super::Overrides).
     #[error("{0}")]
     Override(Problem),
 }
@@ -100,7 +100,7 @@ impl SceneError {
         }
     }
 
-    /// Returns the errors of several values, or this error, and a message about further ones.
+    /// Returns the individual errors (only this error if there is just one), and a message if there are further errors.
     pub fn each(&self) -> (&[SceneError], Option<String>) {
         match self {
             SceneError::Several { errors, more: 0 } => (errors, None),
@@ -118,7 +118,7 @@ impl SceneError {
 }
 
 impl Problems {
-    /// Returns the error, with problems in the order of the text.
+    /// Converts problems to an error, in the order of the text.
     pub fn into_error(
         self,
         place: impl Fn(&Problem) -> usize,

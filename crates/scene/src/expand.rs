@@ -28,7 +28,7 @@ impl Description {
         scene.map_err(|problems| problems.first)
     }
 
-    /// [`Description::validate_with`] with all problems. Lists the files even then.
+    /// Like [`Description::validate_with`], but returns all problems. Lists the files even if there are problems.
     pub(crate) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problems> {
         files.extend(self.files_beside(assets));
         let integrator = self.integrator();

@@ -1,4 +1,4 @@
-//! The automatic camera: it frames a whole scene from a direction.
+//! The automatic camera: it frames the whole scene, seen from a given direction.
 
 use std::str::FromStr;
 
@@ -8,18 +8,22 @@ use super::PerspectiveDescription;
 
 /// Vertical field of view in degrees, except in wide images.
 const FOV: f64 = 35.0;
-/// Largest aspect whose horizontal field of view grows with the width: perspective stretches the sides.
+/// Maximum aspect ratio up to which the horizontal field of view increases with the width. In wider views, perspective
+/// would stretch the sides.
 const WIDEST: f64 = 2.0;
 /// Fraction of the image that the scene fills, with margins of 5 %.
 const INSIDE: f64 = 0.9;
-/// Smallest distance from the camera to the nearest point, relative to the scene's extent, for long objects.
+/// Minimum distance from the camera to the nearest point, relative to the scene's extent; only relevant for scenes that
+/// are elongated along the view direction.
 const NEAREST: f64 = 0.1;
-/// Range of the diagonal of a framed scene's bounds, which keeps distances and coordinates within their limits.
+/// Range of the diagonal of a framed scene's bounding box. The range keeps distances and coordinates within their
+/// limits.
 const EXTENTS: (f64, f64) = (1e-8, 4e8);
-/// Elevation in degrees from which on the vertical axis cannot be up in the image.
+/// Minimum elevation in degrees at which the view counts as vertical, so that the vertical axis cannot be up in the
+/// image.
 const STEEPEST: f64 = 89.9;
 
-/// The side that a scene is seen from. Its front is towards -y and its top towards +z, as of upright glTF files.
+/// The side from which a scene is seen. The front is towards -y and the top towards +z, as in upright glTF files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum View {
@@ -30,15 +34,15 @@ pub enum View {
     Front,
     /// From behind.
     Back,
-    /// From the viewer's left of the front.
+    /// From the left, as seen by a viewer in front.
     Left,
-    /// From the viewer's right of the front.
+    /// From the right, as seen by a viewer in front.
     Right,
     /// From above; the front is at the image's lower edge.
     Top,
     /// From below; the front is at the image's upper edge.
     Bottom,
-    /// From the front, the right and above in equal parts.
+    /// Isometric: equally from the front, the right and above.
     Iso,
 }
 
@@ -69,7 +73,7 @@ impl View {
         }
     }
 
-    /// Returns the directions to the camera, not normalized, and up in the image.
+    /// Returns the direction to the camera (not normalized), and the up direction of the image.
     fn direction(self) -> (DVec3, DVec3) {
         let from = |x: f64, y: f64, z: f64| (DVec3::new(x, y, z), DVec3::Z);
         match self {
@@ -86,22 +90,22 @@ impl View {
     }
 }
 
-/// A direction that the camera looks from, in degrees.
+/// A direction from which the camera looks, in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
-    /// The turn about the vertical axis: 0 is the front, 90 the right, from -360 to 360.
+    /// Rotation about the vertical axis, -360 to 360: 0 is the front, 90 the right.
     pub azimuth: f64,
     /// The angle above the horizon, from -90 to 90.
     pub elevation: f64,
 }
 
 impl Orbit {
-    /// Returns the directions to the camera and up in the image.
+    /// Returns the direction to the camera, and the up direction of the image.
     fn direction(self) -> (DVec3, DVec3) {
         let (sin, cos) = self.azimuth.to_radians().sin_cos();
         let (high, level) = self.elevation.to_radians().sin_cos();
         let towards = DVec3::new(sin * level, -cos * level, high);
-        // From straight above or below, up is towards the scene's back or front.
+        // Seen from straight above or below, up is towards the back or the front of the scene.
         match self.elevation.abs() < STEEPEST {
             true => (towards, DVec3::Z),
             false => (towards, DVec3::new(-sin, cos, 0.0) * high.signum()),
@@ -135,7 +139,7 @@ impl FromStr for Orbit {
 pub struct Framing {
     /// The view of the scene.
     pub view: View,
-    /// A direction that replaces the one of `view`.
+    /// A direction that replaces the direction of `view`.
     pub orbit: Option<Orbit>,
     /// The vertical field of view in degrees. If absent, 35, or less if the image is more than twice as wide as high.
     pub fov: Option<f64>,
@@ -162,7 +166,7 @@ impl Framing {
     }
 }
 
-/// Checks that a model's extent is within the limits of the automatic camera. The error is the violated rule.
+/// Checks that a model's extent is within the limits of the automatic camera. Returns the violated rule as the error.
 pub fn check_extent(points: impl Iterator<Item = DVec3>) -> Result<(), String> {
     let (low, top) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, top), p| {
         (low.min(p), top.max(p))
@@ -177,8 +181,8 @@ pub fn check_extent(points: impl Iterator<Item = DVec3>) -> Result<(), String> {
     }
 }
 
-/// Returns the nearest camera that sees all points with equal margins on opposite sides, and looks at their center.
-/// Without points it frames the origin.
+/// Returns the nearest camera that sees all points with equal margins on opposite sides, and looks at their center. If
+/// there are no points, the camera frames the origin.
 pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> PerspectiveDescription {
     let (towards, up) = framing.direction();
     let forward = -towards.normalize();
@@ -204,7 +208,7 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
         axis: framing.turns.then_some(up),
     };
     let reach = |n: DVec3| extent.reach(n, DVec3::ZERO).0;
-    // A point is in the image if right . (p - camera) <= w forward . (p - camera), and likewise at other sides.
+    // A point p is in the image if right . (p - camera) <= w forward . (p - camera), and likewise for the other sides.
     let (w, h) = (INSIDE * wide, INSIDE * high);
     let across = reach(right - w * forward) + reach(-right - w * forward);
     let along = reach(upwards - h * forward) + reach(-upwards - h * forward);
@@ -232,12 +236,13 @@ const MAX_STEPS: usize = 64;
 struct Extent<'a, I> {
     points: &'a I,
     middle: DVec3,
-    /// Axis of rotation, if any: each point then stands for its whole circle.
+    /// Axis of rotation, if any. Each point then represents its circle around the axis.
     axis: Option<DVec3>,
 }
 
 impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
-    /// Returns the support function of the points, the maximum of `p . n`, and its derivative along `step`.
+    /// Returns the value of the support function of the points (the maximum of `p . n`), and its derivative along
+    /// `step`.
     fn reach(&self, n: DVec3, step: DVec3) -> (f64, f64) {
         let of = |point: DVec3| {
             let p = point - self.middle;
@@ -263,9 +268,10 @@ impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
 
     /// Returns the offset along `side` of a camera at distance `back` that makes both margins along `side` equal.
     ///
-    /// Let w be the tangent of half the angle that the points then fill. They touch both planes of that angle:
-    /// `reach(side - w forward) + reach(-side - w forward) = 2 w back`. The left side minus the right is convex and
-    /// decreasing in w, hence Newton's method from w = 0 converges to its root from below.
+    /// Let w be the tangent of half of the angle that the points then subtend. The points touch both planes that bound
+    /// the angle: `reach(side - w forward) + reach(-side - w forward) = 2 w back`. The left-hand side minus the
+    /// right-hand side is convex and decreasing in w, so Newton's method, started at w = 0, converges to the root from
+    /// below.
     fn offset(&self, side: DVec3, forward: DVec3, back: f64) -> f64 {
         let (mut w, mut offset) = (0.0, 0.0);
         for _ in 0..MAX_STEPS {

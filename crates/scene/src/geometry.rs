@@ -35,9 +35,9 @@ pub struct Shape {
 /// The geometry of a shape, in world space.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
-    /// A rectangle; its normal is u x v.
+    /// A rectangle with the normal u x v.
     Rectangle(Parallelogram),
-    /// A disk: the points of the parallelogram with x² + y² <= 1; its normal is u x v.
+    /// A disk with the normal u x v: the points of the parallelogram with x² + y² <= 1.
     Disk(Parallelogram),
     /// An ellipsoid or a sphere: the points `center + x a + y b + z c` with x² + y² + z² = 1.
     Ellipsoid {
@@ -53,8 +53,8 @@ pub enum Geometry {
         /// Two radii and half of the axis, perpendicular to each other.
         axes: [DVec3; 3],
     },
-    /// Triangles with a common shape index: one, or the four faces of a tetrahedron. Vertices are counter-clockwise as
-    /// seen from outside: the normal is (v1 - v0) x (v2 - v1).
+    /// Triangles with a common shape index: a single triangle, or the four faces of a tetrahedron. Vertices are
+    /// counter-clockwise as seen from outside: the normal is (v1 - v0) x (v2 - v1).
     Triangles(Vec<[DVec3; 3]>),
     /// A triangle mesh.
     Mesh {
@@ -62,7 +62,7 @@ pub enum Geometry {
         mesh: Arc<Mesh>,
         /// Object-to-world transform; invertible.
         to_world: DAffine3,
-        /// Index into [`Scene::materials`](crate::Scene::materials) for each group of the mesh.
+        /// For each group of the mesh, an index into [`Scene::materials`](crate::Scene::materials).
         materials: Vec<usize>,
     },
     /// An infinite plane.
@@ -84,7 +84,8 @@ impl Parallelogram {
 }
 
 impl Geometry {
-    /// Returns the value of `type` in a scene file; spheres differ from ellipsoids, triangles from tetrahedra.
+    /// Returns the value of `type` in a scene file; distinguishes spheres from ellipsoids, and triangles from
+    /// tetrahedra.
     pub fn name(&self) -> &'static str {
         match self {
             Geometry::Rectangle(_) => "rectangle",
@@ -133,8 +134,8 @@ impl Geometry {
         }
     }
 
-    /// Calls `point` with points whose projections onto a unit vector bound those of the geometry: one for a plane; for
-    /// a mesh, the corners of its bounding box.
+    /// Calls `point` with points whose projections onto a unit vector bound the projection of the geometry. For a
+    /// plane, this is one point; for a mesh, the corners of its bounding box.
     pub fn each_extreme(&self, direction: DVec3, mut point: impl FnMut(DVec3)) {
         let mut between = |center: DVec3, half: f64| {
             point(center + direction * half);
@@ -161,7 +162,7 @@ impl Geometry {
     }
 }
 
-/// Returns true if the semi-axes are those of a sphere that is not rotated.
+/// Returns true if the semi-axes belong to an unrotated sphere.
 fn is_sphere(axes: &[DVec3; 3]) -> bool {
     *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }
@@ -174,7 +175,8 @@ fn around(center: DVec3, reach: DVec3) -> Option<Bounds> {
     Some((center - reach, center + reach))
 }
 
-/// Returns the half extents of a disk or ellipsoid: per coordinate axis, the norm of the semi-axes' components.
+/// Returns the half extents of the bounding box of a disk or ellipsoid: for each coordinate axis, the norm of the
+/// components of the semi-axes.
 fn root_of_squares(axes: &[DVec3]) -> DVec3 {
     axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt)
 }

@@ -20,29 +20,29 @@ use wgray_image::color::srgb_to_linear;
 
 /// Maximum size of a file in bytes.
 const MAX_FILE_BYTES: u64 = 512 << 20;
-/// Maximum component of a texel, as of all colors.
+/// Maximum component of a texel, equal to the maximum for all colors.
 const BRIGHTEST: f32 = 1e6;
 
 /// Locations of the images and meshes of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assets {
-    /// Folder of the scene file, which file names are relative to.
+    /// Folder of the scene file; file names are relative to it.
     pub folder: PathBuf,
     /// Folder that must contain all files.
     pub root: PathBuf,
-    /// Files outside of it, by the absolute paths in the scene.
+    /// Files outside of `root` that are allowed, by their absolute paths in the scene.
     pub elsewhere: BTreeSet<PathBuf>,
-    /// Images in memory by name. A texture uses one instead of a file of this name.
+    /// Images in memory by name. A texture uses an image in memory instead of a file of the same name.
     pub images: BTreeMap<String, Arc<Image>>,
     /// Encoded image files in memory by name.
     pub encoded: BTreeMap<String, Arc<[u8]>>,
     /// Maximum side in texels of images in `encoded`; larger ones are halved until they fit.
     pub longest_side: Option<u32>,
-    /// Missing image files by the names in textures, with the reason.
+    /// Reasons for missing image files, by the names that textures use.
     pub(super) absent: BTreeMap<String, String>,
     /// Meshes in memory by name.
     pub meshes: BTreeMap<String, Arc<Mesh>>,
-    /// Damage to a file is an error, instead of a warning and a placeholder.
+    /// True to report damage to a file as an error, instead of using a placeholder with a warning.
     pub strict: bool,
 }
 
@@ -81,7 +81,7 @@ impl Assets {
         }
     }
 
-    /// Returns the warning about damage to a file, with its placeholder.
+    /// Returns the warning about damage to a file, which names the placeholder.
     ///
     /// # Errors
     ///
@@ -93,8 +93,8 @@ impl Assets {
         }
     }
 
-    /// Returns an image in memory, of this `encoding` if given; `fits` checks the header first. The error is the value
-    /// with the violated rule.
+    /// Returns an image in memory, which must have this `encoding` if given. `fits` checks the header first. The error
+    /// is the value with the violated rule.
     fn image_in_memory(
         &self,
         name: &str,
@@ -117,9 +117,7 @@ impl Assets {
         }
         has_texels(name, *width, *height)?;
         if count as u64 != u64::from(*width) * u64::from(*height) {
-            return Err(format!(
-                "{name:?} has {count} texels; its size, {width} x {height}, must be their number"
-            ));
+            return Err(format!("{name:?} has {count} texels; its size is {width} x {height}"));
         }
         if encoding.is_some_and(|encoding| encoding != default) {
             return Err(format!("{name:?} must have the encoding of the image in memory"));
@@ -218,7 +216,7 @@ impl Assets {
         })
     }
 
-    /// Returns a file's name for messages: relative to the current folder if from the command line.
+    /// Returns a file's name for messages: relative to the current folder if the file was named on the command line.
     fn shown<'f>(&self, file: &'f str) -> &'f str {
         let is_given = self.elsewhere.contains(Path::new(file));
         let here = std::env::current_dir().ok().filter(|_| is_given);
@@ -290,7 +288,7 @@ fn in_range(name: &str, image: &Image) -> Result<(), String> {
     Ok(())
 }
 
-/// Clamps invalid texels. Returns their description, or `None`.
+/// Clamps invalid texels. Returns a description of them; `None` if all are valid.
 fn clamp(image: &mut Image) -> Option<String> {
     let Texels::Floats(values) = &mut image.texels else {
         return None;
@@ -319,7 +317,7 @@ fn clamp(image: &mut Image) -> Option<String> {
 #[derive(Clone)]
 pub(super) struct File {
     pub image: Arc<Image>,
-    /// `None` in memory, where names do not determine the format.
+    /// `None` for images in memory, whose names do not determine the format.
     format: Option<Format>,
     default: Encoding,
     encoding: Encoding,
@@ -330,7 +328,7 @@ pub(super) struct File {
 /// The part of an image that a texture uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
-    /// Colors, in this encoding if given.
+    /// Colors, decoded with this encoding if given.
     Colors(Option<Encoding>),
     /// Alpha, as gray.
     Alpha,
@@ -350,7 +348,7 @@ impl File {
         self.is_alpha == (part == Part::Alpha) && part.encoding().unwrap_or(self.default) == self.encoding
     }
 
-    /// Rejects a name with the extension of another format.
+    /// Rejects a name whose extension belongs to a different format.
     pub fn check_name(&self, file: &str) -> Result<(), String> {
         self.format.map_or(Ok(()), |format| check_name(file, format))
     }
@@ -369,7 +367,7 @@ fn check_name(file: &str, format: Format) -> Result<(), String> {
 fn read(file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
     let mut bytes = Vec::new();
     let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20));
-    // Rejects most large files unread.
+    // Rejects most files that are too large without reading them.
     if fs::metadata(path).is_ok_and(|data| data.len() > MAX_FILE_BYTES) {
         return Err(too_large());
     }
@@ -386,7 +384,7 @@ fn unreadable(file: &str, error: &io::Error) -> String {
     format!("{file:?} cannot be read: {error}")
 }
 
-/// Returns the message about an invalid image, without its name.
+/// Returns the message about an invalid image, without the name of the image.
 fn refused_image(error: &ImageError) -> String {
     match error {
         ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
@@ -398,7 +396,7 @@ fn refused_image(error: &ImageError) -> String {
     }
 }
 
-/// Returns the message about an EXR file without supported channels, without its name.
+/// Returns the message about an EXR file without supported channels, without the name of the file.
 fn refused_channels(channels: &Channels) -> String {
     match channels.are_deep {
         true => "must have one value for each pixel and channel; it is deep".to_owned(),
@@ -436,7 +434,7 @@ fn texels(image: DynamicImage, is_float: bool, encoding: Encoding) -> Texels {
     Texels::Bytes(encoding, bytes)
 }
 
-/// Returns the alpha channel as gray, if there is one.
+/// Returns the alpha channel as a gray image; `None` if there is no alpha channel.
 fn alpha(image: DynamicImage) -> Option<Texels> {
     if !image.color().has_alpha() {
         return None;

@@ -1,11 +1,11 @@
-//! Key paths of values, and names as messages quote them.
+//! Key paths of values, and the quoting of names in messages.
 
 use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 
 /// Maximum length of a value or key in a message, in characters.
 const MAX_VALUE_LEN: usize = 60;
-/// Returns a value or key for a message, elided if long.
+/// Returns a value or key for a message, with the middle elided if it is long.
 pub fn cut(text: &str) -> Cow<'_, str> {
     cut_to(MAX_VALUE_LEN, text)
 }
@@ -101,7 +101,7 @@ impl fmt::Display for KeyPath {
 }
 
 impl KeyPath {
-    /// Returns the path as it is written in a scene file, at any length. Parsing it returns the same path.
+    /// Formats the complete path as in a scene file. Parsing the result returns the same path.
     pub fn exact(&self) -> String {
         let mut text = String::new();
         for segment in &self.0 {
@@ -119,7 +119,7 @@ impl KeyPath {
     }
 }
 
-/// Returns a key as it is written in TOML: bare or quoted.
+/// Formats a key as in TOML: bare or quoted.
 fn written_key(key: &str) -> std::borrow::Cow<'_, str> {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if !key.is_empty() && key.chars().all(is_bare) {

@@ -16,7 +16,8 @@ pub(super) const IDENTIFIER: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 /// Position of the index of levels (section 2); the entry of a level has 24 bytes.
 const INDEX: usize = 80;
 const ENTRY: usize = 24;
-/// Minimum window of a Zstandard frame that is accepted, in bytes (RFC 8878, section 3.1.1.1.2).
+/// Window sizes of a Zstandard frame that are always accepted, in bytes (RFC 8878, section 3.1.1.1.2); larger windows
+/// only for larger images.
 const WINDOW: u64 = 8 << 20;
 
 /// The supercompression schemes (section 3.2).
@@ -43,7 +44,7 @@ pub(crate) struct Ktx2<'a> {
     supercompression: u32,
     descriptor: Range<usize>,
     level: Range<usize>,
-    /// Length of the largest level after Zstandard decompression.
+    /// Length in bytes of the largest level after Zstandard decompression.
     inflated: usize,
 }
 
@@ -77,7 +78,7 @@ pub(crate) fn has_alpha(bytes: &[u8]) -> Option<bool> {
 }
 
 impl<'a> Ktx2<'a> {
-    /// Checks the header. The error is the violated rule, to follow the file's name.
+    /// Checks the header. The error is the violated rule; in messages, it follows the file's name.
     pub fn parse(bytes: &'a [u8]) -> Result<Ktx2<'a>, String> {
         let [format, _, width, height, depth, layers, faces, levels, supercompression] = {
             let mut fields = [0; 9];
@@ -143,7 +144,7 @@ impl<'a> Ktx2<'a> {
         })
     }
 
-    /// Decodes the largest level, to 8 bits per channel. The error is to follow the file's name.
+    /// Decodes the largest level, to 8 bits per channel. In messages, the error follows the file's name.
     pub fn decode(&self) -> Result<DynamicImage, String> {
         let inflated;
         let bytes = match self.supercompression {
@@ -168,8 +169,8 @@ impl<'a> Ktx2<'a> {
         })
     }
 
-    /// Returns the file with its largest level alone, decompressed. Not by the crate `basisu`: its version 0.1.0
-    /// depends on ruzstd 0.7, which does not limit the length of a block.
+    /// Returns the file with only the largest level, decompressed. Does not use the decompression of the crate
+    /// `basisu`, because version 0.1.0 depends on ruzstd 0.7, which does not limit the length of a block.
     fn inflated(&self) -> Result<Vec<u8>, String> {
         let error = |error: &dyn std::fmt::Display| format!("its Zstandard data cannot be decompressed: {error}");
         let window = (self.inflated as u64).next_power_of_two().max(WINDOW);

@@ -4,7 +4,7 @@ pub(super) const COORDINATES: (f64, f64) = (-FARTHEST, FARTHEST);
 /// Maximum absolute coordinate.
 pub(super) const FARTHEST: f64 = 1e9;
 pub(super) const LENGTHS: (f64, f64) = (1e-9, 1e9);
-/// Components of colors.
+/// Range of color components.
 pub(super) const COLORS: (f64, f64) = (0.0, BRIGHTEST);
 /// Maximum component of a color.
 pub(super) const BRIGHTEST: f64 = 1e6;
@@ -18,9 +18,9 @@ pub(super) const MOST: u32 = 65_536;
 pub(super) const MIN_ADAPTIVE_SAMPLES: u32 = 2;
 /// Maximum number of bounces of a path.
 pub(super) const DEEPEST: u32 = 1024;
-/// Maximum contributions of a sample.
+/// Range of the maximum contribution of a sample.
 pub(super) const CLAMPS: (f64, f64) = (1e-6, 1e6);
-/// Offsets of ray origins above a surface, relative to the largest coordinate there.
+/// Range of ray origin offsets above a surface, relative to the largest coordinate there.
 pub(super) const SHADOW_EPSILONS: (f64, f64) = (0.0, 0.1);
 /// Filter radii in pixels.
 pub(super) const FILTER_RADII: (f64, f64) = (0.01, 16.0);
@@ -38,9 +38,9 @@ pub(super) const BLADES: (u32, u32) = (3, 16);
 pub(super) const SHININESS: (f64, f64) = (1e-6, 1e6);
 /// Indices of refraction, relative to the medium in front of a surface.
 pub(super) const IORS: (f64, f64) = (0.01, DENSEST);
-/// Indices of refraction of principled materials, from that of a vacuum.
+/// Indices of refraction of principled materials, from the index of a vacuum up.
 pub(super) const PRINCIPLED_IORS: (f64, f64) = (1.0, DENSEST);
-/// Real and imaginary parts of the indices of metals.
+/// Ranges of the real and imaginary parts of the refractive indices of metals.
 pub(super) const ETAS: (f64, f64) = (0.001, DENSEST);
 pub(super) const KS: (f64, f64) = (0.0, DENSEST);
 /// Maximum index of refraction.

@@ -12,7 +12,7 @@ use crate::texture::{Color, NormalMap, Value};
 pub struct Material {
     /// Reflection and transmission.
     pub reflection: Reflection,
-    /// Emitted radiance, on both sides; black under [`Integrator::Phong`](crate::Integrator::Phong).
+    /// Radiance emitted on both sides; black with [`Integrator::Phong`](crate::Integrator::Phong).
     pub emission: Color,
     /// Normal map.
     pub normal_map: Option<NormalMap>,
@@ -39,14 +39,15 @@ pub enum Reflection {
         /// Factor of the reflected light.
         tint: Color,
     },
-    /// Clear glass, by the Fresnel equations.
+    /// Clear glass; reflection and transmission follow the Fresnel equations.
     Glass {
         /// Index of refraction on the side opposite to the outward normal, relative to the other side.
         ior: f64,
         /// Factor of the transmitted light, on entry and on exit.
         tint: Color,
     },
-    /// A diffuse surface; this and the following only for [`Integrator::Path`](crate::Integrator::Path).
+    /// A diffuse surface. This and the following variants are only valid for
+    /// [`Integrator::Path`](crate::Integrator::Path).
     Diffuse {
         /// Albedo, 0 to 1.
         color: Color,
@@ -55,20 +56,20 @@ pub enum Reflection {
     },
     /// Metal.
     Conductor {
-        /// Reflectance, 0 to 1; white with an index of refraction.
+        /// Reflectance, 0 to 1; white if `index` is set.
         color: Color,
-        /// Complex index of refraction; without it the reflectance does not depend on the angle.
+        /// Complex index of refraction. If `None`, the reflectance does not depend on the angle.
         index: Option<MetalIndex>,
         /// Roughness.
         facets: Facets,
     },
-    /// Clear glass or liquid, by the Fresnel equations.
+    /// Clear glass or liquid; reflection and transmission follow the Fresnel equations.
     Dielectric {
         /// Index of refraction on the side opposite to the outward normal, relative to the other side.
         ior: f64,
         /// Factor of the transmitted light, on entry and on exit, 0 to 1.
         color: Color,
-        /// Absorption coefficient x per unit of length: the transmittance over a length of 1 is exp(-x).
+        /// Absorption coefficient a per unit of length: the transmittance over a length of 1 is exp(-a).
         absorption: DVec3,
         /// True for a thin sheet with the same medium on both sides.
         thin: bool,
@@ -93,14 +94,14 @@ pub struct Principled {
     pub anisotropy: Value,
     /// Rotation of the tangent, counter-clockwise in radians.
     pub anisotropy_rotation: f64,
-    /// Index of the image of the unrotated tangent: red and green, 0 to 1 for -1 to 1, are its components along u and
-    /// v.
+    /// Index of the texture that contains the unrotated tangent: red and green, mapped from 0 ... 1 to -1 ... 1, are
+    /// the components along u and v.
     pub anisotropy_direction: Option<usize>,
     /// Index of refraction of the dielectric, 1 to 100.
     pub ior: f64,
     /// Factor of the dielectric's reflection.
     pub specular: Value,
-    /// Factor of that reflection at normal incidence.
+    /// Color factor of the dielectric's reflection at normal incidence.
     pub specular_color: Color,
     /// Fraction of the dielectric's light that is transmitted.
     pub transmission: Value,
@@ -122,7 +123,7 @@ pub struct Principled {
     pub alpha: Value,
     /// Effect of `alpha`.
     pub alpha_mode: AlphaMode,
-    /// Minimum alpha of opaque points, under [`AlphaMode::Mask`].
+    /// Minimum alpha of opaque points, with [`AlphaMode::Mask`].
     pub alpha_cutoff: f64,
     /// Use of a mesh's vertex colors.
     pub vertex_colors: VertexColors,
@@ -170,7 +171,8 @@ impl Material {
         colors.chain(values).chain(maps).chain(direction).collect()
     }
 
-    /// Returns true if anisotropy or a clear coat's normals need a tangent besides that of the normal map.
+    /// Returns true if anisotropy or the normal map of the clear coat needs a tangent in addition to the tangent of the
+    /// normal map.
     pub fn has_direction(&self) -> bool {
         match &self.reflection {
             Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,
@@ -212,9 +214,9 @@ pub struct Facets {
     pub roughness: Value,
     /// Increase of the roughness along the first axis, 0 to 1.
     pub anisotropy: f64,
-    /// Rotation of that axis from the direction of u towards that of v, in degrees.
+    /// Rotation of the first axis from the direction of u towards the direction of v, in degrees.
     pub rotation: f64,
-    /// Compensate the energy loss by multiple scattering between microfacets.
+    /// True to compensate the energy that single-scattering microfacets lose.
     pub compensated: bool,
 }
 

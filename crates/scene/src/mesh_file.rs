@@ -1,4 +1,4 @@
-//! Cache of the mesh files in use.
+//! Cache of the mesh files that are in use.
 
 use std::collections::HashMap;
 use std::fs;
@@ -20,16 +20,16 @@ struct Key {
 /// Length and modification time.
 type FileStamp = Option<(u64, SystemTime)>;
 
-/// A mesh, and the stamps of its MTL files.
+/// A mesh and the stamps of its MTL files.
 struct CachedMesh {
     mesh: Weak<Mesh>,
     libraries: Vec<FileStamp>,
 }
 
-/// Scenes that are reloaded in development mode reuse BVHs.
+/// The meshes in use. A scene that is reloaded in development mode thus reuses BVHs.
 static IN_USE: Mutex<Option<HashMap<Key, CachedMesh>>> = Mutex::new(None);
 
-/// Reads a mesh, unless it is in use and its files have not changed.
+/// Reads a mesh; returns the existing mesh if it is in use and its files have not changed.
 pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
     let Some(key) = key(path, normals) else {
         return Mesh::load(path, normals).map(Arc::new); // reports the error
@@ -37,7 +37,7 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
     if let Some(mesh) = known(&key) {
         return Ok(mesh);
     }
-    // Not under the lock: threads of the reader may be here for another scene.
+    // The lock is not held, because a thread of the reader may call this function for another scene.
     let read = Arc::new(Mesh::load(path, normals)?);
     let libraries = libraries(&read);
     if let Some(mesh) = known(&key) {
@@ -51,7 +51,7 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
     Ok(read)
 }
 
-/// Returns the mesh if in use and its MTL files have not changed.
+/// Returns the mesh if it is in use and its MTL files have not changed.
 fn known(key: &Key) -> Option<Arc<Mesh>> {
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     let in_use = in_use.get_or_insert_default();
@@ -93,7 +93,7 @@ mod tests {
         fs::write(&path, SMALL).unwrap();
         let first = load(&path, None).unwrap();
         assert!(Arc::ptr_eq(&first, &load(&path, None).unwrap()));
-        // Other normals: another mesh.
+        // Other normals require a different mesh.
         let flat = load(&path, Some(Normals::Flat)).unwrap();
         assert!(!Arc::ptr_eq(&first, &flat));
         let smooth = load(&path, Some(Normals::Smooth)).unwrap();
@@ -143,7 +143,7 @@ mod tests {
         fs::write(&path, format!("{SMALL}v 0 0 1\nf 1 2 4\n")).unwrap();
         let second = load(&path, None).unwrap();
         assert_eq!((first.triangles.len(), second.triangles.len()), (1, 2));
-        // The same length at another time.
+        // Same length, different modification time.
         fs::write(&path, format!("{SMALL}v 0 0 5\nf 1 2 4\n")).unwrap();
         let file = fs::File::options().write(true).open(&path).unwrap();
         file.set_modified(SystemTime::now() + std::time::Duration::from_secs(5))
@@ -151,7 +151,7 @@ mod tests {
         let third = load(&path, None).unwrap();
         assert_eq!(third.positions[3].z, 5.0);
         assert_eq!(second.positions[3].z, 1.0);
-        // An error even if in use.
+        // An invalid file is an error even if the mesh is in use.
         fs::write(&path, "v 0 0 0\n").unwrap();
         assert!(load(&path, None).is_err());
         fs::remove_file(&path).unwrap();

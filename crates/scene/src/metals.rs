@@ -15,9 +15,9 @@ pub struct MetalIndex {
 type Entry = (&'static str, [f64; 3], [f64; 3]);
 
 /// The spectra in the tables of luxpop.com and of E. D. Palik, "Handbook of Optical Constants of Solids", 1985,
-/// weighted by the color matching functions (CIE 1931, primaries of sRGB) and normalized: a constant spectrum keeps its
-/// value. For example, gold reflects (0.97, 0.80, 0.32) at normal incidence. `benches/peers/metals.py` prints this
-/// table.
+/// weighted by the color matching functions (CIE 1931, primaries of sRGB) and normalized such that a constant spectrum
+/// keeps its value. For example, gold reflects (0.97, 0.80, 0.32) at normal incidence. `benches/peers/metals.py` prints
+/// this table.
 const METALS: &[Entry] = &[
     ("aluminium", [1.6575, 0.8804, 0.5212], [9.2238, 6.2695, 4.837]),
     ("beryllium", [4.185, 3.185, 2.7841], [3.8355, 3.0101, 2.869]),

@@ -7,16 +7,16 @@ use std::fmt;
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub struct Note {
-    /// The file by the name that the scene has for it; `None` for the file that was loaded.
+    /// The name by which the scene refers to the file; `None` for the loaded file itself.
     pub file: Option<String>,
-    /// The line of that file, counted from 1.
+    /// The line in this file, counted from 1.
     pub line: Option<usize>,
     /// The message.
     pub message: String,
 }
 
 impl Note {
-    /// Returns the note about a file that the loaded one names.
+    /// Turns the note into one about `file`, which the loaded file refers to.
     pub(crate) fn in_file(self, file: &str) -> Note {
         Note {
             file: Some(file.to_owned()),
@@ -24,7 +24,7 @@ impl Note {
         }
     }
 
-    /// Returns the note of a scene that consists of the file of this name.
+    /// Removes the name of the file if it is `name`, the file that was loaded.
     pub(crate) fn of_loaded(mut self, name: &str) -> Note {
         self.file = self.file.filter(|file| file != name);
         self

@@ -1,4 +1,4 @@
-//! Options for a model file that is rendered without a scene: what points up, the automatic camera, and a ground.
+//! Options for a model file that is rendered without a scene: the up axis, the automatic camera, and a ground.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,14 +11,15 @@ use super::{
     View,
 };
 
-/// The fields of view that the automatic camera may have, in degrees.
+/// Range of the automatic camera's field of view, in degrees.
 const FOVS: (f64, f64) = (1.0, 170.0);
 const GROUND: &str = "ground";
-/// The share of light that the ground reflects.
+/// The albedo of the ground.
 const GRAY: [f64; 3] = [0.5; 3];
-/// The radius of the ground, relative to the diagonal of the model's bounds; holds the shadows of low lights.
+/// The radius of the ground, relative to the diagonal of the model's bounds. Large enough for the shadows of low
+/// lights.
 const RADIUS: f64 = 5.0;
-/// The gap above the ground, relative to that diagonal: no face coincides with it.
+/// The gap between ground and model, relative to the same diagonal, so that no face coincides with the ground.
 const GAP: f64 = 1e-4;
 
 /// Options for a model file without a scene.
@@ -26,9 +27,9 @@ const GAP: f64 = 1e-4;
 pub struct Presentation {
     /// The vertical field of view of the automatic camera, from 1 to 170 degrees.
     pub fov: Option<f64>,
-    /// The direction that the automatic camera looks from, in place of a [`View`].
+    /// The direction from which the automatic camera looks, instead of a [`View`].
     pub orbit: Option<Orbit>,
-    /// The axis of the file that points up, in place of the one that its format defines.
+    /// The up axis of the file, instead of the axis that the file format defines.
     pub up: Option<UpAxis>,
     /// True to put a disk below the model.
     pub ground: bool,
@@ -65,7 +66,7 @@ impl Presentation {
         })
     }
 
-    /// Adds the ground below these points, if it is asked for.
+    /// Adds the ground below these points, if requested.
     pub(super) fn add_ground(&self, description: &mut Description, points: &[DVec3]) {
         if !self.ground {
             return;
@@ -104,7 +105,7 @@ impl Scene {
         self.shapes.iter().position(|shape| is_ground(shape.material))
     }
 
-    /// Copies the ground from another frame, so that it stands still while the model moves.
+    /// Copies the ground from another frame, so that it does not move while the model is animated.
     pub fn keep_ground(&mut self, before: &Scene) {
         if let (Some(now), Some(then)) = (self.ground(), before.ground()) {
             self.shapes[now].geometry = before.shapes[then].geometry.clone();
@@ -112,7 +113,7 @@ impl Scene {
     }
 }
 
-/// An axis of a model file, in one of its two directions.
+/// A coordinate axis of a model file, in its positive or negative direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UpAxis {
     /// 0 is x, 1 is y, 2 is z.
@@ -121,8 +122,8 @@ pub struct UpAxis {
 }
 
 impl UpAxis {
-    /// Returns the rotation of this axis to +z, unless it is +z; `to_scene` maps directions of the file to the scene.
-    /// -z is rotated about the axis from front to back.
+    /// Returns the rotation that maps this axis to +z; `None` if the axis is +z. `to_scene` maps directions of the file
+    /// to the scene. -z is rotated about the axis from front to back.
     pub(super) fn rotation(self, to_scene: impl Fn(DVec3) -> DVec3) -> Option<(Rotation, DMat3)> {
         let sign = if self.is_negative { -1.0 } else { 1.0 };
         let up = to_scene(DVec3::AXES[self.axis] * sign);

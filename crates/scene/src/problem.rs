@@ -1,4 +1,4 @@
-//! Values that break a rule, each with its key path.
+//! Violations of rules by values, each with the key path of the value.
 
 use std::fmt;
 
@@ -21,7 +21,7 @@ pub struct ErrorPlace {
 /// Maximum length of a message, in characters.
 const MAX_MESSAGE_LEN: usize = 1000;
 
-/// A value that breaks a rule: `shapes[2].size: -1 must be finite and greater than 0`.
+/// A value that violates a rule: `shapes[2].size: -1 must be finite and greater than 0`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Problem {
@@ -82,7 +82,8 @@ impl Problem {
     }
 }
 
-/// Maximum number of reported problems, also per section, as the order of sections in the file is unknown.
+/// Maximum number of reported problems. Also applies to each section, because the order of the sections in the file is
+/// unknown.
 pub(crate) const MAX_PROBLEMS: usize = 20;
 
 /// The problems of a description: at least one.
@@ -121,7 +122,7 @@ impl Problems {
         self.others.len() + 1 >= MAX_PROBLEMS
     }
 
-    /// Adds a problem, or only counts it if there are enough.
+    /// Adds a problem; if the maximum is reached, only counts it.
     pub fn add(&mut self, problem: Problem) {
         match self.others.len() + 1 < MAX_PROBLEMS {
             true => self.others.push(problem),
@@ -152,7 +153,7 @@ impl Problems {
 pub struct Collector(Option<Problems>);
 
 impl Collector {
-    /// Returns a value, or `None` and keeps its problem.
+    /// Returns the value; on failure, collects the problem and returns `None`.
     pub fn value<T>(&mut self, checked: Result<T, Problem>) -> Option<T> {
         let add = |problem| match &mut self.0 {
             Some(problems) => problems.add(problem),
@@ -161,7 +162,7 @@ impl Collector {
         checked.map_err(add).ok()
     }
 
-    /// Returns a value, or `None` and keeps its problems.
+    /// Returns the value; on failure, collects the problems and returns `None`.
     pub fn values<T>(&mut self, checked: Result<T, Problems>) -> Option<T> {
         let add = |found: Problems| match &mut self.0 {
             Some(problems) => {
@@ -175,12 +176,13 @@ impl Collector {
         checked.map_err(add).ok()
     }
 
-    /// Returns a value, or an unused default: [`Collector::end`] returns the problem.
+    /// Returns the value; on failure, collects the problem, which [`Collector::end`] returns, and returns a default
+    /// that is never used.
     pub fn or_default<T: Default>(&mut self, checked: Result<T, Problem>) -> T {
         self.value(checked).unwrap_or_default()
     }
 
-    /// Returns a value if there are no problems.
+    /// Returns the value if no problems were collected.
     pub fn end<T>(self, value: T) -> Result<T, Problems> {
         match self.0 {
             None => Ok(value),

@@ -12,7 +12,7 @@ impl Description {
     ///
     /// # Errors
     ///
-    /// Invalid TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
+    /// The text is invalid TOML or JSON, has unknown or missing keys, unknown types, or values of the wrong type.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
         Description::parse_with(text, origin, &mut Defines::new(&[]))
     }

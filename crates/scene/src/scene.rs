@@ -28,17 +28,19 @@ pub struct Scene {
     pub view: ViewSettings,
     /// The camera.
     pub camera: Camera,
-    /// Animation of the camera; [`Scene::camera_at`] evaluates it at a frame.
+    /// Animation of the camera, evaluated by [`Scene::camera_at`].
     pub camera_path: Option<CameraPath>,
     /// Render settings.
     pub render: Render,
-    /// Textures, to which materials refer by index: of the scene file by name, then of MTL files.
+    /// Textures, to which materials refer by index: first the textures of the scene file, sorted by name, then the
+    /// textures of MTL files.
     pub textures: Vec<Texture>,
-    /// Materials, to which shapes refer by index: of the scene file by name, then of MTL files.
+    /// Materials, to which shapes refer by index: first the materials of the scene file, sorted by name, then the
+    /// materials of MTL files.
     pub materials: Vec<Material>,
     /// Names of the materials.
     pub material_names: Vec<String>,
-    /// The environment, if it emits light; `None` under [`Integrator::Phong`].
+    /// The environment, if it emits light; `None` with [`Integrator::Phong`].
     pub environment: Option<Environment>,
     /// Lights, in file order.
     pub lights: Vec<Light>,
@@ -46,7 +48,7 @@ pub struct Scene {
     pub shapes: Vec<Shape>,
     /// Number of instances, at the end of the shapes.
     pub instances: usize,
-    /// All files of the scene, sorted: images, meshes and the files that these name.
+    /// All files of the scene, sorted: images, meshes, and the files that these refer to.
     pub files: Vec<PathBuf>,
     /// Warnings: `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
@@ -84,7 +86,7 @@ pub struct Lens {
     pub focus: f64,
     /// Number of corners of the aperture, 3 to 16; 0 if it is round.
     pub blades: u32,
-    /// Rotation of the corners in radians, counter-clockwise in the image. At 0, one is at the top.
+    /// Rotation of the corners in radians, counter-clockwise in the image. At 0, a corner is at the top.
     pub rotation: f64,
 }
 
@@ -111,16 +113,16 @@ pub enum Projection {
 pub struct Render {
     /// Light transport algorithm.
     pub integrator: Integrator,
-    /// Ambient light of Phong materials; black under [`Integrator::Path`].
+    /// Ambient light of Phong materials; black with [`Integrator::Path`].
     pub ambient: DVec3,
-    /// Radiance of rays that leave the scene; under [`Integrator::Path`], that of the environment.
+    /// Radiance of rays that leave the scene; with [`Integrator::Path`], the radiance of the environment.
     pub background: DVec3,
     /// Minimum offset of ray origins above a surface, relative to the largest coordinate there.
     pub shadow_epsilon: f64,
-    /// Shadows of glass; [`Shadows::Opaque`] under [`Integrator::Path`].
+    /// Shadows of glass; always [`Shadows::Opaque`] with [`Integrator::Path`].
     pub shadows: Shadows,
-    /// Maximum number of bounces: under [`Integrator::Phong`], by mirrors and glass, 1 to 64; under
-    /// [`Integrator::Path`], all, 0 to 1024: 0 is emission only, 1 adds direct light.
+    /// Maximum number of bounces. With [`Integrator::Phong`], 1 to 64, and only bounces at mirrors and glass count.
+    /// With [`Integrator::Path`], 0 to 1024: 0 is emission only, 1 adds direct light.
     pub max_depth: u32,
     /// First bounce with Russian roulette, 0 to 1024; only for [`Integrator::Path`].
     pub rr_depth: u32,
@@ -129,17 +131,17 @@ pub struct Render {
     pub clamp: Option<f64>,
     /// Transparent background; only for [`Integrator::Path`].
     pub alpha: bool,
-    /// Filter textures over the footprint of each ray, instead of sampling them at a point.
+    /// Filter textures over the footprint of each ray, instead of evaluating them at a point.
     pub ray_differentials: bool,
     /// Seed of all random patterns.
     pub seed: u32,
     /// Samples per pixel.
     pub pixel_samples: Samples,
-    /// Samples per area light and hit; unused under [`Integrator::Path`].
+    /// Samples per area light and hit; unused with [`Integrator::Path`].
     pub light_samples: Samples,
     /// Reconstruction filter.
     pub filter: PixelFilter,
-    /// Adaptive sampling; `pixel_samples` are then those of one round.
+    /// Adaptive sampling; `pixel_samples` is then the number of samples per round.
     pub adaptive: Option<Adaptive>,
 }
 
@@ -177,13 +179,13 @@ pub struct PixelFilter {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Environment {
-    /// Constant radiance; black with an image.
+    /// Constant radiance; black if `image` is set.
     pub color: DVec3,
     /// Environment map.
     pub image: Option<EnvironmentImage>,
     /// Visible to the camera. Reflections and refractions show it in either case.
     pub visible: bool,
-    /// Radiance that the camera sees instead.
+    /// Radiance that the camera sees instead of the environment.
     pub background: Option<DVec3>,
 }
 
@@ -203,12 +205,13 @@ pub struct EnvironmentImage {
 /// A light source.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
-    /// An area light. Under [`Integrator::Phong`] it emits from both sides, casts no shadow, and shows its plain color.
-    /// Under [`Integrator::Path`] it emits along its normal, u x v, and occludes.
+    /// An area light. With [`Integrator::Phong`], the light emits from both sides, does not cast shadows, and is
+    /// displayed in its plain color. With [`Integrator::Path`], it emits along its normal, u x v, and occludes other
+    /// lights.
     Rectangle {
         /// Position and size.
         rectangle: Parallelogram,
-        /// Color; under [`Integrator::Path`], the radiance.
+        /// Color; with [`Integrator::Path`], the radiance.
         color: DVec3,
         /// Visible to the camera; always visible to mirrors.
         visible: bool,
@@ -217,15 +220,15 @@ pub enum Light {
     Point {
         /// Position.
         position: DVec3,
-        /// Color. Under [`Integrator::Path`], the intensity (power per unit solid angle) with inverse-square falloff;
-        /// otherwise without falloff.
+        /// Color. With [`Integrator::Path`], the intensity (power per unit solid angle) with inverse-square falloff;
+        /// otherwise, there is no falloff.
         color: DVec3,
     },
     /// A directional light, invisible to the camera.
     Directional {
         /// Unit vector of propagation.
         direction: DVec3,
-        /// Color; under [`Integrator::Path`], the irradiance of a perpendicular surface.
+        /// Color; with [`Integrator::Path`], the irradiance on a perpendicular surface.
         color: DVec3,
     },
     /// A spot light, invisible to the camera.
@@ -234,7 +237,7 @@ pub enum Light {
         position: DVec3,
         /// Unit vector of the axis, away from the light.
         direction: DVec3,
-        /// Color on the axis, like that of a point light.
+        /// Color on the axis, with the same meaning as for a point light.
         color: DVec3,
         /// Angle between axis and edge of the cone in radians, in (0, pi].
         cone: f64,

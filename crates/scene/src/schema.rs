@@ -14,8 +14,8 @@ use super::{CameraDescription, Description};
 
 /// Returns a JSON Schema (draft 2020-12) of scene files in TOML, for completion and validation in editors.
 ///
-/// All files that it rejects are invalid. It omits rules for several values together, such as a camera that looks at
-/// itself, and for targets of names.
+/// All files that the schema rejects are invalid. The schema does not include rules that involve several values, such
+/// as a camera whose `look_at` is its position, nor rules about references to names.
 pub fn schema() -> String {
     let mut schema = of_files();
     without_kinds(&mut schema);
@@ -25,7 +25,7 @@ pub fn schema() -> String {
 }
 
 fn of_files() -> Value {
-    // Inlined, because editors ignore descriptions next to a reference.
+    // Subschemas are inlined, because editors ignore descriptions next to a reference.
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings
         .into_generator()
@@ -36,7 +36,7 @@ fn of_files() -> Value {
     schema
 }
 
-/// Removes the kinds, which descriptions contain.
+/// Removes the kinds, because the descriptions contain them.
 fn without_kinds(schema: &mut Value) {
     match schema {
         Value::Array(all) => all.iter_mut().for_each(without_kinds),
@@ -48,7 +48,7 @@ fn without_kinds(schema: &mut Value) {
     }
 }
 
-/// Without `type` a camera is perspective, and required keys may be in the keys of its path.
+/// If a camera has no `type`, it is perspective. Required keys may be in the keys of the camera's path.
 fn of_camera(schema: &mut Value) {
     let camera = &mut schema["properties"]["camera"];
     camera["properties"]["type"]["default"] = json!(CameraDescription::DEFAULT);
@@ -73,7 +73,7 @@ fn of_camera(schema: &mut Value) {
     }
 }
 
-/// Adds kinds, ranges and defaults to all descriptions, and removes what TOML lacks and formats of Rust.
+/// Adds kinds, ranges and defaults to all descriptions. Removes what TOML does not support, and formats of Rust.
 fn finish(schema: &mut Value) {
     match schema {
         Value::Array(all) => all.iter_mut().for_each(finish),
@@ -99,7 +99,7 @@ fn finish(schema: &mut Value) {
     }
 }
 
-/// Removes null, which TOML lacks.
+/// Removes null, which TOML does not support.
 fn without_null(schema: &mut Value) {
     let null = json!("null");
     let types = schema.get_mut("type");
@@ -131,7 +131,7 @@ fn without_null(schema: &mut Value) {
     }
 }
 
-/// Converts described names to a list, which all editors support.
+/// Converts alternatives with descriptions to a list of names, which all editors support.
 fn names(schema: &mut Value) {
     let Some(all) = schema.as_object_mut() else { return };
     let Some(Value::Array(list)) = all.get("oneOf") else {
@@ -178,7 +178,7 @@ fn append_kind(schema: &mut Value) {
     }
 }
 
-/// Maximum number of keys of a table that is shown as a default.
+/// Maximum number of keys of a table that is displayed as a default.
 const MAX_SHOWN_KEYS: usize = 3;
 
 fn append_default(property: &mut Value) {

@@ -1,10 +1,11 @@
-//! The environment `sky`: an analytic clear sky with a sun, by single scattering in a flat atmosphere.
+//! The environment `sky`: an analytic clear sky with a sun, computed with single scattering in a flat atmosphere.
 //!
 //! Extinction is by molecules (Hansen and Travis, "Light Scattering in Planetary Atmospheres", Space Science Reviews
 //! 16, 1974, equation 2.30) and by haze (Ångström's formula, with the turbidity as in Preetham, Shirley and Smits, "A
 //! Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix A.1). The air mass is by Kasten and Young, "Revised
 //! Optical Air Mass Tables and Approximation Formula", Applied Optics 28, 1989. A fixed fraction of the scattered
-//! sunlight comes down; what single scattering lacks of it is added in proportion to the opacity of the air.
+//! sunlight reaches the ground. Single scattering yields less; the difference is added to the sky in proportion to the
+//! opacity of the air.
 
 use std::f64::consts::{PI, TAU};
 
@@ -24,11 +25,11 @@ const SUN_RADIUS: f64 = 0.2666 * PI / 180.0;
 /// Single-scattering albedo of haze, and its asymmetry g (Henyey-Greenstein).
 const HAZE_ALBEDO: f64 = 0.9;
 const HAZE_FORWARD: f64 = 0.75;
-/// Fractions of scattered light that come down from molecules, and from haze, which scatters forwards.
+/// Fractions of the scattered light that reach the ground: for molecules, and for haze, which scatters forwards.
 const MOLECULES_DOWN: f64 = 0.5;
 const HAZE_DOWN: f64 = 0.8;
 const GROUND: f64 = 0.25;
-/// Sample points along each side of a texel, for the part that the sun covers.
+/// Number of sample points along each side of a texel, used to estimate the fraction that the sun covers.
 const POINTS: usize = 8;
 
 /// Parameters of a sky; angles in radians.
@@ -49,7 +50,7 @@ pub fn sky(sky: &Sky) -> Image {
     let azimuths: Vec<(f64, f64)> = (0..WIDTH)
         .map(|column| azimuth(column as f64 + 0.5).sin_cos())
         .collect();
-    // Irradiance of the ground by single scattering, and by the added light at unit scale.
+    // Irradiance on the ground from single scattering, and from the added light at unit scale.
     let (mut once, mut added) = (DVec3::ZERO, DVec3::ZERO);
     for row in &rows {
         let angle = TAU / WIDTH as f64 * ROW * row.sine * row.cosine;
@@ -97,7 +98,7 @@ struct Air {
     sun_mass: f64,
     /// Transmittance towards the sun.
     through: DVec3,
-    /// Vertical optical depth, and its scattering parts by molecules and haze.
+    /// Vertical optical depth, and the parts of it that are scattering by molecules and by haze.
     depth: DVec3,
     molecules: DVec3,
     haze: DVec3,
@@ -146,8 +147,8 @@ impl Air {
         }
     }
 
-    /// Returns the radiance by single scattering. Sunlight reaches the vertical optical depth t over t times its air
-    /// mass; scattered light passes the rest times the ray's.
+    /// Returns the radiance by single scattering. Sunlight that reaches the vertical optical depth t has passed t times
+    /// the sun's air mass; scattered light then passes the remaining depth times the ray's air mass.
     fn scattered_once(&self, row: &Row, direction: DVec3) -> DVec3 {
         let cosine = direction.dot(self.sun);
         let g = HAZE_FORWARD;
@@ -215,7 +216,8 @@ mod tests {
         }
     }
 
-    /// Returns a texel's solid angle. At a pole it is a twelfth larger: the radiance is constant up to the pole.
+    /// Returns the solid angle of a texel. At a pole, it is larger by a twelfth, because the radiance is constant up to
+    /// the pole.
     fn stands_for(row: usize) -> f64 {
         let square = ((row as f64 + 0.5) * ROW).sin() * ROW * TAU / WIDTH as f64;
         if row == 0 || row == HEIGHT - 1 {
@@ -238,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn skies_at_the_ends_of_their_ranges_are_made_of_light() {
+    fn skies_are_valid_at_the_ends_of_the_parameter_ranges() {
         for elevation in [0.0, 1e-3, 30.0, 90.0] {
             for turbidity in [1.0, 3.0, 10.0] {
                 let image = sky(&Sky {
@@ -261,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sun_stands_where_it_was_asked_for() {
+    fn the_sun_has_the_requested_direction_and_irradiance() {
         for (elevation, azimuth) in [(0.3, 0.0), (0.7, 2.0), (1.5, -1.0), (PI / 2.0, 1.0)] {
             let asked = Sky {
                 elevation,

@@ -1,11 +1,11 @@
-//! Interpolation between keys, linear or C1-continuous. Only sums, products and quotients of 64-bit floats: the same
-//! bits on all machines.
+//! Interpolation between keys, linear or C1-continuous. Uses only sums, products and quotients of 64-bit floats, so
+//! that the bits are equal on all machines.
 
 use std::ops::{Add, Mul, Sub};
 
 use super::Interpolation;
 
-/// A value of keys: a number or a point.
+/// A value that keys can have: a number or a point.
 pub trait Point:
     Copy + PartialEq + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
 {
@@ -16,7 +16,8 @@ impl<T: Copy + PartialEq + Default + Add<Output = T> + Sub<Output = T> + Mul<f64
 /// Time and value.
 pub type Key<T> = (f64, T);
 
-/// Interpolates keys with ascending times; `None` without keys. Exact at keys; outside, that of the nearest key.
+/// Interpolates keys with ascending times; `None` if there are no keys. The value is exact at keys; before the first
+/// and after the last key, it is constant.
 pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -> Option<T> {
     let next = keys.partition_point(|(time, _)| *time <= at);
     let (Some(&a), Some(&b)) = (
@@ -34,14 +35,14 @@ pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -
         Interpolation::Linear => return Some(a.1 + step * s),
         Interpolation::Smooth => (slope(keys, next - 1), slope(keys, next)),
     };
-    // Cubic Hermite segment: smoothstep between the values plus the slopes' contribution.
+    // Cubic Hermite segment: smoothstep between the values, plus the contribution of the slopes.
     let rest = 1.0 - s;
     Some(a.1 + step * (s * s * (3.0 - 2.0 * s)) + (start * rest - end * s) * (span * s * rest))
 }
 
 /// Returns the derivative of the smooth curve at a key: the secant of its neighbors (E. Catmull and R. Rom, "A Class of
 /// Local Interpolating Splines", 1974, generalized to non-uniform times). At the ends, the slope makes the segment a
-/// parabola. 0 next to an equal value: nothing moves between equal keys.
+/// parabola. Next to a key with an equal value, the slope is 0, so that the value is constant between equal keys.
 fn slope<T: Point>(keys: &[Key<T>], i: usize) -> T {
     let before = i.checked_sub(1).and_then(|i| keys.get(i));
     let after = keys.get(i + 1);
@@ -53,7 +54,7 @@ fn slope<T: Point>(keys: &[Key<T>], i: usize) -> T {
     }
     match (before, after) {
         (Some(before), Some(after)) => secant(before, after),
-        // The mean slope of a parabola between two points is the mean of the slopes there.
+        // The mean slope of a parabola between two points is the mean of the slopes at these points.
         (None, Some(after)) if keys.len() > 2 => secant(key, after) * 2.0 - slope(keys, i + 1),
         (Some(before), None) if keys.len() > 2 => secant(before, key) * 2.0 - slope(keys, i - 1),
         (None, Some(after)) => secant(key, after),
@@ -88,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_met_and_held() {
+    fn values_are_exact_at_keys_and_constant_outside() {
         for kind in WAYS {
             for (time, wanted) in KEYS {
                 assert_eq!(value(&KEYS, time, kind), Some(wanted));
@@ -102,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_linear_way_is_straight() {
+    fn linear_interpolation_is_straight() {
         for (time, wanted) in [(-0.75, 1.0), (0.75, 0.75), (2.5, 2.25), (5.5, -0.25)] {
             assert_eq!(value(&KEYS, time, Interpolation::Linear), Some(wanted));
             assert_ne!(value(&KEYS, time, Interpolation::Smooth), Some(wanted));
@@ -115,7 +116,7 @@ mod tests {
 
     /// Uniform motion with uneven keys; free fall with even keys.
     #[test]
-    fn constant_speeds_and_accelerations_stay() {
+    fn constant_speeds_and_accelerations_are_reproduced() {
         let line = |t: f64| DVec3::new(3.0 - 2.0 * t, t, 0.5);
         let uneven = [0.0, 1.0, 1.5, 4.0, 9.0].map(|t| (t, line(t)));
         let fall = |t: f64| DVec3::new(t, 0.0, 7.0 - 4.9 * t * t);
@@ -137,10 +138,10 @@ mod tests {
         assert!(straightened > 1.0, "no linear way falls so");
     }
 
-    /// From SciPy 1.17: `CubicHermiteSpline(t, v, m)` with `m[1:-1] = (v[2:] - v[:-2]) / (t[2:] - t[:-2])`, and at the
-    /// ends twice the difference quotient minus the neighbor's `m`.
+    /// Computed with SciPy 1.17: `CubicHermiteSpline(t, v, m)` with `m[1:-1] = (v[2:] - v[:-2]) / (t[2:] - t[:-2])`,
+    /// and, at the ends, `m` is twice the difference quotient minus the neighbor's `m`.
     #[test]
-    fn a_smooth_way_is_that_of_another_implementation() {
+    fn smooth_interpolation_matches_scipy() {
         for (time, wanted) in [
             (-1.75, 2.2775),
             (-0.5, -0.26000000000000045),
@@ -167,14 +168,14 @@ mod tests {
     }
 
     #[test]
-    fn the_speed_of_a_smooth_way_does_not_jump() {
+    fn smooth_interpolation_has_continuous_speed() {
         let jumps = |kind| speeds(kind).into_iter().map(|(a, b)| (a - b).abs());
         assert!(jumps(Interpolation::Smooth).all(|jump| jump < 1e-3));
         assert!(jumps(Interpolation::Linear).all(|jump| jump > 1.0));
     }
 
     #[test]
-    fn between_keys_of_one_value_nothing_moves() {
+    fn the_value_is_constant_between_equal_keys() {
         let keys = [(0.0, 1.0), (4.0, 3.0), (6.0, 3.0), (9.0, -2.0)];
         for i in 0..=20 {
             assert_eq!(
@@ -182,7 +183,7 @@ mod tests {
                 Some(3.0)
             );
         }
-        // It does not overshoot before these keys either.
+        // The curve does not overshoot before these keys either.
         for i in 0..=40 {
             assert!(value(&keys, f64::from(i) / 10.0, Interpolation::Smooth).unwrap() <= 3.0);
         }

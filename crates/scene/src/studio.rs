@@ -14,18 +14,18 @@ const HEIGHT: usize = 512;
 const FLOOR: f64 = 0.08;
 const WALL: f64 = 0.14;
 const CEILING: f64 = 0.25;
-/// Width of an emitter's soft edge, relative to half of its side.
+/// Width of an emitter's soft edge, relative to half of the emitter's side.
 const EDGE: f64 = 0.15;
 
 /// A rectangular emitter at a distance of 1.
 struct Lamp {
     towards: DVec3,
-    /// Half of the width and of the height.
+    /// Half of the width, and half of the height.
     half: [f64; 2],
     radiance: f64,
 }
 
-/// For a view along +y: a key light on the left, a weaker fill light on the right, one above, and one behind.
+/// For a view along +y: a key light on the left, a weaker fill light on the right, a light above, and a light behind.
 const LAMPS: [Lamp; 4] = [
     Lamp {
         towards: DVec3::new(-0.75, -0.6, 0.65),
@@ -103,7 +103,7 @@ impl Lamp {
 }
 
 impl AreaLight {
-    /// Returns the coverage: 1 inside the emitter, 0 outside.
+    /// Returns the coverage of the emitter: 1 inside, 0 outside.
     fn share(&self, direction: DVec3) -> f64 {
         let ahead = direction.dot(self.axis);
         if ahead <= 0.0 {

@@ -5,13 +5,13 @@ use std::cell::Cell;
 use super::key_path::cut;
 use super::key_path::list;
 
-/// Maximum length in bytes of a compared name: comparing takes the product of both lengths.
+/// Maximum length in bytes of a compared name, because comparison time is proportional to the product of both lengths.
 const MAX_LEN: usize = 64;
 
 /// Minimum length in bytes of an abbreviation.
 const MIN_START_LEN: usize = 3;
 
-/// Returns the most similar name, if similar enough.
+/// Returns the most similar name, if it is similar enough.
 fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if wrong.len() > MAX_LEN {
         return None;
@@ -20,7 +20,7 @@ fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<
         let (a, b) = (wrong.to_lowercase(), name.to_lowercase());
         (strsim::damerau_levenshtein(&a, &b), name)
     });
-    // One edit for every three letters: "fovv" is like "fov", and "red" is not like "blue".
+    // One edit is allowed for every three letters: "fovv" is similar to "fov", but "red" is not similar to "blue".
     let limit = |name: &str| wrong.chars().count().max(name.chars().count()).div_ceil(3);
     let similar = similar.filter(|(edits, name)| {
         // "pos" is short for "position".
@@ -43,7 +43,7 @@ const MAX_SEARCHES: usize = 40;
 pub(super) struct Suggestions(Cell<usize>);
 
 impl Suggestions {
-    /// Returns the message about an unknown name; the first [`MAX_SEARCHES`] list the available ones.
+    /// Returns the message about an unknown name; the first [`MAX_SEARCHES`] messages list the available names.
     pub fn unknown<'a>(&self, kind: &str, wrong: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
         let searches = self.0.get();
         self.0.set(searches.saturating_add(1));
@@ -54,7 +54,7 @@ impl Suggestions {
     }
 }
 
-/// Returns the message about an unknown name, with the available ones.
+/// Returns the message about an unknown name, with a list of the available names.
 pub(super) fn unknown<'a>(kind: &str, wrong: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
     let instead = match hint(wrong, names.clone()) {
         hint if !hint.is_empty() => hint,
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_names_are_reported_with_what_exists() {
+    fn messages_about_unknown_names_list_the_available_names() {
         let of = |wrong, names: &[&'static str]| unknown("material", wrong, names.iter().copied());
         assert_eq!(of("a", &[]), "there is no material \"a\"; the scene has none");
         assert_eq!(

@@ -25,8 +25,8 @@ impl Color {
 pub enum Value {
     /// A constant.
     Plain(f64),
-    /// A channel of a texture: index into [`Scene::textures`](super::Scene::textures). [`Channel::A`] is the red
-    /// channel of a separate texture of the file's alpha.
+    /// A channel of a texture: index into [`Scene::textures`](super::Scene::textures). For [`Channel::A`], the texture
+    /// contains the alpha of the file in its red channel.
     Texture(usize, Channel),
 }
 
@@ -70,7 +70,7 @@ pub struct Texture {
 pub enum TextureKind {
     /// One colour.
     Constant(DVec3),
-    /// Squares of side 1. The square from (0, 0) to (1, 1) is even.
+    /// A checkerboard of squares with side 1. The square from (0, 0) to (1, 1) has the color `even`.
     Checker {
         /// Color where floor(u) + floor(v) is even.
         even: DVec3,
@@ -86,7 +86,7 @@ pub enum TextureKind {
         /// Width of the lines, in (0, 1).
         line_width: f64,
     },
-    /// An image in the square from (0, 0), its lower left corner, to (1, 1).
+    /// An image in the unit square; (0, 0) is the lower left corner.
     Image {
         /// The texels.
         image: Arc<Image>,
@@ -96,7 +96,7 @@ pub enum TextureKind {
         filter: TextureFilter,
         /// Maximum ratio of the axes of a footprint for [`TextureFilter::Ewa`], at least 1.
         max_anisotropy: f64,
-        /// Factor of the colors; equal components for an alpha texture.
+        /// Factor of the colors; its components are equal for an alpha texture.
         factor: DVec3,
     },
 }
@@ -146,7 +146,7 @@ pub enum Encoding {
     Linear,
 }
 
-/// An image, row by row from the top.
+/// An image in row-major order, top row first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// Texels per row, at least 1.
@@ -178,16 +178,16 @@ pub(super) fn levels(width: u32, height: u32) -> u32 {
     width.max(height).max(1).ilog2() + 1
 }
 
-/// Returns the size of mip levels and the table of their offsets in 32-bit words: one word per texel, or three for
-/// floats.
+/// Returns the size of the mip levels and of the table of their offsets, in 32-bit words: one word per texel, or three
+/// for floats.
 pub fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64 {
     let texel = if is_float { 3 } else { 1 };
     let sizes = (0..levels).map(|i| u64::from((width >> i).max(1)) * u64::from((height >> i).max(1)));
     u64::from(levels) + texel * sizes.sum::<u64>()
 }
 
-/// Returns the maximum size of an environment map in 32-bit words: three per texel with two additional rows, two per
-/// cell between texels, and the tables of blocks.
+/// Returns the maximum size of an environment map in 32-bit words: three per texel (including two additional rows), two
+/// per cell between texels, and the tables of blocks.
 pub(crate) fn words_around(width: u32, height: u32) -> u64 {
     const BLOCKS: u64 = 32 * 32 + 290 * 33 * 33;
     let (width, height) = (u64::from(width), u64::from(height));

@@ -9,8 +9,8 @@ use super::{CameraDescription, CameraKeyDescription, CameraPathDescription, Inte
 
 pub(super) const MAX_FRAMES: u32 = 100_000;
 
-/// Replaces a camera's path by an orbit around its target point, counter-clockwise as seen from `up`. Frame 1, and a
-/// frame after the last, is the original position. Each frame has a key, exactly on the circle.
+/// Replaces a camera's path by an orbit around its target point, counter-clockwise as seen from `up`. Frame 1, and the
+/// frame after the last, have the original position. Each frame has its own key so that it lies exactly on the circle.
 pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraDescription, Problem> {
     if !(1..=MAX_FRAMES).contains(&frames) {
         return Err(Problem::new(format!("{frames} must be from 1 to {MAX_FRAMES}")));

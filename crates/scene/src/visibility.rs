@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::{Bounds, Camera, Color, Geometry, Light, Projection, Reflection, Scene, Shape};
 
 impl Scene {
-    /// Returns warnings if the scene certainly has no light, or no geometry in view. Others may still render black:
-    /// occlusion and the reach of lights are not considered.
+    /// Returns warnings if the scene certainly has no light, or no geometry in view. Other scenes may still render
+    /// black, because occlusion and the range of lights are not considered.
     pub fn visibility_warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if !self.has_geometry_in_view() && !self.shows_environment_only() {
@@ -62,7 +62,7 @@ impl Scene {
         is_lit || self.has_emission()
     }
 
-    /// Returns true if the scene is an environment map only, perhaps intentionally.
+    /// Returns true if the scene consists only of an environment map, which may be intentional.
     fn shows_environment_only(&self) -> bool {
         let environment = self.environment.as_ref();
         self.shapes.is_empty() && environment.is_some_and(|environment| environment.image.is_some())
@@ -111,7 +111,7 @@ struct HalfSpace {
     offset: f64,
 }
 
-/// Half-spaces that hold everything a camera sees.
+/// Half-spaces whose intersection contains everything that a camera sees.
 struct Frustum {
     position: DVec3,
     sides: [HalfSpace; 5],
@@ -130,10 +130,11 @@ impl Frustum {
             ..
         } = scene.camera;
         let (width, height) = (f64::from(scene.width), f64::from(scene.height));
-        // The filter reaches beyond the image; one more pixel allows for rounding.
+        // The filter extends beyond the image; one more pixel allows for rounding errors.
         let margin = 2.0 * (scene.render.filter.radius + 1.0);
         let extents = |half: f64| (half * (width + margin) / height, half * (height + margin) / height);
-        // At depth d, a ray through a lens of radius r focused at f is at most r (1 + d / f) from the central ray.
+        // At depth d, a ray through a lens with radius r and focus distance f is at most r (1 + d / f) from the central
+        // ray.
         let (radius, spread) = lens.map_or((0.0, 0.0), |lens| (lens.radius, lens.radius / lens.focus));
         let ((x, y), is_perspective) = match projection {
             Projection::Perspective { fov } => (extents((fov / 2.0).tan()), true),

@@ -1,5 +1,5 @@
-//! Scenes as TOML in the form of a handwritten file: defaults are omitted, and file names are relative to the new
-//! folder.
+//! Writes scenes as TOML in the form of a handwritten file: defaults are omitted, and file names are relative to the
+//! new folder.
 
 use std::io;
 use std::path::{Component, Path};
@@ -17,7 +17,7 @@ impl Description {
     ///
     /// # Errors
     ///
-    /// Values that TOML does not support.
+    /// The description contains values that TOML does not support.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         let text = self.sections()?;
         match Description::parse(&text, "") {
@@ -68,11 +68,12 @@ impl Description {
         Ok(sections.join("\n"))
     }
 
-    /// Moves the scene to another folder: makes file names relative to it. Names without a file are unchanged.
+    /// Moves the scene to another folder by making file names relative to this folder. Names that do not refer to a
+    /// file are unchanged.
     ///
     /// # Errors
     ///
-    /// Folders that do not exist, and names that are not UTF-8.
+    /// A folder does not exist, or a name is not UTF-8.
     pub fn in_folder(mut self, before: &Path, folder: &Path) -> io::Result<Description> {
         let here = Path::new(".");
         let whole = |folder: &Path| if folder.as_os_str().is_empty() { here } else { folder }.canonicalize();
@@ -115,10 +116,10 @@ impl Description {
     }
 }
 
-/// First keys; others follow alphabetically.
+/// Keys that are written first; other keys follow in alphabetical order.
 const FIRST: [&str; 5] = ["type", "file", "width", "position", "integrator"];
 
-/// Omits defaults.
+/// Writes a section without values that equal the defaults.
 fn section(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
     written(&format!("[{name}]\n"), name, value, defaults, Value::Table)
 }
@@ -147,7 +148,7 @@ fn written(
     Ok(text + rest.strip_prefix(head).unwrap_or(&rest))
 }
 
-/// Returns the relative path of a file from a folder, both canonical.
+/// Returns the path of a file relative to a folder; both paths are canonical.
 fn from(folder: &Path, path: &Path) -> Option<String> {
     let (folder, path): (Vec<_>, Vec<_>) = (folder.components().collect(), path.components().collect());
     let same = folder.iter().zip(&path).take_while(|(a, b)| a == b).count();
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gltf_file_is_a_few_lines() {
+    fn a_gltf_scene_is_written_in_a_few_lines() {
         let camera = crate::PerspectiveDescription::new([0.1, -5.0, 1e-7], [0.0; 3], 35.0);
         let description = Description::new(1024, 512, camera)
             .with_environment(super::super::EnvironmentDescription::named(

@@ -1,11 +1,11 @@
-//! Measurement of a layer by all requested metrics.
+//! Measures a layer with all requested metrics.
 
 use wgray_image::compare::{self, COLOR, Flip, Layer, Picture};
 
 use super::metric::Metric;
 use super::report::{LayerReport, Number};
 
-/// Returns the report, and the error map if FLIP is requested and `step` given.
+/// Returns the report, and the error map if FLIP is requested and `step` is given.
 pub fn measure(
     layer: &Layer,
     a: &Picture,

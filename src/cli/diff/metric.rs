@@ -14,7 +14,7 @@ pub enum Metric {
     Flip,
 }
 
-/// In the order of printing.
+/// All metrics, in the order in which they are printed.
 pub const METRICS: [Metric; 8] = [
     Metric::Different,
     Metric::Largest,
@@ -55,7 +55,7 @@ impl Metric {
         matches!(self, Metric::Psnr | Metric::Ssim)
     }
 
-    /// Minimum, maximum, and rule for messages.
+    /// Returns the minimum, the maximum, and the rule for messages.
     fn range(self) -> (f64, f64, &'static str) {
         match self {
             Metric::Different | Metric::Largest | Metric::Rmse | Metric::RelMse => (0.0, f64::MAX, "of at least 0"),
@@ -72,7 +72,7 @@ impl fmt::Display for Metric {
     }
 }
 
-/// Worse values fail.
+/// A limit of a metric; the comparison fails if the value is worse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
     pub metric: Metric,
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_as_good_as_the_limit_passes_and_no_number_does_not() {
+    fn values_equal_to_the_limit_pass_and_nan_fails() {
         let limit = |text| Limit::parse(text).unwrap();
         assert_eq!(limit("rmse=0.5").exceeded(0.5), None);
         assert_eq!(limit("rmse=0.5").exceeded(0.500_000_1), Some("above"));

@@ -130,7 +130,7 @@ impl fmt::Display for NotFinite {
     }
 }
 
-/// A number. JSON has no infinite numbers, which become strings.
+/// A number. Infinite numbers become strings in JSON, which cannot represent them.
 #[derive(Clone, Copy, Debug)]
 pub struct Number(pub f64);
 
@@ -144,13 +144,13 @@ impl Serialize for Number {
 }
 
 impl fmt::Display for Number {
-    /// Formats with six significant digits; integers in full.
+    /// Formats the number with six significant digits, and integers with all digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let size = self.0.abs();
         if size == 0.0 || !size.is_finite() {
             return write!(f, "{}", self.0);
         }
-        // Shape numbers go up to 2^32 - 1, the background.
+        // Shape numbers are integers up to 2^32 - 1, which stands for the background.
         let is_whole = size.fract() == 0.0 && size < 1e15;
         let text = if (1e-4..1e9).contains(&size) || is_whole {
             let decimals = (5 - size.log10().floor() as i32).max(0) as usize;
@@ -242,7 +242,7 @@ impl Report {
     }
 
     /// Collects the reasons for failing: different sizes, positions or channels, non-finite values, and values beyond a
-    /// limit, or any difference without limits.
+    /// limit. If there are no limits, any difference is a reason.
     pub fn judge(&mut self, limits: &[Limit], threshold: f64) {
         let mut fails = Vec::new();
         let (a, b) = (self.size_a, self.size_b);

@@ -46,12 +46,12 @@ pub struct Picture {
     pub integrator: &'static str,
     pub pixel_pattern: &'static str,
     pub pixel_samples: u32,
-    /// Differs from `pixel_samples` under adaptive sampling.
+    /// Differs from `pixel_samples` if sampling is adaptive.
     pub max_samples: u32,
     /// The former name of `max_samples`, until 0.3.
     #[serde(rename = "most_samples")]
     old_max_samples: u32,
-    /// Light samples per hit, over all lights.
+    /// Light samples per hit, summed over all lights.
     pub light_samples: u64,
     pub max_depth: u32,
     pub seed: u32,
@@ -106,7 +106,7 @@ pub struct Shapes {
     old_instanced_triangles: u64,
     /// Triangles of all mesh instances, triangle shapes and tetrahedra.
     pub triangles: u64,
-    /// Outside of meshes: shapes (a tetrahedron counts as four triangles) and area lights.
+    /// Primitives that are not part of meshes: shapes (a tetrahedron counts as four triangles) and area lights.
     pub primitives: u64,
 }
 
@@ -132,7 +132,7 @@ pub struct Lights {
 
 #[derive(Debug, Serialize)]
 pub struct Memory {
-    /// Total of the packed scene and the largest film.
+    /// Sum of the packed scene and the largest film.
     pub total: u64,
     /// The packed scene, which includes BVHs and texels.
     pub scene: u64,

@@ -2,7 +2,7 @@
 
 use wgray_render::records::{BACKGROUND, LOBE_ANISOTROPY, LOBES, Packed, Specialization};
 
-/// Returns all kernel features, and whether the scene uses them.
+/// Returns each kernel feature, and whether the scene uses the feature.
 pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
     let Specialization {
         tlas_kinds,

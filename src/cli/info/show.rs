@@ -1,4 +1,4 @@
-//! The text of `wgray info`: a table with a row for each topic.
+//! The text of `wgray info`: a table with one row per topic.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ const MAX_LISTED: usize = 20;
 struct Table(String);
 
 impl Table {
-    /// Adds a row; an empty name continues the row above.
+    /// Adds a row; with an empty name, the row continues the previous row.
     fn row(&mut self, name: &str, text: &str) {
         // Writing to a String cannot fail.
         let _ = writeln!(self.0, "    {name:<12}{text}");
@@ -147,7 +147,7 @@ fn lights(table: &mut Table, info: &Info, verbose: bool) {
     }
 }
 
-/// Adds the parts of a glTF file, with the numbers and names that options accept.
+/// Adds the parts of a glTF file, with the indices and names that options accept.
 fn contents(table: &mut Table, model: &ModelContents) {
     table.row("glTF file", &model.file);
     let ModelContents {
@@ -212,7 +212,7 @@ fn kernel(table: &mut Table, info: &Info) {
     table.row("", &format!("unused: {}", features(&kernel.leaves_out)));
 }
 
-/// The first names, numbered if options accept numbers.
+/// Lists the first names, with indices if options accept indices.
 fn list<'a>(names: impl ExactSizeIterator<Item = Option<&'a str>>, numbered: bool) -> String {
     let more = names.len().saturating_sub(MAX_LISTED);
     let one = |(i, name): (usize, Option<&str>)| match (name, numbered) {

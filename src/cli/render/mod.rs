@@ -115,7 +115,7 @@ impl<'a> Job<'a> {
             let before = std::mem::replace(&mut self.scene, moment);
             self.scene.keep_ground(&before);
             if self.args.options.is_framed(&self.scene) {
-                // The automatic camera frames the model at rest: frames are independent.
+                // The automatic camera frames the unanimated model, so that the camera is the same in all frames.
                 (self.scene.camera, self.scene.camera_path) = (before.camera, before.camera_path);
             }
         }
@@ -147,7 +147,7 @@ fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-/// Checks all frames first: outputs must not be inputs, and cameras must be valid.
+/// Checks all frames before rendering: outputs must not be inputs, and cameras must be valid.
 fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame, &'a Outputs)>) -> anyhow::Result<()> {
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
     let mut files = BTreeMap::new();
@@ -175,7 +175,7 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
     Ok(())
 }
 
-/// Renders an image or a part. Signals are deferred from the first image on, and end the command after cleanup.
+/// Renders an image or a part. From the first image on, signals are deferred: they end the command after cleanup.
 fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant) -> anyhow::Result<()> {
     let before = signals.deferred().cloned();
     let mut checkpoint = plan.open_checkpoint(before.as_ref())?;
@@ -256,7 +256,7 @@ fn summary(images: &[String], stats: &Stats, requested: u32) -> String {
     )
 }
 
-/// Returns the signal, if it caused the error.
+/// Returns the signal as the error if the signal caused the error.
 fn interrupted(error: anyhow::Error, stop: &Stop) -> anyhow::Error {
     match (error.downcast_ref(), stop.signal()) {
         (Some(RenderError::Cancelled), Some(signal)) => Interrupted(signal).into(),

@@ -1,4 +1,4 @@
-//! Messages on standard error; over several frames each warning is printed once.
+//! Messages on standard error; each warning is printed once, even if it occurs in several frames.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;

@@ -47,7 +47,7 @@ pub struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Resolves the settings of one image, begun at `start`.
+    /// Resolves the settings of one image, which was started at `start`.
     pub fn resolve(args: &Args, scene: &Scene, log: &'a OnceLog, frame: Frame, start: Instant) -> anyhow::Result<Self> {
         let early = [("--time-limit", args.time_limit.is_some()), ("--preview", args.preview)];
         for (option, _) in early.into_iter().filter(|(_, given)| *given) {
@@ -86,7 +86,7 @@ impl<'a> Plan<'a> {
         self.tile.map_or(self.picture, |(_, rows)| rows)
     }
 
-    /// Needs the depth at the image's center.
+    /// Returns the layout of the image. `middle_depth` is the depth at the image center.
     pub fn layout(&self, middle_depth: f32) -> Layout {
         Layout {
             picture: (self.scene.camera.width, self.scene.camera.height),
@@ -99,7 +99,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Returns true if a file is the whole part of this render.
+    /// Returns true if the file is the complete part of this render.
     pub fn is_done(&self, path: &Path) -> bool {
         let (Some((tile, _)), Ok((identity, found))) = (self.tile, job::read_part(path)) else {
             return false;
@@ -112,12 +112,14 @@ impl<'a> Plan<'a> {
         Identity::of(&self.scene, self.picture, self.options.exact_rounding)
     }
 
-    /// Opens the checkpoint, if any, after other processes. That of a part equals that of an image cropped to its rows.
+    /// Opens the checkpoint, if requested; waits while another process uses it. A part has the same checkpoint as an
+    /// image that is cropped to the rows of the part.
     pub fn open_checkpoint<'b>(&'b self, stop: Option<&'b Stop>) -> anyhow::Result<Option<Checkpoint<'b>>> {
         let Some(path) = &self.checkpoint else {
             return Ok(None);
         };
-        // Without deferred signals a signal ends the program at once.
+        // If signals are not deferred (`stop` is `None`), a signal terminates the process immediately, so there is
+        // nothing to check.
         let signal = move || stop.and_then(Stop::signal);
         let opening = CheckpointOptions {
             path: path.clone(),
@@ -170,7 +172,7 @@ fn rows(tile: Tile, picture: Region) -> Result<Region, Usage> {
     tile.rows(picture).ok_or(Usage(rule))
 }
 
-/// Checks that prefixes of the samples cover a pixel.
+/// Checks that the pixel pattern allows rendering to stop early: the first samples of a pattern must cover the pixel.
 fn can_end_early(option: &str, scene: &Scene) -> Result<(), Usage> {
     let pattern = scene.render.pixel_samples.pattern;
     match pattern.needs_square() {

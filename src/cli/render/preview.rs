@@ -27,7 +27,7 @@ impl Previews {
         samples.is_power_of_two() && self.last.is_none_or(|last| last.elapsed() >= INTERVAL)
     }
 
-    /// Starts the files, except those with more samples.
+    /// Starts writing the files, except files that already have more samples.
     pub fn start(&self, samples: u32, log: &OnceLog) -> io::Result<Vec<Target>> {
         let mut targets = Vec::new();
         for (format, files) in &self.images {
@@ -49,7 +49,7 @@ impl Previews {
     }
 }
 
-/// Returns a message if a file may have more samples.
+/// Returns a message if the existing file may have more samples.
 fn reason_to_keep(file: &Output, samples: u32) -> Option<String> {
     let path = file.path().filter(|path| path.exists())?;
     let reason = match samples_of(path) {

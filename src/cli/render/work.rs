@@ -21,15 +21,15 @@ use crate::cli::signal::Stop;
 pub struct RenderTotals {
     /// Excludes the writing of files.
     pub time: Duration,
-    /// Camera rays of the image, and the fraction not read from a checkpoint.
+    /// Camera rays of the image, and the fraction of them that was rendered in this run, not read from a checkpoint.
     pub camera_rays: u64,
     pub fraction_rendered: f64,
     /// Number of pixels with non-finite values.
     invalid_pixels: usize,
     pub min_samples: u32,
-    /// Fewer than the scene's after the time limit, or if the image is partial.
+    /// Fewer than in the scene if the time limit was reached or the image is partial.
     pub requested_samples: u32,
-    /// The files with the last whole pass, after a signal.
+    /// After a signal, the files that contain the last complete pass.
     pub partial: Vec<String>,
 }
 
@@ -167,12 +167,12 @@ fn render(
             totals.fraction_rendered = bands.fraction_rendered();
             return Ok(());
         };
-        put(plan, renderer, band, totals, sink)?;
+        write_band(plan, renderer, band, totals, sink)?;
     }
 }
 
-/// Hands a band to a sink and adds it to the totals.
-fn put(
+/// Passes a band to a sink and adds its counts to the totals.
+fn write_band(
     plan: &Plan,
     renderer: &mut Renderer,
     band: FinishedBand,
@@ -197,8 +197,8 @@ fn put(
     })
 }
 
-/// Writes the last whole pass into the images, except those with more samples. `None` if none is written; failures are
-/// warnings, as the complete image may succeed.
+/// Writes the last complete pass to the images, except to files that already have more samples. Returns `None` if no
+/// file is written. Failures are only warnings, because writing the complete image may still succeed.
 fn save_pass(
     plan: &Plan,
     renderer: &mut Renderer,
@@ -219,7 +219,7 @@ fn save_pass(
         totals.partial = files.map(|file| file.name().to_owned()).collect();
         if !targets.is_empty() {
             image::save(targets, layout, &options, &mut |sink| {
-                bands.last_pass(&mut |band| put(plan, renderer, band, &mut totals, sink))
+                bands.last_pass(&mut |band| write_band(plan, renderer, band, &mut totals, sink))
             })?;
         }
         Ok(())

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Sets a value, or removes the key if it is `none`.
+/// Sets a value, or removes the key if `value` is `none`.
 fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     let value = (value != "none").then(|| {
         let mut table: toml::Table = toml::from_str(&format!("value = {value}")).unwrap();
@@ -9,7 +9,7 @@ fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     edited(text, &path.parse().unwrap(), value.as_ref())
 }
 
-/// Text, key, value, expected text; also tested with DOS line ends and a byte-order mark.
+/// Text, key, value, expected text. Each case is also tested with DOS line endings and a byte-order mark.
 const CHANGES: [(&str, &str, &str, &str); 36] = [
     // Existing values.
     (
@@ -215,7 +215,7 @@ fn only_the_bytes_of_a_value_change() {
 }
 
 #[test]
-fn what_has_no_place_is_refused() {
+fn values_without_a_location_in_the_file_are_rejected() {
     for (text, path, value, message) in [
         ("[camera]\nfov = 45\n", "camera.fov.a", "1", "is in no table"),
         (
@@ -239,7 +239,7 @@ fn what_has_no_place_is_refused() {
 }
 
 #[test]
-fn where_things_stand_is_known() {
+fn extents_of_tables_and_values_are_found() {
     let text = "a.b = 1 # a\n[camera] # c\nfov = 45\n[camera.path]\nx = [1,\n 2]\n[[shapes]]\nr = 1\n";
     let layout = Layout::of(text).unwrap();
     let at = |path: &str| layout.extent(&path.parse().unwrap()).map(|range| &text[range]);

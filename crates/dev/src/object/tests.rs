@@ -89,7 +89,7 @@ fn another(field: &Field) -> Json {
     }
 }
 
-/// Sets every field to its own value and to another one. Returns their number.
+/// Sets every field to its current value and to a different value. Returns the number of fields.
 fn set_all(seen: &SceneView) -> usize {
     let text = seen.loaded.text.clone();
     let whole = table(&text);
@@ -197,7 +197,7 @@ fn small() -> SceneView {
 }
 
 #[test]
-fn counts_of_cells_are_squares() {
+fn sample_counts_of_grid_patterns_are_squares() {
     let squares = |more: &str| {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\n[camera]\nposition = [0, 1, 0]\nlook_at = [0, 0, 0]\nfov = 40\n{more}"
@@ -231,7 +231,7 @@ fn counts_of_cells_are_squares() {
 #[test]
 fn other_layouts_can_be_set_too() {
     assert!(set_all(&small()) > 60);
-    // Control: `with` changes a table only if the value differs.
+    // Checks that `with` only changes a table if the value differs.
     let whole = plain(&table(SCENE));
     let path: KeyPath = "shapes[0].radius".parse().unwrap();
     assert_ne!(with(&whole, &path, &Value::from(0.25)), whole);

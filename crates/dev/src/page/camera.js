@@ -53,13 +53,14 @@ async function copyCamera(showNotice) {
     await navigator.clipboard.writeText(lastState().camera);
     showNotice("Camera copied");
   } catch {
-    // The clipboard needs a secure connection. Without one, the text is selected so that the user can copy it.
+    // The clipboard requires a secure connection. On other connections, the text is selected so that the user can copy
+    // it.
     getSelection().selectAllChildren(element("camera-text"));
     showNotice("Press Ctrl+C to copy the selected camera");
   }
 }
 
-// Bookmarks are stored in the browser by the scene's name, and never in the scene file.
+// Bookmarks are stored in the browser under the name of the scene, never in the scene file.
 function setUpBookmarks(showNotice) {
   let scene = null;
   const key = () => `bookmarks ${scene}`;

@@ -36,7 +36,7 @@ export function setUpCompare(picture, onKey, showNotice) {
     if (layout === "flicker" && pace) timer = setInterval(() => picture.swap(), 1000 / pace);
   }
 
-  // Uploads a file from the viewer's computer, which the program cannot read itself.
+  // Uploads a file from the viewer's computer, because the program may run on a different machine.
   async function upload(file) {
     try {
       const answer = await fetch(`/reference/${encodeURIComponent(file.name)}`, { method: "POST", body: file });

@@ -1,6 +1,6 @@
-// Controls for the values of an object: number boxes, sliders, colours, vectors, choices, switches and texts. Each
-// maker returns {inputs, elements, update}. It calls `change(value, i)` with the new value; `i` is the changed index of
-// a list.
+// Controls for the values of an object: number boxes, sliders, colours, vectors, choices, switches and texts. Each of
+// these functions returns {inputs, elements, update}. It calls `change(value, i)` with the new value; `i` is the
+// changed index of a list.
 
 import { colorOf, hexOf } from "/color.js";
 import { digits, fit, numberField, say } from "/numbers.js";
@@ -10,7 +10,7 @@ const STEPS = 1000; // positions of a logarithmic slider
 
 export const valueOf = (field) => field.value ?? field.default;
 
-// Returns the control of a field, by its kind.
+// Returns a control that matches the kind of the field.
 export function controlOf(field, change) {
   const makers = { number: numberOf, whole: numberOf, color: colorsOf, vector: vectorOf, choice: choiceOf, switch: switchOf, text: textOf };
   return makers[field.kind](field, change);
@@ -24,12 +24,12 @@ function numberBox(field, label) {
   return box;
 }
 
-// A box for a number, with a slider beside it if the field has one.
+// Returns a number box, with a slider beside it if the field has one.
 function pairOf(field, label, slider, change) {
   const box = numberBox(field, label);
   let now;
   const range = slider ? make("input", { type: "range" }) : null;
-  // For square numbers the slider runs over their roots.
+  // If only square numbers are valid, the slider's position is the square root.
   const placeOf = (x) => {
     if (field.squares) return Math.sqrt(x);
     return slider.logarithmic ? (STEPS * Math.log(x / slider.from)) / Math.log(slider.to / slider.from) : x;
@@ -85,7 +85,7 @@ function colorsOf(field, change) {
   const picker = make("input", { type: "color", title: "Colour as displayed (sRGB)" });
   picker.setAttribute("aria-label", `${field.name}, as displayed (sRGB)`);
   let now = [0, 0, 0];
-  let tint = [1, 1, 1]; // the colour at strength 1, which survives a strength of 0
+  let tint = [1, 1, 1]; // the colour at strength 1; kept when the strength is 0
   const take = (list) => {
     now = list;
     const most = Math.max(...now);
@@ -102,7 +102,7 @@ function colorsOf(field, change) {
     picker.value = hexOf(now);
     change(now, i);
   });
-  // Emission has no upper limit: one slider scales it and keeps its hue.
+  // Emission has no upper limit, so a single slider scales the colour and keeps its hue.
   const strength = field.slider && pairOf({ ...field, kind: "number" }, `${field.name}, strength`, field.slider, (most) => {
     now = tint.map((x) => digits(x * most, 6));
     picker.value = hexOf(now);

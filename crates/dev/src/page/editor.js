@@ -4,7 +4,7 @@
 export function editorLink(template, { file, line, column }) {
   if (!template || !file) return null;
   const path = encodeURI(file.replaceAll("\\", "/")).replace(/[?#&=+;]/g, encodeURIComponent);
-  // Replacements are functions because `$&` in a string would be expanded.
+  // The replacements are functions, because patterns such as `$&` in a replacement string would be expanded.
   return template
     .replace("/{file}", () => (path.startsWith("/") ? path : `/${path}`)) // avoids a double slash before an absolute path
     .replaceAll("{file}", () => path)

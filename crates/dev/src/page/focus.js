@@ -1,4 +1,5 @@
-// Moves the focus of a control that is disabled, hidden or removed to its container, and back when the control returns.
+// If a focused control is disabled, hidden or removed, moves the focus to its container, and back when the control is
+// available again.
 
 const AROUND = ".row, fieldset, ul, #object-groups, #sliders, #panels, details, section, aside";
 
@@ -14,7 +15,7 @@ export function setUpFocus() {
     [wanted, around, home] = [target, [], null];
     for (let node = target.parentElement; node; node = node.parentElement) if (node.matches(AROUND)) around.push(node);
   });
-  // A user who moves the focus away from an available control does not want it back.
+  // If the user moves the focus away from an available control, the focus is not returned to this control.
   document.addEventListener("focusout", ({ target }) => setTimeout(() => {
     if (document.activeElement === document.body && isAvailable(target)) [wanted, home] = [null, null];
   }));

@@ -40,7 +40,7 @@ function show({ faults, width, height, sent, sides }) {
   setText("invalid", parts.length ? `${count.toLocaleString("en")} ${name} ${count === 1 ? "pixel" : "pixels"}` : "");
 }
 
-// An unchanged text is left alone: screen readers announce every change.
+// Unchanged text is not set again, because screen readers announce every assignment.
 function setText(id, text) {
   if (element(id).textContent !== text) element(id).textContent = text;
 }

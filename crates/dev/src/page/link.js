@@ -1,4 +1,4 @@
-// The WebSocket to the program: distributes its messages to listeners and matches answers to requests.
+// The WebSocket to the program: dispatches incoming messages to listeners and matches answers to requests.
 
 const RETRY = 500; // milliseconds before a reconnection attempt
 const ANSWER = 2000; // timeout in milliseconds of an HTTP request to the program
@@ -60,7 +60,8 @@ export function connect() {
   };
 }
 
-// Returns whether the program answers HTTP requests. If it does but closes the socket, all viewer slots are taken.
+// Returns whether the program answers HTTP requests. If it does, but closes the socket, the maximum number of viewers
+// is reached.
 async function isServed() {
   try {
     return (await fetch("/", { signal: AbortSignal.timeout(ANSWER) })).ok;
@@ -86,7 +87,8 @@ function hear(message) {
   named.get(name)?.forEach((f) => f(value));
 }
 
-// Decodes and shows a frame: the length of its header, the header as JSON, and the PNG files that the header lists.
+// Decodes and shows a frame. A frame consists of the header length, the header as JSON, and the PNG files that the
+// header lists.
 async function showFrame(data) {
   const [order, from] = [++received, socket];
   const length = new DataView(data).getUint32(0, true);
@@ -107,8 +109,8 @@ async function showFrame(data) {
   }
 }
 
-// Reports a frame, and with it all earlier ones, as displayed once the browser has drawn it. The program keeps few
-// frames in flight, so that a slow connection delays no newer frame.
+// Acknowledges a frame, and all earlier frames, once the browser has drawn it. The program keeps few frames in flight,
+// so that newer frames are not delayed on a slow connection.
 function acknowledge(from, number) {
   requestAnimationFrame(() => {
     if (from.readyState === WebSocket.OPEN) from.send(JSON.stringify({ shown: number }));

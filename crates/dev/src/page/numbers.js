@@ -7,12 +7,13 @@ const LINE = 20; // pixels per line, for wheel events with deltaMode DOM_DELTA_L
 const KEYS = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
 const HINT = "Drag sideways or press ↑/↓. Shift: 0.1×. Page Up/Down: 10×.";
 
-let typing = null; // the box with a half-typed number; at most one exists
+let typing = null; // the box with an unfinished input, if any
 
 export const digits = (x, count) => Number(x.toPrecision(count));
 export const say = (x) => (x === undefined || x === null ? "" : String(x));
 
-// Returns the nearest value that a field accepts. Gaps and non-squares are skipped in the direction of the change.
+// Returns the nearest value that a field accepts. Values in the gap, and non-squares if only squares are valid, are
+// skipped in the direction of the change.
 export function fit({ kind, range, gap, squares }, x, from) {
   let found = kind === "whole" ? Math.round(x) : digits(x, 12);
   if (squares) found = (x < from ? Math.floor : Math.ceil)(Math.sqrt(Math.max(found, 0))) ** 2;
@@ -33,9 +34,9 @@ function stepOf({ kind, unit, range }, list) {
   return range && range[1] - range[0] <= 2 ? 0.01 : 0.1;
 }
 
-// Turns a box into the editor of a field's number. `numbers()` returns the list that contains the number. `use(x)`
-// receives a new value on Enter or when the box loses the focus, unless the text is empty or not a number. Returns a
-// function that shows a value unless the user is typing one.
+// Makes a box the editor of a field's number. `numbers()` returns the list that contains the number. `use(x)` is called
+// with a new value on Enter or when the box loses the focus, unless the text is empty or not a number. Returns a
+// function that shows a value unless the user is typing.
 export function numberField(box, field, numbers, use) {
   let last;
   const take = (x) => {
@@ -60,12 +61,12 @@ export function numberField(box, field, numbers, use) {
   };
 }
 
-// Discards a half-typed number in a part of the page.
+// Discards an unfinished input in a part of the page.
 export function forget(part) {
   if (typing && part.contains(typing)) typing = null;
 }
 
-// Browsers step a focused number box by the wheel. Here the wheel always scrolls.
+// By default, the wheel changes a focused number box. Here, the wheel always scrolls.
 export function setUpWheel() {
   document.addEventListener("wheel", (event) => {
     const box = event.target;
@@ -79,7 +80,7 @@ export function setUpWheel() {
   }, { passive: false });
 }
 
-// Makes a box respond to drags and step keys. `numbers()` and `use(x)` are those of `numberField`.
+// Makes a box respond to drags and step keys. See `numberField` for `numbers()` and `use(x)`.
 function steppable(box, field, numbers, use) {
   let press = null; // the state of the pointer press in progress
   let step = 0; // step size while a key is held: constant although the number's magnitude changes

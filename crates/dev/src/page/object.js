@@ -49,7 +49,7 @@ export function setUpObject() {
     event.preventDefault();
     ask(event.shiftKey ? "redo_write" : "undo_write");
   });
-  // A press can end with a click, a scroll or outside of the window, while a key is still held.
+  // A press can end with a click, with a scroll, or outside of the window, even while a key is held.
   for (const end of ["pointerup", "pointercancel", "blur"]) {
     window.addEventListener(end, () => setTimeout(() => {
       if (pointer && !key) letGo();
@@ -90,7 +90,7 @@ function setUpSearch() {
   });
 }
 
-// A change of the file by another program clears the undo history; the tooltips of the buttons then give this reason.
+// If another program changes the file, the undo history is cleared, and the tooltips of the buttons give the reason.
 function showUndo({ undo, redo, undo_blocked }) {
   for (const [id, what, word, keys] of [["undo-write", undo, "Undo", "Ctrl+Z"], ["redo-write", redo, "Redo", "Ctrl+Shift+Z"]]) {
     const button = element(id);
@@ -100,8 +100,8 @@ function showUndo({ undo, redo, undo_blocked }) {
   }
 }
 
-// Writes a value, or element `i` of a list, to keep other viewers' changes of the other elements. The next change is
-// sent after the previous one was executed, so that a slider never runs ahead of the file.
+// Writes a value, or only element `i` of a list, so that changes of other elements by other viewers are kept. The next
+// change is sent after the previous change was executed, so that a slider never gets ahead of the file.
 function write(field, value, i, note) {
   const isPart = i !== undefined && valueOf(field) !== undefined;
   const set = { path: isPart ? `${field.path}[${i}]` : field.path, value: isPart ? value[i] : value, gesture };
@@ -138,7 +138,7 @@ function letGo() {
   stale = false;
 }
 
-// A control whose value is being changed shows the user's value, not yet the file's.
+// While a value is being changed, its control shows the user's value instead of the value in the file.
 const isBusy = (path) => path === held || [sending, ...waiting.values()].some((change) => change?.field === path);
 
 function showObject(object) {
@@ -162,7 +162,7 @@ function showNote() {
   if (element("object-note").textContent !== text) element("object-note").textContent = text;
 }
 
-// A table of the scene file: its lines, the values it sets, and those it leaves at their defaults.
+// A table of the scene file: its source lines, the values in the file, and the values that have their defaults.
 function groupOf({ name }) {
   const pre = make("pre", { tabIndex: 0 });
   const kind = new Text();
@@ -188,7 +188,7 @@ function groupOf({ name }) {
   return { item, show };
 }
 
-// A field with another key needs another control.
+// Fields with the same key can share a control.
 const keyOf = ({ path, kind, length, unit, range, gap, squares, fixed, slider, about }) =>
   JSON.stringify([path, kind, length, unit, range, gap, squares, fixed, Boolean(slider), about]);
 
@@ -222,7 +222,7 @@ function fieldOf(field) {
   };
   let newest = field;
   let accepted = field.value;
-  let kept = null; // the value in the file while the error of a refused one is shown
+  let kept = null; // the value in the file while the error of a refused value is shown
   const change = (value, i) =>
     write(newest, value, i, (text) => {
       if (text) kept = JSON.stringify(accepted);
@@ -255,7 +255,7 @@ function fieldOf(field) {
     out.hidden = isAbsent || next.required || Boolean(next.fixed);
     if (isBusy(next.path) && !isNew) return;
     isNew = false;
-    // A late answer about an earlier change leaves the error and the value that it is about.
+    // A late answer to an earlier change does not replace the error and the refused value.
     const isLate = !error.hidden && JSON.stringify(next.value) === kept && JSON.stringify(before) !== kept;
     if (isLate) return;
     accepted = next.value;

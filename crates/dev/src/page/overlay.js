@@ -3,7 +3,7 @@
 const MAX_RINGS = 8; // maximum number of invalid pixels that get rings; more are visible without
 const HANDLE = 11; // radius of the divider's handle, in CSS pixels
 
-// Draws a path in black and, thinner, in white, so that it is visible on any image.
+// Draws a path in black, then with a thinner line in white, so that it is visible on any image.
 function outline(context, widths, path) {
   for (const [color, lineWidth] of [["#000", widths[0]], ["#fff", widths[1]]]) {
     Object.assign(context, { strokeStyle: color, lineWidth });
@@ -13,7 +13,7 @@ function outline(context, widths, path) {
   }
 }
 
-// Draws a frame around a pixel at a distance in CSS pixels.
+// Draws a frame around a pixel. `distance` is in CSS pixels.
 export function frame(context, pixel, scale, distance) {
   context.lineWidth = 1;
   for (const [color, inset] of [["#000", -distance], ["#fff", 1 - distance]]) {
@@ -23,7 +23,7 @@ export function frame(context, pixel, scale, distance) {
   }
 }
 
-// Draws rings around invalid pixels, so that single ones are not overlooked.
+// Draws rings around invalid pixels, so that isolated ones are not overlooked.
 export function rings(context, part, { width, height, sent, faults }, scale) {
   const found = faults.find(([name]) => name === part)?.[1];
   if (!found || found.nan + found.infinite + found.negative > MAX_RINGS) return;

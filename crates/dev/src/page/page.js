@@ -20,7 +20,7 @@ let isLinked = null; // null until the first connection attempt has finished
 let isFull = false; // whether the viewer limit is reached
 let noticesSeen = null;
 let numberShown = 0; // the number of the displayed frame
-// Actions of keys: available everywhere, and only while the image has the focus.
+// Keyboard actions: those available everywhere, and those available only while the image has the focus.
 const [everywhere, atPicture] = [new Map(), new Map()];
 
 // Registers a key's action; `key` is a `KeyboardEvent.key`.
@@ -60,13 +60,13 @@ onFrame((header, images) => {
   element("smaller").parentElement.hidden = width === header.width && height === header.height;
   element("smaller").textContent = `${width} × ${height}`;
   numberShown = header.number;
-  // Attributes for scripts that drive the page.
+  // Attributes for scripts that control the page.
   const { revision, samples, done } = header;
   Object.assign(element("panels").dataset, { revision, samples, done, view: viewName(header.view), sent: header.sent.join("x") });
 });
 
-// For scripts that drive the page: returns whether the image is final and shows all commands of this page and at least
-// `commands` commands of all viewers.
+// For scripts that control the page: returns whether the image is final and shows all commands of this page and at
+// least `commands` commands of all viewers.
 window.isSettled = (commands) => {
   const state = lastState();
   return isUpToDate() && state.executed >= commands && picture.isSettled() && !state.busy && state.frame > 0 && numberShown >= state.frame;
@@ -88,7 +88,7 @@ onState((state) => {
   noticesSeen = number;
 });
 
-// Shows why the image is not up to date. Without a connection the controls are disabled.
+// Shows why the image is not up to date. While there is no connection, the controls are disabled.
 function showBadge() {
   const state = lastState();
   const [text, kind] = isLinked === null ? ["Connecting…", "waits"]
@@ -141,7 +141,8 @@ function seconds(s) {
   return s < 1 ? `${Math.round(s * 1000)} ms` : `${s.toFixed(2)} s`;
 }
 
-// Returns whether a control handles a key itself. Among values, a stray key must not trigger an action for all viewers.
+// Returns whether a control handles a key itself. In the value editor, an accidental key press must not trigger an
+// action that affects all viewers.
 function isTaken(control, key) {
   if (control.closest("#object-groups, #sliders")) return true;
   if (control.matches("select, textarea, input:not([type=radio], [type=checkbox], [type=range])")) return true;

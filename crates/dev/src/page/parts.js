@@ -1,4 +1,4 @@
-// Adds and removes parts of the page without disturbing the user's work in other parts.
+// Adds and removes parts of the page without disturbing focus or input in other parts.
 
 import { forget } from "/numbers.js";
 
@@ -14,7 +14,7 @@ export function enable(control, isEnabled) {
   delete control.dataset.off;
 }
 
-// Returns the parts for a list of items, by key: known parts are reused, missing ones are made.
+// Returns a map from key to part for a list of items; known parts are reused, missing parts are created.
 export function keep(known, items, keyOf, makeOne) {
   return new Map(items.map((item) => {
     const key = keyOf(item);
@@ -22,8 +22,8 @@ export function keep(known, items, keyOf, makeOne) {
   }));
 }
 
-// Sets the children of parents, each given as [parent, children]. Children that stay are not touched; half-typed
-// numbers in removed ones are discarded.
+// Sets the children of parents, each given as [parent, children]. Children that stay are not touched; unfinished input
+// in removed children is discarded.
 export function place(...lists) {
   const focus = document.activeElement;
   const all = new Set(lists.flatMap(([, children]) => children));

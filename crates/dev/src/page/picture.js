@@ -28,7 +28,8 @@ export class Picture {
     this.swapped = false; // whether a flicker shows the second image
     this.motion = new Motion();
     this.wheeled = 0; // time of the last wheel event
-    // Scale in screen pixels per image pixel, or null to fit; and the image point at the center of a panel.
+    // Scale in screen pixels per image pixel, or null to fit the image to the panel; and the image point at the center
+    // of a panel.
     this.scale = null;
     this.middle = [0, 0];
     this.cursor = null;
@@ -40,7 +41,7 @@ export class Picture {
     window.addEventListener("blur", () => this.stopFlying());
   }
 
-  // Shows the parts of a frame: images by name.
+  // Shows the images of a frame; `images` maps names to images.
   show(header, images) {
     const resized = !this.header || this.header.width !== header.width || this.header.height !== header.height;
     this.header = header;
@@ -116,7 +117,7 @@ export class Picture {
     this.#schedule();
   }
 
-  // Zooms by a factor about a point of a panel, by default about its middle.
+  // Zooms by a factor around a point of a panel, by default around its center.
   zoom(factor, panel = this.#visible(), at = null) {
     if (panel) this.zoomTo(this.#view(panel).scale * factor, panel, at);
   }
@@ -137,7 +138,7 @@ export class Picture {
     return !this.scheduled;
   }
 
-  // Reads a neighbour of the pixel that was read last.
+  // Moves the cursor from the last read pixel to a neighbour, and reads the neighbour.
   moveCursor(dx, dy) {
     if (!this.header) return;
     const [x, y] = this.cursor ?? [this.header.width >> 1, this.header.height >> 1];
@@ -184,7 +185,7 @@ export class Picture {
       context.clearRect(0, 0, w, h);
       const ratio = devicePixelRatio;
       context.setTransform(ratio, 0, 0, ratio, view.left * ratio, view.top * ratio);
-      // Pixels are drawn as squares if they are large or all of one size; a coarse image is smoothed.
+      // Pixels are drawn as squares if they are large or cover whole screen pixels; a coarse image is smoothed.
       const side = view.scale * ratio;
       context.imageSmoothingEnabled = sent[0] < width || (side < 4 && !Number.isInteger(side));
       context.imageSmoothingQuality = "high";
@@ -264,7 +265,7 @@ export class Picture {
     });
     canvas.addEventListener("pointercancel", end);
     canvas.addEventListener("pointerleave", (event) => {
-      if (event.pointerType === "mouse") this.#point(null); // a value read by touch stays
+      if (event.pointerType === "mouse") this.#point(null); // a value that was read by touch stays visible
     });
     canvas.addEventListener("wheel", (event) => this.#wheel(panel, event), { passive: false });
     canvas.addEventListener("keydown", (event) => this.#key(event));
@@ -308,7 +309,7 @@ export class Picture {
     this.#schedule();
   }
 
-  // Two fingers pan and dolly so that the image between them follows.
+  // Two fingers pan and dolly, so that the image follows the fingers.
   #pinch(panel, fingers, moving, now) {
     const [, other] = [...fingers].find(([id]) => id !== moving);
     const before = fingers.get(moving);
@@ -317,7 +318,8 @@ export class Picture {
     this.#drag(panel, "pan", (now[0] - before[0]) / 2, (now[1] - before[1]) / 2);
   }
 
-  // The wheel dollies. With Ctrl, which a touchpad's pinch also reports, it zooms the image.
+  // The wheel dollies the camera. With Ctrl, the wheel zooms the image; browsers report a pinch on a touchpad as the
+  // wheel with Ctrl.
   #wheel(panel, event) {
     event.preventDefault();
     const place = [event.offsetX, event.offsetY];

@@ -65,7 +65,7 @@ function add(pixel, picture) {
 async function refresh(pin, { revision, samples, view }) {
   const answer = await askPixel(pin.pixel);
   if (!answer || !pins.includes(pin)) return;
-  // Each revision keeps only its newest value.
+  // Only the newest value of each revision is kept.
   const entry = { revision, samples, view: JSON.stringify(view), values: answer.values };
   const last = pin.history.at(-1);
   if (last && last.revision === revision && last.view === entry.view) pin.history.pop();

@@ -11,7 +11,7 @@ let shown = "";
 export function showProblems({ problems, editor, reading }, hasImage) {
   const count = problems.length === 1 ? "1 problem" : `${problems.length} problems`;
   element("problems").querySelector("summary").textContent = reading ? `${count}. Reading the changed files…` : count;
-  // An unchanged list is left alone, so that text selected in it stays selected.
+  // An unchanged list is not rebuilt, so that selected text stays selected.
   const all = JSON.stringify([problems, editor, hasImage]);
   if (all === shown) return;
   shown = all;

@@ -26,7 +26,7 @@ export function setUpShader(showNotice) {
   });
 }
 
-// Copies the declarations of the moved sliders.
+// Copies the declarations of the changed sliders to the clipboard.
 async function copy(showNotice) {
   const range = ({ kind, min, max }) => (kind === "bool" ? "" : ` // ${min}..${max}`);
   const line = (slider) => `override ${slider.name}: ${slider.kind} = ${slider.value};${range(slider)}\n`;
@@ -39,7 +39,8 @@ async function copy(showNotice) {
   }
 }
 
-// Sends one value at a time, the newest of each slider: a drag produces more of them than the program can render.
+// Sends one value at a time, the newest of each slider, because a drag produces more values than the program can
+// render.
 function slide({ file, name }, value) {
   waiting.set(keyOf({ file, name }), { file, name, value });
   if (!underWay) next();

@@ -12,7 +12,7 @@ let stops = 0; // current exposure
 let showStops = null; // shows an exposure in its box and slider
 let choice = { exposure: null, transform: null, false_color: false };
 
-// Returns the name of a view of the state: "normal", or "compare" of {"compare": "cpu"}.
+// Returns the name of a view: "normal" for "normal", and "compare" for {"compare": "cpu"}.
 export const viewName = (view) => (typeof view === "string" ? view : Object.keys(view)[0]);
 
 export function setUpView(picture, onKey, showNotice) {
@@ -53,7 +53,8 @@ function setUpExposure(showNotice) {
   };
   const showInBox = numberField(element("exposure-number"), STOPS, () => [stops], expose);
   showStops = (stops) => {
-    // The slider's usual range is finer than the box's. It widens for a value beyond it, and stays wide during a drag.
+    // The slider usually has a smaller range than the box. The range is widened for a value outside it, and stays wide
+    // during a drag.
     if (Math.abs(stops) > Number(slider.max)) [slider.min, slider.max] = [-LIMIT, LIMIT];
     slider.value = stops;
     showInBox(stops);
@@ -107,7 +108,7 @@ function reveal(button) {
   bar.scrollLeft = Math.min(offsetLeft, Math.max(bar.scrollLeft, offsetLeft + offsetWidth - bar.clientWidth));
 }
 
-// Disables views that the scene lacks; the label of their group gives the reason.
+// Disables views that the scene lacks; the label of the group gives the reason.
 let missingShown = "";
 function showMissing(rules) {
   if (JSON.stringify(rules) === missingShown) return;

@@ -1,4 +1,4 @@
-//! Comparison of the image with another one, and the difference between them.
+//! Comparison of the image with a second image, and the difference between the two.
 
 use std::sync::Arc;
 
@@ -10,16 +10,16 @@ use wgray_image::Pixels;
 
 #[derive(Default)]
 pub struct Comparison {
-    /// The last complete image before the last saved change.
+    /// The last complete image from before the last saved change.
     pub before: Option<Reference>,
-    /// An image that was set or given as the reference.
+    /// The reference: an image that was kept or uploaded.
     pub reference: Option<Reference>,
     apart: Option<Apart>,
     measuring: bool,
 }
 
 impl Comparison {
-    /// Returns whether there is a `before`, and the name of the reference.
+    /// Returns whether an image from before the last change exists, and the name of the reference.
     pub fn comparable(&self) -> (bool, Option<String>) {
         let name = self.reference.as_ref().map(|reference| reference.name.clone());
         (self.before.is_some(), name)
@@ -35,7 +35,7 @@ impl Comparison {
 }
 
 impl Painter {
-    /// Returns the displayed image if complete, in color and up to date.
+    /// Returns the displayed image if it is complete, in color and up to date.
     fn whole_picture(&self) -> Option<Pixels> {
         let frame = self.frame_sender.borrow().clone()?;
         let header = &frame.header;
@@ -76,7 +76,7 @@ impl Painter {
         }
     }
 
-    /// Returns the content with its comparison, and the names of both.
+    /// Returns the content together with the image to compare with, and the names of both images.
     pub(super) fn beside(&self, content: Content, whole: [u32; 2]) -> (Content, Option<[String; 2]>) {
         let View::Compare(against) = self.view else {
             return (content, None);
@@ -92,7 +92,7 @@ impl Painter {
         }
     }
 
-    /// Measures a finished comparison on a thread: it takes longer than a frame.
+    /// Measures a finished comparison on a separate thread, because this takes longer than a frame.
     pub(super) fn measure(&mut self, frame: &Arc<Frame>) {
         if frame.header.done && !self.comparison.measuring && matches!(frame.content, Content::Compare(..)) {
             self.comparison.measuring = true;
@@ -111,7 +111,7 @@ impl Painter {
     pub(super) fn take_measured(&mut self, apart: Apart) {
         self.comparison.measuring = false;
         self.comparison.apart = Some(apart);
-        // Another image may have been shown meanwhile.
+        // A different image may be shown by now.
         let newest = self.frame_sender.borrow().clone();
         if let Some(frame) = newest.filter(|frame| frame.header.number != apart.frame) {
             self.measure(&frame);
@@ -122,7 +122,7 @@ impl Painter {
         self.comparison.apart.filter(|apart| apart.frame == self.frames)
     }
 
-    /// Returns why a comparison cannot be shown.
+    /// Returns the reason if the comparison cannot be shown.
     pub(super) fn no_comparison(&self) -> Option<String> {
         let View::Compare(against) = self.view else { return None };
         let whole = self.running.as_ref()?.canvas.finest_size();

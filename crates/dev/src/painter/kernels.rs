@@ -1,4 +1,4 @@
-//! The life of a kernel: it is run, refused, truncated by the driver or lost, and replaced.
+//! The life cycle of a kernel: it is run, may be refused, truncated by the driver or lost, and is replaced.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -43,7 +43,7 @@ impl Painter {
                 let (view, running) = (self.seen(), &mut self.running);
                 let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
                 if running.as_mut().is_some_and(lives) {
-                    // The driver refuses the kernel although naga accepts it; the device still works.
+                    // The driver rejected the kernel although naga accepted it; the device still works.
                     self.refuse((pending.shaders, pending.constants), Vec::new());
                     self.problems.device = Some((&error).into());
                     self.since = None;
@@ -55,7 +55,8 @@ impl Painter {
         }
     }
 
-    /// Takes a kernel whose request was overtaken. If it fits the scene, it is shown until the newer one is compiled.
+    /// Takes a kernel although a newer one was requested. If the kernel fits the scene, it renders until the newer
+    /// kernel is compiled.
     fn take_overtaken(&mut self, built: BuildResult) {
         let constants = self.loaded.as_ref().map(|loaded| self.constants(loaded));
         let is_useful = self.pending.is_some() && built.id >= self.oldest && constants == Some(built.constants);
@@ -74,7 +75,7 @@ impl Painter {
         }
     }
 
-    /// Starts to render with a kernel that shows a change.
+    /// Starts to render with a new kernel.
     fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants, noticed: Instant) {
         let Some(loaded) = self.loaded.clone() else { return };
         let info = &gpu.device().info;
@@ -107,13 +108,13 @@ impl Painter {
         }
     }
 
-    /// Remembers that shaders have errors for such scenes.
+    /// Remembers that the shaders are refused for these constants.
     fn refuse(&mut self, shaders: (Arc<Shaders>, Constants), problems: Vec<Diagnostic>) {
         self.refused.push(shaders);
         self.problems.shader = problems;
     }
 
-    /// Refuses shaders that the driver truncates, until the scene or the shaders change.
+    /// Refuses shaders whose loops the driver truncates, until the scene or the shaders change.
     fn refuse_cut(&mut self, shaders: (Arc<Shaders>, Constants), error: &RenderError) {
         let problem = self.of_render(error);
         self.cut = Some(shaders.clone());
@@ -122,7 +123,7 @@ impl Painter {
         self.settle((Instant::now(), true));
     }
 
-    /// Returns a diagnostic with advice.
+    /// Converts a render error to a diagnostic with advice.
     fn of_render(&self, error: &RenderError) -> Diagnostic {
         match error {
             RenderError::Shader(error) => match &self.shaders {
@@ -145,13 +146,13 @@ impl Painter {
         }
     }
 
-    /// Returns the diagnostic with the user's path of the file.
+    /// Converts a shader error to a diagnostic that contains the user's path of the file.
     fn of_shader(&self, error: &ShaderError, shaders: &Shaders) -> Diagnostic {
         Diagnostic::shader(error, shaders, self.sources.shaders.as_deref())
     }
 
-    /// Opens the device again, a few times. If the driver truncates the kernel, uses the last good shaders, or halts
-    /// without others.
+    /// Handles a render error. Opens a lost device again, up to a maximum number of attempts. If the driver truncates
+    /// the loops of the kernel, uses the last good shaders; halts if no good shaders exist.
     pub(super) fn fail(&mut self, error: &RenderError) {
         if let (RenderError::LoopTruncated { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running)
         {
@@ -183,7 +184,7 @@ impl Painter {
         drop_contained(self.running.take());
     }
 
-    /// Keeps a kernel that only differs in its layers: viewers switch back.
+    /// Keeps the running kernel if it differs from the new one only in its layers, because viewers often switch back.
     fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
         let is_sibling = |known: &Running| {
             let same_scene = are_of_one_scene(&known.constants, constants);
@@ -199,7 +200,7 @@ impl Painter {
     }
 }
 
-/// Drops a kernel. With a lost device this may panic.
+/// Drops a kernel. Catches the panic that may occur if the device is lost.
 fn drop_contained(running: Option<Running>) {
     let _ = guarded(|| {
         drop(running);

@@ -1,4 +1,4 @@
-//! The painter: decides on each event what to compile, render, show and report.
+//! The painter: decides after each event what to compile, render, show and report.
 
 mod commands;
 mod comparison;
@@ -38,9 +38,9 @@ use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::sliders::Slider;
 use wgray_scene::CameraDescription;
 
-/// Minimum time between frames of a refining image; at most a tenth is spent on them.
+/// Minimum time between frames while an image is refined. At most a tenth of the time is spent on making frames.
 const BETWEEN_FRAMES: Duration = Duration::from_millis(100);
-/// Maximum number of attempts to open a device without an image in between.
+/// Maximum number of successive attempts to open a device without rendering an image.
 const ATTEMPTS: u32 = 3;
 const GAIN: f32 = 256.0;
 
@@ -50,7 +50,7 @@ pub struct Painter {
     out: Option<PathBuf>,
     /// Number of viewers; `None` renders without viewers.
     looking: Option<Arc<AtomicUsize>>,
-    /// The revision that the output file was last written for.
+    /// The revision that was last written to the output file.
     written: Option<u64>,
     report: Box<dyn Fn(Report) + Send>,
     state_sender: watch::Sender<Arc<State>>,
@@ -66,11 +66,11 @@ pub struct Painter {
     good: Option<Arc<Shaders>>,
     /// Shaders that were refused for these constants.
     refused: Vec<(Arc<Shaders>, Constants)>,
-    /// The last shaders that the driver truncated: in another scene it may not.
+    /// The last shaders whose loops the driver truncated. In a different scene, the driver may not truncate them.
     cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
-    /// The kernel of color while one for layers runs; else the last kernel for layers.
+    /// The color kernel while a layer kernel runs; otherwise the last layer kernel.
     parked: Option<Running>,
     pending: Option<Pending>,
     requests: u64,
@@ -79,13 +79,13 @@ pub struct Painter {
     failures: u32,
     problems: Problems,
 
-    /// The camera, if it differs from the file's.
+    /// The camera, if it differs from the camera in the file.
     camera: Option<CameraDescription>,
     sliders: Sliders,
     /// True if the camera or a slider moved since the image was started.
     camera_waits: bool,
     history: History,
-    /// The changes of the scene file, which the watcher need not read again.
+    /// The changes that this session made to the scene file, so that the watcher need not read them again.
     writes: Arc<Mutex<Writes>>,
     files: Vec<(PathBuf, FileStamp)>,
     view: View,
@@ -99,20 +99,20 @@ pub struct Painter {
     comparison: Comparison,
     /// The inbox of the session, for results of other threads.
     events: SyncSender<Event>,
-    /// The last reported sizes of an image that is too large: in full, and as shown.
+    /// The last reported sizes of an image that is too large to display: the full size, and the displayed size.
     smaller: Option<([u32; 2], [u32; 2])>,
 
     executed: u64,
     frames: u64,
-    /// Number of images.
+    /// Number of images started so far.
     revision: u64,
-    /// When the newest change that is not displayed yet was noticed, and whether it was a save.
+    /// The time when the newest change that is not displayed yet was noticed, and whether the change was a save.
     since: Option<(Instant, bool)>,
     /// Seconds from the last change to its first image.
     latency: Option<f64>,
     /// Seconds spent on compiling for the next frame.
     compiled: Option<f64>,
-    /// When the first image after a save was shown; `None` once it is finished.
+    /// The time when the first image after a save was shown; `None` once the image is finished.
     first_frame: Option<Instant>,
     last_frame: Instant,
     frame_cost: Duration,
@@ -120,11 +120,11 @@ pub struct Painter {
 
 struct Running {
     canvas: Canvas,
-    /// True if the driver truncates the kernel: it halts until something changes.
+    /// True if the driver truncates loops of the kernel; rendering halts until something changes.
     halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,
-    /// The kernel's sliders, by the current shaders.
+    /// The sliders of the kernel, as declared in the current shaders.
     sliders: Vec<Slider>,
     /// The bits of their values.
     slider_values: Vec<u32>,
@@ -137,14 +137,14 @@ struct Pending {
 }
 
 pub struct SessionChannels {
-    /// The terminal.
+    /// Receives reports for the terminal.
     pub report: Box<dyn Fn(Report) + Send>,
     pub state: watch::Sender<Arc<State>>,
     pub frames: watch::Sender<Option<Arc<Frame>>>,
     pub times: Times,
     /// The template of links to an editor.
     pub editor: Option<String>,
-    /// For questions.
+    /// The scene and the camera, for queries about objects.
     pub seen: watch::Sender<Option<Arc<SceneView>>>,
     pub events: SyncSender<Event>,
 }
@@ -240,7 +240,8 @@ impl Painter {
             Event::Reference(reference) => self.take_reference(reference),
             Event::Measured(apart) => self.take_measured(apart),
             Event::Viewers => {
-                // Restarts the latency: no viewer has waited for the image, nor for a finished compiler.
+                // Restarts the latency measurement: no viewer has been waiting for the image, or for a compilation that
+                // has already finished.
                 if self.pending.is_none() {
                     self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
                     self.compiled = None;
@@ -284,13 +285,13 @@ impl Painter {
         self.show_files(noticed, shown_otherwise);
     }
 
-    /// Takes a scene or its errors. Returns true if the display settings changed.
+    /// Takes a loaded scene or its errors. Returns true if the display settings changed.
     fn take_scene(&mut self, scene: Result<Arc<Loaded>, Vec<Diagnostic>>) -> bool {
         let mut shown_otherwise = false;
         match scene {
             Ok(loaded) => {
                 self.problems.scene.clear();
-                // Values edited in the file replace those of the moved camera.
+                // Camera values that were edited in the file replace the values of the moved camera.
                 if let (Some(camera), Some(old)) = (&self.camera, &self.loaded) {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
@@ -318,7 +319,8 @@ impl Painter {
         self.keep_view();
         self.settle((noticed, true));
         self.upload_sliders((noticed, true));
-        // An unchanged rendering with new display settings; the first image of a new one is shown later.
+        // If only the display settings changed, shows the current image again. The first image of a new rendering is
+        // shown later.
         let picture = self.running.as_ref().filter(|running| !running.canvas.is_new());
         if shown_otherwise && self.pending.is_none() && picture.is_some() {
             self.changed((noticed, true));
@@ -326,7 +328,7 @@ impl Painter {
         }
     }
 
-    /// Returns the scene and its shaders: the newest, or the last good ones if those have errors.
+    /// Returns the scene and the shaders to render: the newest ones, or the last good ones if the newest have errors.
     fn wanted(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
         let constants = self.constants(&loaded);
@@ -335,7 +337,7 @@ impl Painter {
         Some((loaded, shaders))
     }
 
-    /// Makes the rendering match the files.
+    /// Makes the rendering match the current scene and shaders.
     fn settle(&mut self, since: (Instant, bool)) {
         let Some((loaded, shaders)) = self.wanted() else { return };
         if self.shaders.as_ref() == Some(&shaders) {
@@ -399,14 +401,14 @@ impl Painter {
         }
     }
 
-    /// An image was started with the current camera.
+    /// Records that an image was started with the current camera.
     fn begun(&mut self, since: (Instant, bool)) {
         self.camera_waits = false;
         self.tell_size();
         self.changed(since);
     }
 
-    /// Another image is shown from now on.
+    /// Records that a different image is shown from now on.
     fn changed(&mut self, since: (Instant, bool)) {
         self.revision += 1;
         self.since.get_or_insert(since);
@@ -436,7 +438,7 @@ impl Painter {
         let Some(loaded) = self.loaded.clone() else { return };
         let camera = self.packed_camera(&loaded);
         let Some(running) = &mut self.running else { return };
-        // Only a complete first image is interrupted: a moving camera must show images.
+        // A first image is only interrupted once it is complete, so that images are shown while the camera moves.
         if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
             running.slider_values = self.sliders.bits(&running.sliders);
             let restarted = guarded(|| {

@@ -1,4 +1,4 @@
-//! The shaders of the files, the values of their sliders, and the kernel that was shown before.
+//! The shaders of the session, the values of their sliders, and the previously shown kernel.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -24,7 +24,7 @@ impl Painter {
         let good = self.good.as_ref();
         self.refused
             .retain(|(known, _)| *known == shaders || Some(known) == good);
-        // A kernel with the same code keeps running; errors and sliders refer to the new text.
+        // A kernel with unchanged code keeps running, but errors and sliders refer to the new text.
         let kernels = [&mut self.running, &mut self.parked].into_iter().flatten();
         for kernel in kernels.filter(|kernel| kernel.shaders.has_same_code(&shaders)) {
             let (_, integrator, adaptive) = kernel.constants;
@@ -55,7 +55,7 @@ impl Painter {
         self.upload_sliders((Instant::now(), false));
     }
 
-    /// From the next image on.
+    /// Uploads the slider values, which apply from the next image on.
     pub(super) fn upload_sliders(&mut self, since: (Instant, bool)) {
         let Some(running) = &mut self.running else { return };
         if self.sliders.bits(&running.sliders) != running.slider_values {
@@ -75,7 +75,7 @@ impl Painter {
         found
     }
 
-    /// With its current image.
+    /// Shows the parked kernel with its current image.
     pub(super) fn show_parked(&mut self, since: (Instant, bool)) {
         let (view, limits) = (self.seen(), self.limits);
         let packed = self.loaded.as_ref().map(|loaded| self.packed(loaded));
@@ -85,7 +85,7 @@ impl Painter {
             running.canvas.set_limits(limits, view)?;
             running.canvas.change_view(view)
         });
-        // After changes of scene or camera, the image restarts at once.
+        // If the scene or the camera changed, the image restarts immediately.
         let is_current = packed.is_some_and(|packed| running.canvas.shows(&packed));
         match shown {
             Ok(()) => {

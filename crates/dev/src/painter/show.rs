@@ -15,13 +15,13 @@ use crate::picture::{Content, Frame, Header, Names, View, png_of};
 use crate::save::replace;
 use wgray_scene::ViewSettings;
 
-/// The current errors by source.
+/// The current errors, grouped by source.
 #[derive(Default)]
 pub struct Problems {
     pub scene: Vec<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
-    /// The image cannot be rendered completely.
+    /// The driver truncates the image: it cannot be rendered completely.
     pub cut: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
     pub out: Option<Diagnostic>,
@@ -128,7 +128,7 @@ impl Painter {
         self.tell();
     }
 
-    /// Replaces `--out` when each pixel has a sample, and when finished.
+    /// Replaces the file of `--out` when each pixel has a sample, and when the image is finished.
     fn write_out(&mut self, png: impl FnOnce() -> Vec<u8>, done: bool) {
         let Some(out) = &self.out else { return };
         if done || self.written != Some(self.revision) {
@@ -139,14 +139,14 @@ impl Painter {
         }
     }
 
-    /// Reports an image too large to display, once per size.
+    /// Reports once per size that an image is too large to display.
     pub(super) fn tell_size(&mut self) {
         let scale = self.limits.scale;
         let sizes = self
             .running
             .as_ref()
             .map(|running| (running.canvas.size(), running.canvas.finest_size()));
-        // A viewer's preview scale is not reported.
+        // A reduction that a viewer requested with the preview scale is not reported.
         let smaller = sizes.filter(|(asked, shown)| asked.map(|side| side.div_ceil(scale)) != *shown);
         if self.smaller != smaller {
             self.smaller = smaller;
@@ -156,7 +156,7 @@ impl Painter {
         }
     }
 
-    /// Publishes scene and camera for questions.
+    /// Publishes the scene and the camera, for queries about objects.
     fn tell_seen(&self) {
         let Some(loaded) = &self.loaded else { return };
         let camera = self.packed_camera(loaded);

@@ -33,7 +33,7 @@ impl Painter {
         }
     }
 
-    /// Falls back to color if the scene lacks the view.
+    /// Falls back to the color view if the scene does not provide the selected view.
     pub(super) fn keep_view(&mut self) {
         if self.loaded.is_none() {
             return;
@@ -45,19 +45,19 @@ impl Painter {
         self.notice(&Err(format!("view `{}`: {rule}", aov.name())), String::new());
     }
 
-    /// Returns why the scene lacks a view, if it does.
+    /// Returns the reason if the scene does not provide a view.
     fn missing(&self, view: View) -> Option<&'static str> {
         let packed = &self.loaded.as_ref()?.packed;
         view.aov()?.missing(packed.integrator, packed.sampling.adaptive)
     }
 
-    /// Views that the scene lacks, and why.
+    /// Returns the views that the scene does not provide, each with the reason.
     pub(super) fn missing_views(&self) -> Vec<(View, &'static str)> {
         let rules = View::LAYERS.iter().map(|view| (*view, self.missing(*view)));
         rules.filter_map(|(view, rule)| Some((view, rule?))).collect()
     }
 
-    /// Returns the shown view: the selected one, unless it needs another kernel.
+    /// Returns the view that is shown: the selected view, unless it needs a different kernel.
     pub(super) fn seen(&self) -> View {
         match &self.running {
             Some(running) => shown(&running.constants, self.view),

@@ -1,4 +1,4 @@
-//! Moves of the camera, and the history of viewpoints.
+//! Camera moves, and the history of viewpoints.
 
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ const STEPS: usize = 256;
 pub struct CameraHistory {
     back: Vec<CameraDescription>,
     forth: Vec<CameraDescription>,
-    /// True if the next move belongs to the last step.
+    /// True if the next move belongs to the current step.
     in_step: bool,
 }
 
@@ -28,7 +28,7 @@ impl CameraHistory {
         [!self.back.is_empty(), !self.forth.is_empty()]
     }
 
-    /// The next move starts another step.
+    /// Ends the current step: the next move starts a new one.
     pub fn end_step(&mut self) {
         self.in_step = false;
     }
@@ -127,7 +127,7 @@ impl Painter {
         };
         let Some(camera) = from.pop() else { return };
         walk.in_step = false;
-        // The file's camera may be of another kind.
+        // The camera in the file may be of a different kind.
         if std::mem::discriminant(&camera) == std::mem::discriminant(&now) {
             to.push(now);
             self.look_through(camera);
@@ -136,7 +136,7 @@ impl Painter {
         }
     }
 
-    /// Moves the camera in a step of its own.
+    /// Moves the camera as a separate step.
     fn step(&mut self, old: &CameraDescription, new: CameraDescription) {
         self.walk.in_step = false;
         self.go(old, new);

@@ -1,5 +1,5 @@
-//! Changes of the scene file: the camera, and values that are set on the page. Each change is validated first, and
-//! can be undone.
+//! Writes changes to the scene file: the camera, and values that are set on the page. Each change is validated before
+//! it is written, and can be undone.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -21,13 +21,13 @@ use wgray_scene::{Field, KeyPath, PendingScene, Segment, cut, folder_of, read_te
 
 impl Painter {
     pub(super) fn set(&mut self, set: &Set) {
-        // The terminal prints the error, with the viewer's text.
+        // The error is escaped because the terminal prints it, and it contains text from the viewer.
         let result = self.try_set(set).map_err(|why| escape_control(&why).into_owned());
         match &result {
             Ok(()) => self.taken(),
             Err(_) => self.notice(&result, String::new()),
         }
-        // A dragged slider only reports errors.
+        // While a slider is dragged, only errors are reported.
         if result.is_err() || set.gesture.is_none() {
             (self.report)(Report::Wrote(escape_control(&cut(&set.path)).into_owned(), result));
         }
@@ -115,7 +115,7 @@ impl Painter {
         let read = self.read_change(&loaded, &at, after)?;
         self.replace(&file, &before, &read)?;
         self.history.turn(again);
-        // A saved camera stays on screen when the save is undone.
+        // If saving the camera is undone, the image keeps showing the saved camera.
         let view = keeps_view.then(|| self.camera.clone().unwrap_or(loaded.camera.clone()));
         let shown_otherwise = self.take_written(read);
         if let (Some(view), Some(loaded)) = (view, &self.loaded) {
@@ -125,7 +125,7 @@ impl Painter {
         Ok(())
     }
 
-    /// Returns the scene file, with links resolved, and its text.
+    /// Returns the path of the scene file, with symbolic links resolved, and the text.
     fn scene_file(&self, what: &str) -> Result<(PathBuf, String), String> {
         let scene = &self.sources.scene;
         let place = scene.display();
@@ -147,7 +147,7 @@ impl Painter {
         self.scene_file(what)
     }
 
-    /// Returns the scene of a text: the loaded one, unless another program changed the file.
+    /// Returns the scene for the text of the file: the loaded scene, unless another program changed the file.
     fn read_again(&self, text: &str) -> Result<Arc<Loaded>, String> {
         if let Some(loaded) = self.loaded.as_ref().filter(|loaded| loaded.text == text) {
             return Ok(Arc::clone(loaded));
@@ -163,7 +163,7 @@ impl Painter {
         Ok(Arc::new(Loaded::new(text.to_owned(), scene, description)))
     }
 
-    /// Returns the scene of a text that differs from a known one inside one table.
+    /// Returns the scene for a text that differs from the known scene's text only inside one table.
     fn read_change(&self, known: &Loaded, at: &KeyPath, text: String) -> Result<Arc<Loaded>, String> {
         let origin = self.sources.scene.display().to_string();
         let folder = folder_of(&self.sources.scene);
@@ -202,7 +202,7 @@ impl Painter {
             .map_err(|error| format!("{place}: cannot be written: {error}"))
     }
 
-    /// Takes a scene that this session has written, instead of reading it.
+    /// Takes over a scene that this session has written, so that the file is not read again.
     fn take_written(&mut self, read: Arc<Loaded>) -> bool {
         if let Some((_, stamp)) = self.files.first_mut() {
             *stamp = FileStamp::Content(read.text.clone().into_bytes());
@@ -216,7 +216,7 @@ impl Painter {
     }
 }
 
-/// Returns a list with one changed number: its path, its field and its value.
+/// Changes one number of a list; returns the path, the field and the new value of the list.
 fn with_element(seen: &SceneView, path: &KeyPath, given: &Json) -> Option<(KeyPath, Field, Json)> {
     let (Segment::Index(i), list) = path.0.split_last()? else {
         return None;

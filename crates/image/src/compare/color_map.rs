@@ -1,5 +1,5 @@
-//! A color map from black over violet, red and orange to pale yellow. Luminance increases monotonically, for grayscale
-//! and color-blind viewers.
+//! A color map from black over violet, red and orange to pale yellow. Luminance increases monotonically, so that the
+//! map is readable in grayscale and for color-blind viewers.
 
 /// Evenly spaced display colors.
 const KNOTS: [[u8; 3]; 9] = [

@@ -1,4 +1,4 @@
-//! Colors of two images in the form that perceptual metrics need.
+//! Converts the colors of two images for the perceptual metrics.
 
 use std::ops::Range;
 
@@ -64,7 +64,8 @@ impl<'a> Colors<'a> {
         })
     }
 
-    /// Returns part of a row of both images, over black. Linear values not finite in either image are 0 in both.
+    /// Returns part of a row of both images, composited over black. Linear values that are non-finite in either image
+    /// are replaced by 0 in both.
     pub fn values(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
         let pixels = y * self.width + x.start..y * self.width + x.end;
         let (mut a, mut b) = (self.a.values(pixels.clone()), self.b.values(pixels));
@@ -78,7 +79,7 @@ impl<'a> Colors<'a> {
         (a, b)
     }
 
-    /// Like `values`, encoded for display: 0 to 1.
+    /// Like `values`, but encoded for display, 0 to 1.
     pub fn shown(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
         let (mut a, mut b) = self.values(y, x);
         if self.kind == Kind::Linear {

@@ -3,7 +3,7 @@
 //! Display images: Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, "ꟻLIP: a difference evaluator
 //! for alternating images", Proceedings of the ACM on Computer Graphics and Interactive Techniques 3 (2), 2020. Linear
 //! images (HDR-ꟻLIP): Andersson, Nilsson, Shirley and Akenine-Möller, "Visualizing errors in rendered high dynamic
-//! range images", Eurographics 2021 Short Papers. Filters are separable as in the authors' note "Separated
+//! range images", Eurographics 2021 Short Papers. Filters are separated as in the authors' note "Separated
 //! convolutions", 2022.
 
 use std::f64::consts::PI;
@@ -30,14 +30,14 @@ pub struct Flip {
     pub map: Option<Map>,
 }
 
-/// Values from 0 to 1 in 255 steps, each the maximum of a square of pixels.
+/// An error map in 8 bits: 255 is 1. Each value is the maximum over a square of pixels.
 #[derive(Clone, Debug)]
 pub struct Map {
     /// Side of a square in pixels.
     pub step: usize,
     /// Squares per row.
     pub width: usize,
-    /// Values by rows.
+    /// Values in row-major order, top row first.
     pub values: Vec<u8>,
 }
 
@@ -53,7 +53,7 @@ impl Map {
         }
     }
 
-    /// Raises the value at a pixel. Values above 0 are at least one step.
+    /// Raises the value at a pixel. Positive values are stored as at least 1 of 255.
     pub fn raise(&mut self, x: usize, y: usize, value: f64) {
         let steps = (value * 255.0 + 0.5) as u8;
         let steps = if value > 0.0 { steps.max(1) } else { 0 };
@@ -105,14 +105,13 @@ pub fn flip(a: &Picture, b: &Picture, pixels_per_degree: f64, step: Option<usize
     })
 }
 
-// Constants of the paper: section 4.1.1, table 1, and sections 4.1.2, 4.2 and 4.3.
-/// Exponent of the color difference.
+// Constants from sections 4.1.1, 4.1.2, 4.2 and 4.3 and table 1 of the paper. Exponent of the color difference.
 const QC: f64 = 0.7;
 /// Fraction of the maximum color difference that is mapped ...
 const PC: f64 = 0.4;
 /// ... to this fraction of the error range.
 const PT: f64 = 0.95;
-/// Width of edges in degrees.
+/// Width of the edge detection filter in degrees.
 const W: f64 = 0.082;
 /// Exponent of the feature difference.
 const QF: f64 = 0.5;
@@ -126,9 +125,9 @@ struct Filters {
     radius: usize,
     light: Vec<f32>,
     red_green: Vec<f32>,
-    /// Two separable filters, whose results are added.
+    /// Two separable filters; their results are added.
     blue_yellow: [Vec<f32>; 2],
-    /// A Gaussian, and its first and second derivatives.
+    /// A Gaussian and its first and second derivatives.
     gauss: Vec<f32>,
     edge: Vec<f32>,
     point: Vec<f32>,
@@ -151,7 +150,7 @@ impl Filters {
             let x = x / pixels_per_degree;
             a * (PI / b).sqrt() * (-PI * PI * x * x / b).exp()
         };
-        // A 2D Gaussian is the product of two 1D Gaussians with the root of its amplitude.
+        // A 2D Gaussian is the product of two 1D Gaussians; each has the square root of the amplitude.
         let root = |x: f64, (a, b): (f64, f64)| seen(x, ((a / (PI / b).sqrt()).sqrt(), b));
         let light = taps(spatial, &|x| seen(x, LIGHT));
         let red_green = taps(spatial, &|x| seen(x, RED_GREEN));
@@ -167,7 +166,7 @@ impl Filters {
         let edge = taps(feature, &|x| -x * bell(x));
         let point = taps(feature, &|x| (x * x / (deviation * deviation) - 1.0) * bell(x));
         let over = |weights: &[f64], sum: f64| weights.iter().map(|weight| (weight / sum) as f32).collect::<Vec<f32>>();
-        // Positive weights sum to 1, negative ones to -1.
+        // Positive weights sum to 1, negative weights to -1.
         let balanced = |weights: &[f64]| {
             let above: f64 = weights.iter().filter(|weight| **weight > 0.0).sum();
             let below: f64 = weights.iter().filter(|weight| **weight < 0.0).sum();
@@ -199,9 +198,9 @@ fn tone(x: f64) -> f64 {
     (a * x * x + b * x + c) / (d * x * x + e * x + f)
 }
 
-/// Returns the exposures in stops for linear images, about one stop apart: from the one that maps the brightest pixel
-/// of the reference to 0.85 to the one of the median luminance. If the median is 0, black pixels are ignored. A black
-/// reference has the exposure 0 only.
+/// Returns the exposures in stops for linear images, about one stop apart. The first maps the brightest pixel of the
+/// reference to 0.85, the last maps the median luminance to 0.85. If the median is 0, black pixels are ignored. For a
+/// black reference, the only exposure is 0.
 fn exposures(colors: &Colors) -> Vec<f64> {
     let rows = (0..colors.height).into_par_iter();
     let luminances = rows.flat_map_iter(|y| {
@@ -385,12 +384,12 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     ((a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])).powf(QC)
 }
 
-/// Maximum distance, between green and blue.
+/// Returns the maximum distance, which is the distance between green and blue.
 fn greatest() -> f64 {
     distance(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0]))
 }
 
-/// Error from 0 to 1 of two filtered opponent colors.
+/// Returns the error, 0 to 1, between two filtered opponent colors.
 fn color_difference(a: [f32; 3], b: [f32; 3], greatest: f64) -> f64 {
     if a == b {
         return 0.0;
@@ -404,8 +403,8 @@ fn color_difference(a: [f32; 3], b: [f32; 3], greatest: f64) -> f64 {
     }
 }
 
-/// A tile filtered horizontally: achromatic, red-green, blue-yellow twice; then Gaussian and two derivatives of the
-/// achromatic channel.
+/// A horizontally filtered tile. Channels: achromatic, red-green, two of blue-yellow; then the achromatic channel
+/// filtered by a Gaussian and by its two derivatives.
 struct Lines {
     width: usize,
     values: [Vec<f32>; 7],
@@ -438,7 +437,7 @@ impl Lines {
     }
 }
 
-/// A row filtered in both directions: four colors; first and second derivatives in x, then in y.
+/// A row filtered in both directions: the four color channels, and the first and second derivatives in x, then in y.
 struct EdgesAndPoints {
     values: [Vec<f32>; 8],
 }
@@ -489,7 +488,8 @@ fn add(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// Linear value of a displayed one, from the table for the 256 steps. Others have been rounded to `f32`.
+/// Converts a display value to a linear value. The 256 values of an 8-bit display use the table; other values have been
+/// rounded to `f32`.
 fn screen_to_linear(curve: &[f64; 256], value: f64) -> f64 {
     let step = (value * 255.0 + 0.5) as u8;
     if value as f32 == (f64::from(step) / 255.0) as f32 {

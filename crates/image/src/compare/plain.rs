@@ -8,15 +8,15 @@ use super::picture::{Kind, Picture, Plane};
 /// Added to the squared reference in the denominator of the relative error: Rousselle, Knaus and Zwicker, "Adaptive
 /// sampling and reconstruction using greedy error minimization", ACM Trans. Graph. 30 (6), 2011, section 5.
 const EPSILON: f64 = 0.01;
-/// Pixels per work unit. Partial sums are added in order, whatever the number of threads.
+/// Pixels per work unit. Partial sums are added in order, independent of the number of threads.
 const CHUNK: usize = 1 << 16;
 
 /// A group of channels that both images have.
 #[derive(Clone, Debug)]
 pub struct Layer<'a> {
-    /// `color` for `R`, `G`, `B`, `A` and `Y`; `normal` for `normal.X`; else the name of the channel.
+    /// `color` for `R`, `G`, `B`, `A` and `Y`; `normal` for `normal.X`; otherwise the name of the channel.
     pub name: String,
-    /// Name and values in both images of each channel.
+    /// For each channel: its name, and its values in both images.
     pub channels: Vec<(&'a str, &'a Plane, &'a Plane)>,
     kind: Kind,
 }
@@ -24,13 +24,13 @@ pub struct Layer<'a> {
 /// Coordinates of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelCoord {
-    /// Column from the left, from 0.
+    /// Column, counted from 0 at the left.
     pub x: u32,
-    /// Row from the top, from 0.
+    /// Row, counted from 0 at the top.
     pub y: u32,
 }
 
-/// Numbers of non-finite values.
+/// Counts of non-finite values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Values {
     /// Number of NaNs.
@@ -51,12 +51,12 @@ impl Values {
     }
 }
 
-/// The largest difference of two values.
+/// The largest difference between two values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LargestDifference {
     /// Absolute difference.
     pub difference: f64,
-    /// Pixel, the first in reading order of several.
+    /// The pixel, or the first of several in row-major order.
     pub pixel: PixelCoord,
     /// Name of the channel.
     pub channel: String,
@@ -66,8 +66,8 @@ pub struct LargestDifference {
     pub b: f64,
 }
 
-/// Differences of a layer of two images. Values that are not finite in either image count as 0 in both, except for
-/// `different` and `beyond`.
+/// Differences between two images in one layer. Values that are non-finite in either image count as 0 in both, except
+/// for `different` and `beyond`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// Pixels with a value that is not bit-identical; signed zeros differ.
@@ -82,8 +82,8 @@ pub struct Difference {
     pub rmse: f64,
     /// Mean of d² / (b² + 0.01), where b is the value in the second image.
     pub rel_mse: f64,
-    /// 20 log10(peak / rmse) in decibels; infinite for equal images. The peak is 1 for display values, else the second
-    /// image's maximum magnitude, or 1 if that is 0.
+    /// 20 log10(peak / rmse) in decibels; infinite for equal images. The peak is 1 for display values; otherwise the
+    /// maximum magnitude in the second image, or 1 if the maximum is 0.
     pub psnr: f64,
     /// Non-finite values of the first image.
     pub a: Values,
@@ -93,7 +93,8 @@ pub struct Difference {
     pub first_non_finite: Option<PixelCoord>,
 }
 
-/// Returns the layers of both images, colors first, and the channels of only the first or only the second.
+/// Returns the layers of both images, colors first, and the channels that exist only in the first or only in the second
+/// image.
 pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a str>, Vec<&'a str>) {
     let mut layers: Vec<Layer> = Vec::new();
     let mut only_a = Vec::new();
@@ -171,7 +172,7 @@ impl DifferenceSums {
 }
 
 impl<'a> Layer<'a> {
-    /// Compares both images; `threshold` only affects [`Difference::beyond`].
+    /// Compares the layer in both images; `threshold` only affects [`Difference::beyond`].
     pub fn difference(&self, width: u32, height: u32, threshold: f64) -> Difference {
         let pixels = width as usize * height as usize;
         let chunks = (0..pixels.div_ceil(CHUNK)).into_par_iter();
@@ -213,7 +214,7 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Returns a mask of differing or non-finite pixels, and the differences relative to the largest one.
+    /// Returns a mask of differing or non-finite pixels, and the differences divided by the largest difference.
     pub(super) fn maps(&self, picture: &Picture, step: usize) -> (Map, Map) {
         let (mut differing, mut apart) = (Map::new(picture, step), Map::new(picture, step));
         let largest = self.difference(picture.width, picture.height, 0.0).largest;

@@ -1,4 +1,5 @@
-//! Visualization of a comparison: both images and the error map as three panels, in a row or, if wide, in a column.
+//! Visualization of a comparison: both images and the error map as three panels, side by side, or stacked if the images
+//! are wide.
 
 use super::color_map;
 use super::colors::Colors;
@@ -8,14 +9,14 @@ use super::plain::{COLOR, Layer};
 
 /// Maximum side of a displayed image. Larger images are subsampled by an integer step.
 const LONGEST: usize = 4096;
-/// Smaller images are magnified up to this size, by an integer factor.
+/// Smaller images are magnified by an integer factor up to this size.
 const SHORTEST: usize = 256;
 /// Minimum width and height of a displayed image.
 const NARROWEST: usize = 16;
 /// Cells along the longer side. Cells with a differing pixel are outlined.
 const CELLS: usize = 64;
 const GAP: usize = 8;
-/// Side of a dot of a letter in pixels, and height of a label with its margin.
+/// Side of a glyph dot in pixels, and height of a label including its margin.
 const DOT: usize = 2;
 const LABEL: usize = 7 * DOT + 6;
 /// Height of the color scale below the map.
@@ -34,7 +35,8 @@ pub struct ErrorImage<'a> {
     source: Source<'a>,
     columns: usize,
     error: Map,
-    /// Cells with a differing pixel by rows, cells per row, and side of a cell in squares of the map.
+    /// For each cell in row-major order, whether it contains a differing pixel; cells per row; side of a cell in
+    /// squares of the map.
     marked: Vec<bool>,
     cells: usize,
     cell: usize,
@@ -56,7 +58,7 @@ pub fn step(picture: &Picture) -> usize {
     (picture.width.max(picture.height) as usize).div_ceil(LONGEST)
 }
 
-/// Lays out a layer of two images. `error` is the map of [`flip`](super::flip()) with the step of [`step`]; otherwise
+/// Lays out a layer of two images. `error` is the map of [`flip`](super::flip()) with the step of [`step`]; without it,
 /// the panel shows relative differences.
 pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option<Map>) -> ErrorImage<'a> {
     let step = step(b);
@@ -84,7 +86,7 @@ pub fn show<'a>(a: &'a Picture, b: &'a Picture, layer: &Layer<'a>, error: Option
     let zoom = (zoom(columns), zoom(rows));
     let panel = (columns * zoom.0, rows * zoom.1);
     let is_stacked = panel.0 > 2 * panel.1;
-    // The longest label has four letters, each six dots wide.
+    // The longest label has four letters; each is six dots wide.
     let (across, down) = (panel.0.max(4 * 6 * DOT), LABEL + panel.1);
     let (width, height) = match is_stacked {
         true => (across, 3 * (down + GAP)),
@@ -171,7 +173,7 @@ impl ErrorImage<'_> {
         (0..self.panel.0).map(pixel).collect()
     }
 
-    /// Returns true for pixels of outlines: outside of the marked cells, but close to one.
+    /// Returns true for pixels of the outlines, which surround the marked cells.
     fn is_line(&self, x: usize, y: usize) -> bool {
         let (wide, high) = (self.cell * self.zoom.0, self.cell * self.zoom.1);
         let thick = (wide.min(high) / 16).max(1);

@@ -33,7 +33,7 @@ pub fn ssim(a: &Picture, b: &Picture) -> Option<f64> {
     Some(sum / (3 * across.count * down.count) as f64)
 }
 
-/// A range of window centers along a side.
+/// The windows along one axis.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     first: usize,
@@ -62,8 +62,8 @@ impl Axis {
         self.first.saturating_sub(RADIUS)..self.side.min(self.first + self.count + RADIUS)
     }
 
-    /// Calls `call` with a range of windows (relative to this axis), the pixels of a tap (relative to `pixels`) and its
-    /// weight. Clipped windows have their own weights: one at a time.
+    /// For each filter tap, calls `call` with a range of windows (relative to this axis), the pixels under the tap
+    /// (relative to `pixels`) and the weight. Clipped windows differ in weights, so each of them has its own calls.
     fn each(self, mut call: impl FnMut(Range<usize>, Range<usize>, f64)) {
         let kernel: [f64; 2 * RADIUS + 1] = std::array::from_fn(|i| {
             let x = i as f64 - RADIUS as f64;

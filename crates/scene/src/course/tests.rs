@@ -1,4 +1,4 @@
-//! Tests of the conversion and of the errors of JSON scenes of the course.
+//! Tests of the conversion of JSON scenes of the course, and of their error messages.
 
 use std::fs;
 
@@ -49,7 +49,7 @@ const GOOD: &str = r#"{
 const FLOOR: &str = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nf 1 2 3 4\n";
 const LEFT: &str = "v -1 0 -1\nv -1 2 -1\nv -1 2 1\nv -1 0 1\nf 1 2 3 4\n";
 
-/// The tall box, with the course's x and z of its top corners.
+/// The tall box; its top corners have the x and z coordinates of the course's scene.
 fn tall() -> String {
     let corners = [
         (-0.720444, 0.473882),
@@ -129,7 +129,7 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
     assert!(near(u.cross(*v).normalize(), DVec3::NEG_Z));
     assert_eq!(*color, DVec3::new(17.0, 12.0, 5.0));
 
-    // In the order of their names: a mirror, gray, red.
+    // In the order of the names: a mirror, gray, red.
     let plain = |r, g, b| Color::Plain(DVec3::new(r, g, b));
     let plain_of = |reflection| Material {
         reflection,
@@ -155,7 +155,7 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
         extent(&scene, 1),
         (DVec3::new(-1.0, 0.0, 1.0), DVec3::new(0.0, 1.0, 1.0))
     );
-    // Scaled by 0.5, then translated by (0.7, 0, -0.5): 0.5 away from the camera.
+    // Scaled by 0.5, then translated by (0.7, 0, -0.5): 0.5 farther from the camera.
     let (middle, half) = extent(&scene, 2);
     let (low, high) = ((-0.720444, -0.0906493), (0.0495656, 0.673479));
     let expected = DVec3::new((low.0 + high.0) / 4.0 + 0.7, -(low.1 + high.1) / 4.0 + 0.5, 0.3);
@@ -179,7 +179,7 @@ fn samples_need_not_be_a_square() {
 }
 
 #[test]
-fn a_camera_sees_the_same_in_both_coordinates() {
+fn a_camera_has_the_same_view_in_both_coordinate_systems() {
     // The axes of the camera must be converted like vectors.
     let described = camera(&Camera {
         position: DVec3::new(1.0, 2.0, 3.0),
@@ -212,7 +212,7 @@ fn names_end_in_json_in_any_case() {
 }
 
 #[test]
-fn what_may_be_absent_has_defaults() {
+fn optional_keys_have_defaults() {
     let text = GOOD
         .replace(",\n    \"focal_length\": 1", "")
         .replace(", \"translate\": [0, 0, 0], \"scale\": 1, \"has_bvh\": false", "");
@@ -223,7 +223,7 @@ fn what_may_be_absent_has_defaults() {
 }
 
 #[test]
-fn overrides_stand_in_for_the_files_values() {
+fn overrides_replace_values_of_the_file() {
     let overrides = Overrides {
         size: Some((30, 20)),
         pixel_samples: Some(5),
@@ -293,7 +293,7 @@ fn all_errors_are_reported() {
 }
 
 #[test]
-fn defines_have_the_files_own_keys() {
+fn defines_use_the_keys_of_the_file() {
     let load = |define: &str| {
         let overrides = Overrides {
             define: vec![define.parse().unwrap()],
@@ -331,7 +331,7 @@ fn defines_have_the_files_own_keys() {
 }
 
 #[test]
-fn meshes_lie_in_the_folder_above_or_where_it_is_told() {
+fn meshes_must_be_in_the_parent_folder_or_the_asset_root() {
     let folder = folder();
     let configs = folder.path().join("configs");
     let path = configs.join("a.json");
@@ -528,7 +528,7 @@ const BAD: &[(&str, &str, &str)] = &[
 ];
 
 #[test]
-fn bad_files_are_told_with_place_key_value_and_rule() {
+fn invalid_files_are_reported_with_location_key_value_and_rule() {
     for (piece, bad, expected) in BAD {
         assert_eq!(GOOD.matches(piece).count(), 1, "{piece}");
         let text = GOOD.replace(piece, bad);

@@ -1,5 +1,5 @@
-//! EXR files with one channel of any name, decoded as gray; the crate `image` requires R, G and B. Files with neither
-//! are rejected here.
+//! EXR files with one channel of any name, decoded as gray; the crate `image` requires R, G and B. Files that have
+//! neither are rejected here.
 
 use std::io::Cursor;
 
@@ -13,7 +13,8 @@ use super::{Channels, DecodeError, Header};
 const COLORS: [&str; 3] = ["R", "G", "B"];
 
 /// Returns the image if the file has one layer with one channel and an optional, ignored `A`; `None` if it is a color
-/// image. First, `check_layer` gets the size and the bytes per pixel of each layer, and `check` the header.
+/// image. Before decoding, calls `check_layer` with the size and the bytes per pixel of each layer, and `check` with
+/// the header.
 pub(super) fn gray_exr(
     bytes: &[u8],
     check_layer: impl Fn((u32, u32), u64) -> Result<(), DecodeError>,

@@ -3,8 +3,8 @@
 use super::*;
 use crate::{Camera, CameraDescription, Projection};
 
-/// Returns a point's position in the image, from -1 at the left and lower edges to 1.
-fn seen(camera: &Camera, aspect: f64, point: DVec3) -> [f64; 2] {
+/// Returns the image position of a point, from -1 (left and lower edges) to 1.
+fn image_position(camera: &Camera, aspect: f64, point: DVec3) -> [f64; 2] {
     let Projection::Perspective { fov } = camera.projection else {
         panic!("a perspective camera")
     };
@@ -67,7 +67,7 @@ fn clouds() -> Vec<Vec<DVec3>> {
 const ASPECTS: [f64; 6] = [1.0, 16.0 / 9.0, 9.0 / 16.0, 6.0, 1.0 / 6.0, 10.0];
 
 #[test]
-fn all_is_in_the_image_and_fills_it() {
+fn all_points_are_in_the_image_and_fill_it() {
     for points in clouds() {
         for view in View::ALL {
             for aspect in ASPECTS {
@@ -75,7 +75,7 @@ fn all_is_in_the_image_and_fills_it() {
                 let camera = camera(&points, framing);
                 let (mut most, mut ends) = (0.0_f64, [[f64::INFINITY, f64::NEG_INFINITY]; 2]);
                 for point in &points {
-                    let at = seen(&camera, aspect, *point);
+                    let at = image_position(&camera, aspect, *point);
                     assert!(
                         at.iter().all(|x| x.abs() <= INSIDE + 1e-6),
                         "{framing:?}: {point} at {at:?}"
@@ -85,10 +85,10 @@ fn all_is_in_the_image_and_fills_it() {
                         *ends = [ends[0].min(x), ends[1].max(x)];
                     }
                 }
-                // A pixel of an image of 2000 x 2000 is 1e-3 of its half.
+                // In an image of 2000 x 2000 pixels, a pixel is 1e-3 of half the side.
                 let [x, y] = ends.map(|[low, top]| (low + top).abs());
                 assert!(x.max(y) < 1e-6, "{framing:?}: off centre by {x}, {y}");
-                // The margins are reached, unless the camera would be too near.
+                // The points reach the margins, unless the camera would be too near.
                 let size = (0..3).map(|i| {
                     let along = || points.iter().map(|p| p[i]);
                     along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
@@ -103,7 +103,8 @@ fn all_is_in_the_image_and_fills_it() {
                     assert!(nearest > near * (1.0 - 1e-6), "{framing:?}: {nearest}");
                     assert!(
                         farthest - nearest >= 0.8 * size,
-                        "only what is long may be farther away"
+                        "the camera is at its minimum distance although the scene is not elongated along the view \
+                         direction"
                     );
                 }
             }
@@ -112,7 +113,7 @@ fn all_is_in_the_image_and_fills_it() {
 }
 
 #[test]
-fn what_turns_stays_in_the_image() {
+fn rotating_scenes_stay_in_the_image() {
     for points in clouds() {
         for view in View::ALL {
             for aspect in ASPECTS {
@@ -126,9 +127,9 @@ fn what_turns_stays_in_the_image() {
                 for turn in 0..72 {
                     let turned = glam::DQuat::from_axis_angle(up, f64::from(turn).to_radians() * 5.0);
                     for point in &points {
-                        // The points turn, in place of the camera.
+                        // Rotates the points instead of the camera.
                         let point = still.look_at + turned * (*point - still.look_at);
-                        let at = seen(&still, aspect, point);
+                        let at = image_position(&still, aspect, point);
                         assert!(
                             at.iter().all(|x| x.abs() <= INSIDE + 1e-6),
                             "{framing:?}: {point} at {at:?}"
@@ -143,7 +144,7 @@ fn what_turns_stays_in_the_image() {
 }
 
 #[test]
-fn views_show_the_sides_that_they_name() {
+fn views_look_at_the_side_that_they_are_named_after() {
     let points = corners([0.0; 3], [1.0; 3]);
     let at = |view: View| camera(&points, Framing::new(view, 1.0));
     for (view, forward, right) in [
@@ -171,7 +172,7 @@ fn views_show_the_sides_that_they_name() {
 
 #[test]
 fn the_margins_of_a_leaning_triangle_are_equal() {
-    // Seen from the front: the base, 2 wide and from z = 0, lies at depth d, the tip at (0, -1, 3) one nearer.
+    // Seen from the front: the base at z = 0 is 2 wide and lies at depth D + 1; the tip at (0, -1, 3) is nearer by 1.
     let points = [-1.0, 1.0].map(|x| DVec3::new(x, 0.0, 0.0)).into_iter();
     let points: Vec<DVec3> = points.chain([DVec3::new(0.0, -1.0, 3.0)]).collect();
     for aspect in [0.25, 4.0] {
@@ -207,7 +208,7 @@ fn a_turning_model_keeps_equal_margins() {
             for turn in 0..3600 {
                 let turned = glam::DQuat::from_rotation_z(f64::from(turn).to_radians() / 10.0);
                 for point in &points {
-                    let [_, y] = seen(&still, aspect, middle + turned * (*point - middle));
+                    let [_, y] = image_position(&still, aspect, middle + turned * (*point - middle));
                     ends = [ends[0].min(y), ends[1].max(y)];
                 }
             }
@@ -282,13 +283,17 @@ fn a_field_of_view_is_kept() {
             panic!("a perspective camera")
         };
         assert!((found.to_degrees() - fov).abs() < 1e-9, "{found}");
-        let inside = |p: &DVec3| seen(&camera, aspect, *p).iter().all(|x| x.abs() <= INSIDE + 1e-6);
+        let inside = |p: &DVec3| {
+            image_position(&camera, aspect, *p)
+                .iter()
+                .all(|x| x.abs() <= INSIDE + 1e-6)
+        };
         assert!(points.iter().all(inside), "{fov}");
     }
 }
 
 #[test]
-fn nothing_is_framed_somewhere() {
+fn empty_scenes_can_be_framed() {
     for turns in [false, true] {
         camera(
             &[],

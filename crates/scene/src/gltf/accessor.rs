@@ -12,9 +12,9 @@ use super::json::missing;
 
 /// Maximum element count of an accessor without a buffer view.
 const MAX_ZEROS: u64 = 1 << 22;
-/// Maximum decoded size of such an accessor, in bytes.
+/// Maximum decoded size of an accessor without a buffer view, in bytes.
 const MAX_ZEROS_BYTES: u64 = 64 << 20;
-/// Overhead per read in bytes: limits small reads.
+/// Bytes charged per read in addition to the data; limits the number of small reads.
 const BESIDE: u64 = 64;
 
 /// Element type and memory layout of an accessor.
@@ -81,7 +81,7 @@ struct Elements<'a> {
 }
 
 impl Elements<'_> {
-    /// Checks that `count` elements are within `bytes`. Errors name `place`.
+    /// Checks that `count` elements are within `bytes`. Error messages contain `place`.
     fn in_bytes<'a>(
         key: &str,
         (bytes, place): (&'a [u8], &str),
@@ -183,8 +183,8 @@ impl Document {
         layout.map(Layout::count).map_err(|fault| fault.of(&self.path))
     }
 
-    /// Returns the elements of an accessor with `N` components, matrices column-major. Normalized integers are from -1
-    /// or 0 to 1; floats may be NaN or infinite.
+    /// Returns the elements of an accessor with `N` components, matrices column-major. Normalized integers become -1
+    /// ... 1 or 0 ... 1; floats may be NaN or infinite.
     pub fn vectors<const N: usize>(&self, accessor: usize) -> Result<Vec<[f32; N]>, GltfError> {
         self.floats(accessor).map_err(|fault| fault.of(&self.path))
     }

@@ -10,14 +10,14 @@ use super::document::Document;
 use super::error::GltfError;
 use super::node::{Pose, quaternion};
 
-/// Maximum number of morph weights of all animated nodes.
+/// Maximum total number of morph weights of animated nodes.
 const MAX_WEIGHTS: usize = 1 << 24;
 
 /// Maximum number of animations named in a warning.
 const MAX_NAMED: usize = 5;
 
 impl Document {
-    /// Returns the animations whose properties no earlier one drives. `notes` name the others.
+    /// Returns the animations that do not drive a property of an earlier animation. The others are listed in `notes`.
     pub(super) fn compatible(&self, animations: Vec<usize>, notes: &mut Vec<String>) -> Vec<usize> {
         let mut driven = HashSet::new();
         let (mut playing, mut others) = (Vec::new(), Vec::new());
@@ -58,7 +58,7 @@ impl Document {
         playing
     }
 
-    /// Applies an animation at `time` in seconds, clamped to its first and last key.
+    /// Applies an animation at `time` in seconds, clamped to the first and last key.
     pub(super) fn animate(
         &self,
         poses: &mut [Pose],
@@ -149,7 +149,7 @@ impl Document {
 }
 
 impl Pose {
-    /// Decomposes the matrix, forbidden on animated nodes.
+    /// Decomposes the matrix. The specification does not allow matrices on animated nodes.
     fn take_apart(&mut self) {
         if let Some(matrix) = self.matrix.take() {
             (self.scale, self.rotation, self.translation) = matrix.to_scale_rotation_translation();
@@ -160,9 +160,9 @@ impl Pose {
 struct KeyInterval {
     interpolation: Interpolation,
     keys: [usize; 2],
-    /// Interpolation parameter, 0 to 1.
+    /// Position in the key interval, 0 to 1.
     share: f64,
-    /// Key interval in seconds.
+    /// Length of the key interval in seconds.
     seconds: f64,
 }
 

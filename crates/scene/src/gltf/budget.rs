@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub(super) enum Resource {
     /// Bytes of accessor reads.
     Read,
-    /// Triangles of all meshes, per combination of skin and weights.
+    /// Triangles of all meshes, counted for each combination of skin and weights.
     Triangles,
     Instances,
     /// Bytes of decompressed buffer views.
@@ -28,7 +28,7 @@ impl Resource {
     fn rates(self) -> (u64, (u64, u64), u64) {
         match self {
             Resource::Read => (1 << 30, (16, 1), u64::MAX),
-            // A triangle has at least three bytes of indices, except in a shared mesh.
+            // A triangle has at least three bytes of indices, unless its mesh is shared.
             Resource::Triangles => (1 << 22, (1, 3), 1 << 28),
             // An instance takes more than 1 KiB in a scene.
             Resource::Instances => (1 << 16, (1, 4), super::MAX_INSTANCES as u64),
@@ -40,7 +40,7 @@ impl Resource {
 
 #[derive(Debug)]
 pub(super) struct Budget {
-    /// Size of the JSON and of the referenced buffers.
+    /// Total size of the JSON and of the referenced buffers.
     bytes: u64,
     taken: [AtomicU64; 4],
 }
@@ -58,7 +58,7 @@ impl Budget {
         any.saturating_add(self.bytes.saturating_mul(more) / of).min(most)
     }
 
-    /// Charges `count`; the error is the rule.
+    /// Charges `count` to the budget; the error is the violated rule.
     pub fn take(&self, thing: Resource, count: u64) -> Result<(), String> {
         let most = self.most(thing);
         let taken = &self.taken[thing as usize];

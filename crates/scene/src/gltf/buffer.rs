@@ -13,7 +13,7 @@ use super::json::missing;
 use super::meshopt::{self, Compressed};
 use super::uri::{self, Folder};
 
-/// Maximum size of a file, and of all buffers together.
+/// Maximum size of a file, and of all buffers in total.
 pub(super) const MAX_BUFFER_BYTES: u64 = 8 << 30;
 
 enum Bytes {
@@ -35,7 +35,8 @@ pub(super) struct Buffers {
 }
 
 impl Buffers {
-    /// Reads the referenced buffers, and removes data URIs from `root`. `chunk` is that of the GLB file `file`.
+    /// Reads the referenced buffers, and removes data URIs from `root`. `chunk` is the binary chunk of the GLB file
+    /// `file`.
     pub fn read(
         root: &mut Root,
         file: Vec<u8>,
@@ -161,7 +162,7 @@ impl Buffers {
         )
     }
 
-    /// `key` is for errors.
+    /// Returns a part of a buffer. `key` is the location for errors.
     fn part(&self, root: &Root, key: &str, buffer: usize, offset: u64, length: u64) -> Result<&[u8], GltfFault> {
         let bytes = self.buffer(root, buffer)?;
         let end = offset.checked_add(length).filter(|end| *end <= bytes.len() as u64);

@@ -9,7 +9,7 @@ use super::{ImportedCamera, UPRIGHT};
 use crate::{OrthographicDescription, PerspectiveDescription};
 
 impl Document {
-    /// The target is at the depth of the centre of the scene bounds.
+    /// Returns the camera of a node. The look-at point has the depth of the centre of the scene bounds.
     pub(super) fn camera(
         &self,
         node: usize,
@@ -32,7 +32,7 @@ impl Document {
         if !position.is_finite() || !(forward.cross(up).length() > 1e-6) {
             note(
                 notes,
-                format!("nodes[{node}]: its camera is left out: its scale is zero"),
+                format!("nodes[{node}]: the camera is skipped because the node has zero scale"),
             );
             return Ok(None);
         }
@@ -45,7 +45,7 @@ impl Document {
                 let fov = f64::from(of.yfov).to_degrees();
                 if !(0.001..=179.999).contains(&fov) {
                     let rule = format!("yfov: {} must be from 0.00002 to 3.1415 radians", of.yfov);
-                    note(notes, format!("{place}.{rule}; it is left out"));
+                    note(notes, format!("{place}.{rule}; the camera is skipped"));
                     return Ok(None);
                 }
                 let camera = PerspectiveDescription {
@@ -58,7 +58,7 @@ impl Document {
                 let (width, height) = (f64::from(of.xmag).abs(), f64::from(of.ymag).abs());
                 if !(1e-9..=1e9).contains(&height) || !(1e-9..=1e9).contains(&width) {
                     let rule = format!("xmag and ymag: {} and {} must not be 0", of.xmag, of.ymag);
-                    note(notes, format!("{place}: {rule}; it is left out"));
+                    note(notes, format!("{place}: {rule}; the camera is skipped"));
                     return Ok(None);
                 }
                 let camera = OrthographicDescription {

@@ -21,7 +21,7 @@ fn ways(value: &Value, pointer: &mut String, all: &mut Vec<String>) {
     }
 }
 
-/// Replaces or removes one value. `below(n)` is random, less than `n`.
+/// Replaces or removes one value. `below(n)` returns a random number less than `n`.
 pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
     let mut all = Vec::new();
     ways(json, &mut String::new(), &mut all);
@@ -74,7 +74,7 @@ pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
     } else if let Some(value) = json.pointer_mut(pointer) {
         *value = match (kind, other) {
             (2, Some(other)) => other,
-            // Numbers are usually replaced by numbers.
+            // In most cases, numbers are replaced by numbers.
             (3..7, _) if value.is_number() => values[below(21)].clone(),
             _ => values[below(values.len())].clone(),
         };

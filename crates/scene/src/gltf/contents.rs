@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::document::Document;
 use super::uri;
 
-/// The names in a glTF file, in the order in which options count; `None` for parts without a name.
+/// The names in a glTF file, in the order of the indices that options accept; `None` for parts without a name.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct ModelContents {

@@ -19,11 +19,11 @@ use super::{extension, glb, json};
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
 /// Texture extensions with further image formats, in three.js's order of precedence.
 const SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
-/// Maximum size of all image reads in bytes.
+/// Maximum total size of all image reads in bytes.
 const MAX_IMAGES_BYTES: u64 = 4 << 30;
 
-/// An open file. JSON indices (except in raw extension data) and enumerations are valid, and numbers finite; the node
-/// hierarchy and values are unchecked.
+/// An open file. JSON indices (except in raw extension data) and enumerations are valid, and all numbers are finite;
+/// the node hierarchy and values have not been checked.
 pub(super) struct Document {
     /// JSON without data URIs of buffers.
     pub json: Root,
@@ -32,7 +32,7 @@ pub(super) struct Document {
     pub budget: Budget,
     folder: Folder,
     buffers: Buffers,
-    /// Size of all image reads in bytes.
+    /// Total size of all image reads in bytes.
     given: AtomicU64,
 }
 
@@ -54,7 +54,7 @@ impl Document {
     ///
     /// # Errors
     ///
-    /// Unreadable or invalid files, unsupported required extensions, and missing or truncated buffers.
+    /// The file cannot be read or is invalid, requires an unsupported extension, or has a missing or truncated buffer.
     pub fn open(path: &Path, root: &Path, files: &mut BTreeSet<PathBuf>) -> Result<Document, GltfError> {
         files.insert(path.to_owned());
         let file = uri::read(path, MAX_BUFFER_BYTES).map_err(|error| GltfError::Read {
@@ -126,7 +126,8 @@ impl Document {
         self.buffers.view(&self.json, view)
     }
 
-    /// Returns the image of a texture: that of the first of [`SOURCES`], or the core source.
+    /// Returns the image of a texture: the image of the first extension in [`SOURCES`] that is present, or the core
+    /// source.
     pub fn image_of(&self, texture: usize) -> Result<usize, GltfError> {
         self.source_of(texture).map_err(|fault| fault.of(&self.path))
     }
@@ -147,7 +148,7 @@ impl Document {
                 GltfFault::key(format!("{key}.extensions.{name}.source"), rule)
             });
         }
-        // A missing source is an index out of range.
+        // A missing source has an index that is out of range.
         match self.json.get(texture.source) {
             Some(_) => Ok(texture.source.value()),
             None => Err(match others.and_then(extension::unknown) {
@@ -161,7 +162,7 @@ impl Document {
     ///
     /// # Errors
     ///
-    /// Files outside of the asset root, and too large images.
+    /// The file is outside of the asset root, or the image is too large.
     pub fn image_bytes(&self, image: usize) -> Result<Result<Arc<[u8]>, String>, GltfError> {
         match self.encoded(image) {
             Ok(bytes) => Ok(Ok(bytes)),
@@ -212,7 +213,7 @@ impl Document {
         Ok(bytes.into())
     }
 
-    /// Limits the size of an image and of all reads: references may repeat.
+    /// Limits the size of an image, and the total size of all reads, because an image may be referenced repeatedly.
     fn has_room(&self, index: usize, bytes: u64) -> Result<(), GltfFault> {
         let given = self.given.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
         let fault = |rule: String| Err(GltfFault::key(format!("images[{index}]"), rule));

@@ -41,7 +41,7 @@ pub enum GltfError {
         /// The value and the rule.
         message: String,
     },
-    /// Invalid value of the JSON, or invalid data of it.
+    /// Invalid value of the JSON, or invalid data that the JSON refers to.
     #[error("{}: {key}: {message}", path.display())]
     Key {
         /// The file.
@@ -118,7 +118,7 @@ pub(super) struct GltfFault {
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Location {
     File,
-    /// In the JSON, from 1.
+    /// Line and column of the JSON, counted from 1.
     Line(usize, usize),
     Byte(u64),
     /// Key path in the JSON.
@@ -221,7 +221,7 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
     format!("expected {wanted}, found {found}")
 }
 
-/// Quotes a name for a message, eliding the middle if long.
+/// Quotes a name for a message, with the middle elided if it is long.
 pub(super) fn shown(name: &str) -> String {
     const LONGEST: usize = 60;
     let count = name.chars().count();
@@ -240,7 +240,7 @@ mod tests {
     use super::plain;
 
     #[test]
-    fn wrong_types_are_told_in_words_of_the_file() {
+    fn type_errors_are_reported_in_terms_of_json() {
         #[derive(serde::Deserialize, Debug)]
         #[expect(dead_code, reason = "it is for its errors")]
         struct View {

@@ -38,7 +38,8 @@ fn is_known(name: &str) -> bool {
     KNOWN.contains(&name)
 }
 
-/// Rejects required unsupported extensions, or with the only data of a primitive; notes others.
+/// Rejects unsupported extensions that are required or that contain the only data of a primitive. Adds notes about
+/// other unsupported extensions.
 pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), GltfFault> {
     for (i, name) in root.extensions_required.iter().enumerate() {
         if !is_known(name) {
@@ -84,7 +85,7 @@ fn remedy(name: &str) -> &'static str {
     }
 }
 
-/// Data that only an unsupported extension has.
+/// Returns the fault of data that is only present in an unsupported extension.
 pub(super) fn only_in(key: &str, name: &str) -> GltfFault {
     let rule = "holds its only data and is not supported";
     GltfFault::key(key, format!("{} {rule}{}", shown(name), remedy(name)))

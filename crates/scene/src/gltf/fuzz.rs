@@ -57,7 +57,7 @@ fn check(imported: &Imported) {
     }
 }
 
-/// Counts successful imports with several options.
+/// Imports the file with several options; returns the number of successful imports.
 fn read(bytes: &[u8], path: &std::path::Path) -> usize {
     std::fs::write(path, bytes).unwrap();
     let root = path.parent().unwrap();

@@ -16,7 +16,7 @@ pub(super) struct Chunks {
     pub binary: Option<Range<usize>>,
 }
 
-/// Returns true for GLB, whatever the file name.
+/// Returns true if the bytes are a GLB file, independent of the file name.
 pub(super) fn is_container(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
@@ -69,7 +69,7 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfFault> {
     Ok(Chunks { json, binary })
 }
 
-/// The caller checks the bounds.
+/// Returns a little-endian word; the caller checks the bounds.
 fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }

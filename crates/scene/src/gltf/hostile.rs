@@ -16,7 +16,7 @@ fn read(json: &Value, binary: &[u8]) -> Result<Imported, String> {
     read.map_err(|error| error.to_string().replace(&format!("{}: ", path.display()), ""))
 }
 
-/// Accessor 0 has positions, 1 texture coordinates, 2 normals, and 3 zeros.
+/// Returns a triangle. Accessor 0 contains positions, 1 texture coordinates, 2 normals, and 3 zeros.
 fn triangle(corners: [f32; 9], uvs: [f32; 6]) -> (Value, Vec<u8>) {
     let normals = [0.0, 0.0, 1.0].repeat(3);
     let all = corners.iter().chain(&uvs).chain(&normals);
@@ -46,7 +46,7 @@ const UVS: [f32; 6] = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
 
 #[test]
 fn weights_are_not_multiplied_by_nodes() {
-    // A copy of the weights for each node would take 40 GB.
+    // If each node had a copy of the weights, the copies would take 40 GB.
     let (mut json, binary) = triangle(CORNERS, UVS);
     json["meshes"][0]["weights"] = json!(vec![0; 1_000_000]);
     json["nodes"] = json!(vec![json!({ "mesh": 0 }); 10_000]);
@@ -55,7 +55,7 @@ fn weights_are_not_multiplied_by_nodes() {
 }
 
 #[test]
-fn sets_of_texture_coordinates_are_few() {
+fn unused_texture_coordinate_sets_take_no_memory() {
     // All sets would take 8 GB.
     let (mut json, binary) = triangle(CORNERS, UVS);
     json["accessors"][3]["type"] = json!("VEC3");
@@ -71,7 +71,7 @@ fn sets_of_texture_coordinates_are_few() {
 }
 
 #[test]
-fn materials_of_one_name_are_told_apart_soon() {
+fn equal_material_names_are_made_unique_quickly() {
     let count = 20_000;
     let (mut json, binary) = triangle(CORNERS, UVS);
     json["materials"] = json!(vec![json!({ "name": "a".repeat(500) }); count]);
@@ -84,7 +84,7 @@ fn materials_of_one_name_are_told_apart_soon() {
 }
 
 #[test]
-fn long_chains_of_nodes_and_many_notes_are_nothing() {
+fn deep_hierarchies_are_imported_and_notes_are_limited() {
     let count = 100_000;
     let (mut json, binary) = triangle(CORNERS, UVS);
     json["nodes"] = (0..count).map(|i| json!({ "children": [i + 1], "mesh": 0 })).collect();
@@ -97,11 +97,14 @@ fn long_chains_of_nodes_and_many_notes_are_nothing() {
     let imported = read(&json, &binary).unwrap();
     assert!(imported.cameras.is_empty());
     assert_eq!(imported.notes.len(), 201);
-    assert_eq!(imported.notes[0], "nodes[1]: its camera is left out: its scale is zero");
+    assert_eq!(
+        imported.notes[0],
+        "nodes[1]: the camera is skipped because the node has zero scale"
+    );
 }
 
 #[test]
-fn numbers_that_are_none_are_told() {
+fn non_finite_and_too_large_coordinates_are_reported() {
     for k in 0..9 {
         for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1.1e9] {
             let mut corners = CORNERS;
@@ -119,7 +122,7 @@ fn numbers_that_are_none_are_told() {
 }
 
 #[test]
-fn tangents_are_made_of_any_numbers() {
+fn tangents_are_finite_for_extreme_values() {
     for size in [1e-38, 1e-20, 1.0, 9e8] {
         for scale in [0.0, 1e-45, 1e-38, 1.0, 1e19, 3e38, -3e38, f32::NAN, f32::INFINITY] {
             let (mut json, binary) = triangle(CORNERS.map(|x| x * size), UVS.map(|x| x * scale));

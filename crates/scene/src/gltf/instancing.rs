@@ -26,7 +26,7 @@ impl Document {
             .map(Some)
     }
 
-    /// Returns the selected animations; all if only a time is given.
+    /// Returns the selected animations; all animations if only a time is given.
     pub(super) fn animations(&self, choice: &ImportOptions) -> Result<Vec<usize>, GltfError> {
         let animations = &self.json.animations;
         let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
@@ -55,7 +55,7 @@ impl Document {
             .map(Some)
     }
 
-    /// `place` is the list in the file and the option.
+    /// `place` contains the list in the file, and the option.
     fn selected(
         &self,
         what: &str,
@@ -76,7 +76,7 @@ impl Document {
         }
     }
 
-    /// Returns the instance transforms of a node (EXT_mesh_gpu_instancing), relative to it.
+    /// Returns the instance transforms of a node (EXT_mesh_gpu_instancing), relative to the node.
     pub(super) fn instances(&self, node: usize) -> Result<Vec<DAffine3>, GltfError> {
         let extensions = self.json.nodes[node].extensions.as_ref();
         let Some(extension) = extensions.and_then(|all| all.others.get("EXT_mesh_gpu_instancing")) else {

@@ -9,7 +9,7 @@ use super::error::{GltfFault, Location, plain, shown};
 
 /// Maximum length in bytes; data URIs are long.
 pub(super) const MAX_JSON_BYTES: usize = 512 << 20;
-/// Maximum number of objects, which take up to 1 KiB each.
+/// Maximum number of objects; each takes up to 1 KiB.
 const MAX_OBJECTS: usize = 2 << 20;
 /// Maximum number of elements of objects and arrays.
 const MAX_VALUES: usize = 32 << 20;
@@ -93,7 +93,7 @@ impl TrimZeros for [u8] {
     }
 }
 
-/// Rejects texts that take far more memory once parsed.
+/// Rejects texts that would take far more memory after parsing.
 fn check_size(text: &[u8]) -> Result<(), GltfFault> {
     let (mut objects, mut values) = (0usize, 0usize);
     let mut bytes = text.iter();
@@ -125,7 +125,7 @@ fn check_size(text: &[u8]) -> Result<(), GltfFault> {
     }
 }
 
-/// Checks the version (specification, section 3.2), on which all else depends.
+/// Checks the version first (specification, section 3.2), because everything else depends on it.
 fn check_version(top: &Map<String, Value>) -> Result<(), GltfFault> {
     let asset = top.get("asset").and_then(Value::as_object);
     let asset = asset.ok_or_else(|| GltfFault::key("asset", "is required: an object with the version"))?;
@@ -203,7 +203,7 @@ fn tidy(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> 
     Ok(())
 }
 
-/// Rewrites valid JSON that the crate rejects, and unambiguous errors.
+/// Rewrites valid JSON that the parser crate rejects, and errors that can be corrected unambiguously.
 fn repair(top: &mut Value, notes: &mut Vec<String>) {
     for scene in list(top, "scenes") {
         default(scene, "nodes", Value::Array(Vec::new()));
@@ -265,7 +265,7 @@ fn default(of: &mut Value, key: &str, value: Value) {
 
 /// Checks indices and enumerations.
 fn check(root: &Root) -> Result<(), GltfFault> {
-    // The crate's validation assumes these.
+    // The validation of the parser crate assumes these properties.
     for (i, mesh) in root.meshes.iter().enumerate() {
         for (k, primitive) in mesh.primitives.iter().enumerate() {
             for (name, accessor) in &primitive.attributes {
@@ -330,18 +330,18 @@ pub(super) fn missing(key: impl Into<String>, index: usize, count: usize) -> Glt
     GltfFault::key(key, format!("{index} is out of range; the file has {count}"))
 }
 
-/// Returns true for acceptable findings of the crate's validation.
+/// Returns true for validation errors of the glTF parser crate that are tolerated here.
 fn is_allowed(path: &str, error: Error) -> bool {
     let is_in = |list: &str| path.starts_with(list);
     match error {
-        // Checked by `extension::check`.
+        // `extension::check` checks required extensions.
         Error::Unsupported => is_in("extensionsRequired["),
-        // Accessors without data are zero, bounds unused, primitives without positions skipped.
+        // Accessors without data are zero, bounds are not used, and primitives without positions are skipped.
         Error::Missing => {
             is_in("accessors[") && path.ends_with("].bufferView")
                 || is_in("meshes[") && path.contains("attributes[\"POSITION\"]")
         }
-        // Application-specific attributes, and strides that only GPUs reject.
+        // Application-specific attributes, and strides that are only invalid for GPUs.
         Error::Invalid => {
             is_in("meshes[") && path.contains(".attributes[") || is_in("bufferViews[") && path.ends_with("].byteStride")
         }

@@ -1,4 +1,5 @@
-//! glTF lights (KHR_lights_punctual). As in three.js, candela are intensity and lux irradiance, without conversion.
+//! glTF lights (KHR_lights_punctual). As in three.js, values in candela are used as intensity and values in lux as
+//! irradiance, without conversion.
 
 use std::f64::consts::PI;
 
@@ -50,7 +51,7 @@ fn one() -> f64 {
 }
 
 impl Document {
-    /// Returns the light of a node, which emits along its -Z.
+    /// Returns the light of a node, which emits along its -Z axis.
     pub(super) fn light(
         &self,
         node: usize,
@@ -101,7 +102,7 @@ impl Document {
         if !position.is_finite() || direction == DVec3::ZERO && light.kind != "point" {
             note(
                 notes,
-                format!("nodes[{node}]: its light is left out: its scale is zero"),
+                format!("nodes[{node}]: the light is skipped because the node has zero scale"),
             );
             return Ok(None);
         }
@@ -160,7 +161,7 @@ pub(super) fn brightness(lights: &[LightDescription], middle: DVec3) -> Option<S
     })
 }
 
-/// Adds a note unless it exists or notes are too many.
+/// Adds a note, unless it already exists or there are too many notes.
 pub(super) fn note(notes: &mut Vec<String>, note: String) {
     const MOST: usize = 200;
     let is_room = notes.len() < MOST;

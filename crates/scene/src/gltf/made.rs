@@ -25,7 +25,7 @@ pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Reads a file from memory, without other files.
+/// Reads a glTF file from memory. The file must not refer to other files.
 pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     Document::read(
         bytes,
@@ -35,7 +35,7 @@ pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     )
 }
 
-/// The JSON has one buffer, in the container.
+/// Returns JSON with one buffer, which is in the GLB container.
 pub fn json_of(binary: &[u8], views: Value, accessors: Value) -> Value {
     json!({
         "asset": { "version": "2.0" },
@@ -49,7 +49,7 @@ pub fn document(binary: &[u8], views: Value, accessors: Value) -> Document {
     read(container(&json_of(binary, views, accessors), binary)).unwrap()
 }
 
-/// The buffer view contains all bytes.
+/// Returns a document with one accessor; its buffer view contains all bytes.
 pub fn accessor(binary: &[u8], accessor: Value) -> Document {
     let views = json!([{ "buffer": 0, "byteLength": binary.len() }]);
     document(binary, views, json!([accessor]))

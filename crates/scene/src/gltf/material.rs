@@ -172,7 +172,7 @@ impl Converter<'_> {
             };
             let cutoff = json.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0.into());
             if cutoff > 1.0 {
-                // The cutoff exceeds any alpha: invisible.
+                // The cutoff exceeds every alpha value, so the material is invisible.
                 of.alpha = 0.0.into();
             }
             of.alpha_cutoff = f64::clamp(cutoff, 0.0, 1.0);
@@ -205,7 +205,7 @@ impl Converter<'_> {
 
     fn ior(&mut self, ior: f64, of: &mut PrincipledDescription) -> Result<(), GltfError> {
         if ior == 0.0 {
-            // By the extension, 0 is total reflection.
+            // In the extension, 0 means total reflection.
             of.ior = IORS.1;
             of.specular_color = [(101.0_f64 / 99.0).powi(2); 3].into();
             return Ok(());
@@ -221,7 +221,7 @@ impl Converter<'_> {
         Ok(())
     }
 
-    /// Applies KHR_materials_volume. The factor only enables the volume; the thickness is traced.
+    /// Applies KHR_materials_volume. The thickness factor only enables the volume; rays trace the actual thickness.
     fn volume(&mut self, all: &Map<String, Value>, of: &mut PrincipledDescription) -> Result<(), GltfError> {
         let thickness = self.number(all, "thicknessFactor", 0.0)?;
         let color = self.triple(all, "attenuationColor", [1.0; 3])?;
@@ -286,7 +286,7 @@ impl Converter<'_> {
         Ok((base, slot.map(|(slot, _)| slot)))
     }
 
-    /// Returns a parameter from 0 to 1, possibly textured.
+    /// Returns a parameter from 0 to 1, which may have a texture.
     fn value(
         &mut self,
         all: &Map<String, Value>,
@@ -334,7 +334,7 @@ impl Converter<'_> {
         })
     }
 
-    /// Returns the name of a texture, adding it if new.
+    /// Returns the name of a texture, and adds the texture if it is new.
     fn texture(&mut self, slot: &Slot, encoding: Encoding, factor: [f64; 4]) -> Result<String, GltfError> {
         let file = self.image(slot)?;
         let mut lookup = self.document.lookup(slot, &self.place, &file, encoding)?;
@@ -349,7 +349,7 @@ impl Converter<'_> {
         Ok(name)
     }
 
-    /// Returns the name of an image, reading it if new.
+    /// Returns the name of an image, and reads the image if it is new.
     fn image(&mut self, slot: &Slot) -> Result<String, GltfError> {
         let image = self.document.image_of(slot.texture)?;
         let name = format!("images[{image}]");
@@ -403,7 +403,7 @@ impl Converter<'_> {
         })
     }
 
-    /// Clamps to 0 to 1, with a note.
+    /// Clamps a value to 0 ... 1; adds a note if this changes the value.
     fn share(&mut self, key: &str, x: f64) -> Result<f64, GltfError> {
         let [x, _, _] = self.colors(key, [x, 0.0, 0.0], 1.0)?;
         Ok(x)
@@ -413,7 +413,7 @@ impl Converter<'_> {
         self.colors(key, color, 1.0)
     }
 
-    /// Clamps to 0 to `most`, with a note.
+    /// Clamps color components to 0 ... `most`; adds a note if this changes a component.
     fn colors(&mut self, key: &str, color: [f64; 3], most: f64) -> Result<[f64; 3], GltfError> {
         if color.iter().any(|x| x.is_nan()) {
             return Err(self.document.fault(&self.place, format!("{key}: must be finite")));

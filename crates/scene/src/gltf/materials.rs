@@ -1,4 +1,4 @@
-//! The materials that the primitives of a glTF file use, by variant, with their textures.
+//! The materials that the primitives of a glTF file use in the selected variant, with their textures.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,13 +12,13 @@ use super::material::{Converter, Images, Textures};
 use super::texture::Slot;
 use crate::{PrincipledDescription, VertexColors};
 
-/// Maximum length of a name in characters; all instances store it.
+/// Maximum length of a name in characters; limited because every instance stores the name.
 const MAX_NAME_LEN: usize = 200;
 
 pub struct Materials<'a> {
     document: &'a Document,
     variant: Option<usize>,
-    /// Indices into `used` by material of the file; `None` is the default.
+    /// Maps materials of the file to indices into `used`; `None` is the default material.
     numbers: BTreeMap<Option<usize>, usize>,
     used: Vec<MaterialUse>,
 }
@@ -30,7 +30,7 @@ pub struct MaterialUse {
     is_colored: bool,
     /// Required texture coordinate sets.
     pub sets: BTreeSet<u32>,
-    /// Normal or anisotropy map.
+    /// The normal or anisotropy map that requires tangents.
     pub tangents: Option<Slot>,
 }
 
@@ -44,7 +44,7 @@ impl<'a> Materials<'a> {
         }
     }
 
-    /// The material becomes used.
+    /// Returns the index of a primitive's material, and marks the material as used.
     pub fn number(&mut self, primitive: &Primitive, place: &str, is_colored: bool) -> Result<usize, GltfError> {
         let index = self.index(primitive);
         let count = self.document.json.materials.len();

@@ -25,7 +25,7 @@ pub struct Key {
     pub skin: Option<usize>,
     /// Bits of the node's own morph weights.
     weights: Option<Vec<u32>>,
-    /// Bits of a transform of the vertices, with an axis too short or too long for an instance.
+    /// Bits of a transform that is applied to the vertices, because an axis is too short or too long for an instance.
     flat: Option<[u64; 12]>,
 }
 
@@ -47,7 +47,7 @@ impl Key {
         }
     }
 
-    /// Returns true if an axis is too short rather than too long.
+    /// Returns true if an axis is too short; false if an axis is too long.
     pub fn is_flat(&self) -> bool {
         let is_small = |axis: DVec3| axis.length() <= MAX_AXIS_LENGTH;
         self.flat().is_some_and(|map| {
@@ -85,9 +85,9 @@ pub struct Meshes<'a> {
     /// First primitive that lacks a texture coordinate set, and the set.
     bare: Option<(String, u32)>,
     bare_count: usize,
-    /// First primitive with non-finite values and their number, by attribute.
+    /// For each attribute, the first primitive with non-finite values, and the number of such primitives.
     non_finite: Mutex<BTreeMap<&'static str, (String, usize)>>,
-    /// First primitive with triangles without valid positions, and their number.
+    /// The first primitive that has triangles with invalid positions, and the number of such triangles.
     unplaced: Mutex<Option<(String, usize)>>,
 }
 
@@ -161,9 +161,9 @@ impl<'a> Meshes<'a> {
     pub fn notes(&self) -> impl Iterator<Item = String> {
         let ignored = |count: usize, of: &str| match count {
             0 => None,
-            1 => Some(format!("1 primitive of {of} is left out: only triangles are rendered")),
+            1 => Some(format!("1 primitive of {of} is skipped: only triangles are rendered")),
             _ => Some(format!(
-                "{count} primitives of {of} are left out: only triangles are rendered"
+                "{count} primitives of {of} are skipped: only triangles are rendered"
             )),
         };
         let bare = self.bare.as_ref().map(|(place, set)| {
@@ -202,16 +202,16 @@ impl<'a> Meshes<'a> {
             Damage {
                 what: format!("{place}.attributes.POSITION: {triangles} a vertex with a coordinate {rule}"),
                 stand_in: if count == 1 {
-                    "it is left out"
+                    "it is skipped"
                 } else {
-                    "they are left out"
+                    "they are skipped"
                 },
             }
         });
         unplaced.into_iter().chain(non_finite).collect()
     }
 
-    /// Returns why no triangles exist.
+    /// Returns the reason why there are no triangles.
     pub fn nothing(&self) -> String {
         match (self.points, self.lines, self.damage().first()) {
             (0, 0, None) => "has no triangles".to_owned(),
@@ -227,7 +227,7 @@ impl<'a> Meshes<'a> {
         let mut unplaced = self.unplaced.lock().unwrap_or_else(PoisonError::into_inner);
         let (first, count) = unplaced.get_or_insert_with(|| (place.to_owned(), 0));
         *count += triangles;
-        // In any order, as meshes are built in parallel.
+        // Reports arrive in any order, because meshes are built in parallel.
         if (place.len(), place) < (first.len(), first.as_str()) {
             place.clone_into(first);
         }
@@ -286,7 +286,7 @@ impl<'a> Meshes<'a> {
         let sets = parts.iter().flat_map(|part| materials.get(part.material).sets.iter());
         let most = sets.copied().max();
         let mesh = whole.finish(most).map_err(|rule| self.document.fault(place(), rule))?;
-        // Drops flattened meshes that are too small for a scene.
+        // Drops flattened meshes that are too small to render.
         let has_size = |mesh: &Mesh| {
             let positions = || mesh.positions.iter().copied();
             let extent = positions().fold(Vec3::NEG_INFINITY, Vec3::max) - positions().fold(Vec3::INFINITY, Vec3::min);
@@ -335,7 +335,7 @@ struct MeshBuilder {
     draft: RawMesh,
     /// Texture coordinate sets, each up to the last primitive that has it.
     uvs: Vec<Vec<Vec2>>,
-    /// First vertices by accessors, which primitives may share.
+    /// The first vertex for each set of accessors; primitives may share accessors.
     known: HashMap<Vec<usize>, usize>,
     counts: HashMap<usize, usize>,
     /// Vertices with non-finite or too large coordinates.
@@ -343,7 +343,7 @@ struct MeshBuilder {
 }
 
 impl MeshBuilder {
-    /// Adds the vertices of a primitive unless known. Returns the first.
+    /// Adds the vertices of a primitive, unless they were already added. Returns the index of the first vertex.
     fn vertices(
         &mut self,
         meshes: &Meshes,
@@ -354,7 +354,7 @@ impl MeshBuilder {
     ) -> Result<usize, GltfError> {
         let mut accessors = accessors(part.primitive);
         accessors.push(usize::from(used.tangents.is_some()));
-        // Rotated tangents need separate vertices.
+        // Vertices with rotated tangents cannot be shared.
         let is_plain = used.tangents.as_ref().is_none_or(|slot| !slot.is_turned());
         if let Some(first) = self.known.get(&accessors).filter(|_| is_plain) {
             return Ok(*first);
@@ -381,7 +381,7 @@ impl MeshBuilder {
         Ok(first)
     }
 
-    /// Adds positions. Invalid ones are zero and in `unplaced`.
+    /// Adds positions. Invalid positions become zero and are added to `unplaced`.
     fn add_positions(&mut self, first: usize, mut positions: Vec<DVec3>) {
         for (i, position) in positions.iter_mut().enumerate() {
             if !(position.is_finite() && position.abs().max_element() <= MAX_COORDINATE) {
@@ -425,14 +425,14 @@ impl MeshBuilder {
             }
             let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
             self.uvs[set].resize(first, Vec2::ZERO);
-            // v of the first image row is 0 in glTF and 1 here.
+            // At the first image row, v is 0 in glTF, but 1 here.
             let uvs = vectors.into_iter().map(|[u, v]| Vec2::new(finite(u), 1.0 - finite(v)));
             self.uvs[set].extend(uvs);
         }
         Ok(())
     }
 
-    /// Generates missing tangents, with own vertices, split where tangents differ.
+    /// Generates missing tangents. The triangles get separate vertices, which are split where tangents differ.
     fn with_tangents(
         &mut self,
         part: &Part,
@@ -464,7 +464,7 @@ impl MeshBuilder {
             }
         }
         let origins = || made.origins.iter().map(|vertex| from(*vertex));
-        // Lists end with the last primitive that has them.
+        // Each list ends at the last primitive that has the attribute.
         let reach = |length: usize| length >= first + count;
         if reach(self.draft.normals.len()) {
             self.draft.normals.resize(own, Vec3::ZERO);
@@ -486,7 +486,7 @@ impl MeshBuilder {
         (own, made.triangles)
     }
 
-    /// Finishes the mesh; `None` without area. `most` is the last required texture coordinate set.
+    /// Builds the mesh; `None` if it has zero area. `most` is the last required texture coordinate set.
     fn finish(mut self, most: Option<u32>) -> Result<Option<Mesh>, String> {
         let count = self.draft.positions.len();
         let fill = |list: &mut Vec<Vec2>| list.resize(count, Vec2::ZERO);

@@ -58,7 +58,7 @@ use crate::{
 pub use self::contents::ModelContents;
 pub use self::error::GltfError;
 
-/// Maximum number of instances, and of their groups. Each takes more than 1 KiB in a scene.
+/// Maximum number of instances, and maximum total number of their groups. Each takes more than 1 KiB in a scene.
 const MAX_INSTANCES: usize = 1 << 20;
 
 /// Maximum axis length of an instance's transform.
@@ -82,7 +82,7 @@ pub struct ImportOptions {
 }
 
 impl ImportOptions {
-    /// Returns the choice of a shape.
+    /// Returns the import options of a `gltf` shape.
     pub fn of(shape: &GltfDescription) -> Result<ImportOptions, Problem> {
         if let Some(time) = shape.time
             && !(TIMES.0..=TIMES.1).contains(&time)
@@ -115,7 +115,7 @@ pub struct Imported {
     pub lights: Vec<LightDescription>,
     /// The cameras.
     pub cameras: Vec<ImportedCamera>,
-    /// Names of parts.
+    /// Names of the file's scenes, cameras, animations, material variants, materials and images.
     pub contents: ModelContents,
     /// Number of animations.
     pub animations: usize,
@@ -126,7 +126,7 @@ pub struct Imported {
     files: BTreeSet<PathBuf>,
 }
 
-/// A damaged part, replaced by a stand-in.
+/// A damaged part of the file that was replaced by a stand-in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
     /// Location and damage.
@@ -164,12 +164,13 @@ pub struct ImportedCamera {
     pub name: Option<String>,
     /// Description.
     pub description: CameraDescription,
-    /// Width over height, if given.
+    /// Aspect ratio (width / height), if given.
     pub aspect: Option<f64>,
 }
 
 impl Imported {
-    /// Returns points that bound the scene: vertices, or box corners if too many.
+    /// Returns points that bound the scene: the vertices, or the corners of bounding boxes if there are too many
+    /// vertices.
     pub fn points(&self) -> Vec<DVec3> {
         const MOST: usize = 1 << 21;
         let vertices = self
@@ -219,7 +220,7 @@ pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String
     }
 }
 
-/// Imports a file, or returns an import in use whose files have not changed.
+/// Imports a file. If the import is still in use and its files have not changed, returns the existing import.
 pub fn load(
     path: &Path,
     root: &Path,
@@ -238,7 +239,7 @@ pub fn load(
         }
     }
     let _span = tracing::debug_span!("gltf", path = %path.display()).entered();
-    // Stamped first, so that a change during the read is noticed.
+    // The stamp is taken before reading, so that a change while reading is noticed.
     let before = stamp(path);
     let mut own = BTreeSet::new();
     let read = import(path, root, choice, &mut own);
@@ -381,12 +382,12 @@ fn import(
     }
     if flat > 0 {
         notes.push(format!(
-            "{flat} of {total} instances of meshes are left out: their scale is zero"
+            "{flat} of {total} instances of meshes are skipped: their scale is zero"
         ));
     }
     notes.extend(meshes.notes());
     imported.damage = meshes.damage();
-    // A zero scale may be temporary.
+    // A zero scale is accepted, because an animation may change it.
     if imported.instances.is_empty() && flat == 0 {
         return Err(document.fault("scene", meshes.nothing()));
     }

@@ -11,7 +11,7 @@ pub struct Pose {
     pub translation: DVec3,
     pub rotation: DQuat,
     pub scale: DVec3,
-    /// Overrides the above.
+    /// Overrides the translation, rotation and scale.
     pub matrix: Option<DAffine3>,
     /// Overrides the weights of the mesh.
     pub weights: Option<Vec<f32>>,
@@ -40,7 +40,7 @@ impl Pose {
     }
 }
 
-/// Zero becomes the identity.
+/// Converts a quaternion; a zero quaternion becomes the identity.
 pub fn quaternion(of: [f32; 4]) -> DQuat {
     let of = DQuat::from_array(of.map(f64::from));
     let length = of.length();
@@ -51,7 +51,7 @@ pub fn quaternion(of: [f32; 4]) -> DQuat {
 }
 
 pub struct Nodes {
-    /// Node to glTF world transforms.
+    /// For each node, the transform to glTF world space.
     pub globals: Vec<DAffine3>,
     children: Vec<Vec<usize>>,
 }
@@ -90,7 +90,7 @@ impl Nodes {
         Ok(Nodes { globals, children })
     }
 
-    /// Returns the nodes of a scene depth-first, or all nodes.
+    /// Returns the nodes of a scene in depth-first order, or all nodes if `scene` is `None`.
     pub fn of_scene(&self, document: &Document, scene: Option<usize>) -> Result<Vec<usize>, GltfError> {
         let Some(scene) = scene else {
             return Ok((0..self.globals.len()).collect());

@@ -50,7 +50,7 @@ impl Skin {
         Ok(Skin { joints })
     }
 
-    /// Returns the transform of each vertex: the weighted mean of its joints'.
+    /// Returns the transform of each vertex: the weighted mean of the transforms of its joints.
     pub fn maps(
         &self,
         document: &Document,

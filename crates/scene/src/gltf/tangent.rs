@@ -109,13 +109,14 @@ pub fn generated(
     Some(made)
 }
 
-/// The triangles `own` and those that touch them, in order, for reproducible sums.
+/// The triangles `own` and the triangles that touch them, in the original order, so that sums are reproducible.
 struct Part {
     own: Range<usize>,
     triangles: Vec<[u32; 3]>,
 }
 
-/// Partitions triangles for threads: tangents only depend on triangles that share a vertex.
+/// Partitions the triangles, so that threads can process the parts: tangents only depend on triangles that share a
+/// vertex.
 fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> Vec<Part> {
     const MOST: usize = 1 << 16;
     if triangles.len() <= MOST {
@@ -124,7 +125,7 @@ fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32;
             triangles: triangles.to_vec(),
         }];
     }
-    // MikkTSpace merges equal vertices.
+    // MikkTSpace merges vertices with equal attributes.
     let bits = |i: u32| {
         let i = i as usize;
         let position = positions[i].as_vec3().to_array().map(f32::to_bits);
@@ -165,7 +166,7 @@ fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32;
     chunks.into_par_iter().map(part).collect()
 }
 
-/// Rotates a file's tangent back by the texture transform: the renderer rotates normal maps with their texture, glTF
+/// Rotates a file's tangent back by the texture transform: the renderer rotates normal maps with the texture, but glTF
 /// does not. With the transform's second row (x, y), tangent t and bitangent b, the result is y t - x b up to a factor.
 pub fn unturned(tangent: Vec4, normal: Vec3, slot: &Slot) -> Vec4 {
     if !slot.is_turned() {

@@ -60,6 +60,7 @@ struct Info {
 }
 
 impl Slot {
+    /// Creates the slot of a texture reference from core glTF (not from an extension).
     pub fn new(
         document: &Document,
         place: &str,
@@ -94,7 +95,7 @@ impl Slot {
         })
     }
 
-    /// Returns an extension's texture, and the `scale` of a normal map.
+    /// Creates the slot of a texture reference from an extension; also returns the `scale` of a normal map.
     pub fn of_value(document: &Document, place: &str, value: &Value) -> Result<(Slot, f64), GltfError> {
         let info = Info::deserialize(value).map_err(|error| document.fault(place, plain(&error)))?;
         let slot = Slot::new(document, place, (info.index, info.tex_coord), Some(&info.extensions))?;
@@ -108,7 +109,7 @@ impl Slot {
         ([sin * scale[0], cos * scale[1]], scale[0] * scale[1])
     }
 
-    /// Returns true for rotations and mirroring.
+    /// Returns true if the transform contains a rotation or a reflection.
     pub fn is_turned(&self) -> bool {
         let Transform { rotation, scale, .. } = self.transform;
         rotation != 0.0 || scale.iter().any(|scale| *scale < 0.0)
@@ -116,7 +117,8 @@ impl Slot {
 }
 
 impl Document {
-    /// Returns the lookup. v of the first row is 0 in glTF and 1 here: flips the transform like the mesh's coordinates.
+    /// Returns the texture with its transform. At the first image row, v is 0 in glTF, but 1 here, so the transform is
+    /// flipped like the texture coordinates of the mesh.
     pub(super) fn lookup(
         &self,
         slot: &Slot,
@@ -164,7 +166,7 @@ impl Document {
     }
 }
 
-/// The decoder reports unreadable images.
+/// Returns true if the image has alpha; false for unreadable images, which the decoder reports.
 pub(super) fn has_alpha(bytes: &[u8]) -> bool {
     if let Some(has_alpha) = ktx2::has_alpha(bytes) {
         return has_alpha;

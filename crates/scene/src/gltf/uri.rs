@@ -24,7 +24,7 @@ pub(super) fn is_data(uri: &str) -> bool {
     uri.get(..5).is_some_and(|start| start.eq_ignore_ascii_case("data:"))
 }
 
-/// Decodes a data URI; the error is the rule.
+/// Decodes a data URI; the error is the violated rule.
 pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
     let rule = "a data URI must be data:[type][;base64],data";
     let (head, body) = uri.get(5..).and_then(|rest| rest.split_once(',')).ok_or(rule)?;
@@ -41,7 +41,7 @@ pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Why a file is not read: the value and the rule.
+/// The reason why a file is not read: the value and the violated rule.
 #[derive(Debug)]
 pub(super) enum UriError {
     /// Missing or unreadable.
@@ -81,7 +81,7 @@ impl Folder {
         let decoded = percent_decode_str(uri)
             .decode_utf8()
             .map_err(|_| format!("{} must be UTF-8 where it is percent-encoded", shown(uri)))?;
-        // Unencoded percent signs, and backslashes of Windows.
+        // Allows unencoded percent signs, and the backslashes of Windows paths.
         let turned = decoded.replace('\\', "/");
         let names = [&*decoded, uri, &turned];
         for name in names {
@@ -123,7 +123,7 @@ fn scheme(uri: &str) -> Option<&str> {
 }
 
 pub(super) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    // Checked first: opening a pipe waits for a writer.
+    // Checked before opening, because opening a pipe blocks until it has a writer.
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "it must be a file"));
     }

@@ -10,7 +10,7 @@ use super::skin::Skin;
 use super::texture::LAST_SET;
 use crate::mesh::unit;
 
-/// Maximum vertices of a mesh, used or not.
+/// Maximum number of vertices of a mesh, including unused vertices.
 const MAX_VERTICES: usize = 1 << 27;
 
 const TEXCOORDS: [&str; LAST_SET as usize + 1] = [
@@ -29,13 +29,13 @@ pub struct Source<'a> {
     document: &'a Document,
     primitive: &'a Primitive,
     place: &'a str,
-    /// Called with names of non-finite attributes.
+    /// Called with the name of each attribute that has non-finite values.
     report: &'a dyn Fn(&'static str),
     positions: Vec<Vec3>,
 }
 
 impl<'a> Source<'a> {
-    /// Reads the positions, if any. `first` is the number of vertices before.
+    /// Reads the positions, if any. `first` is the number of vertices that precede these.
     pub fn of(
         document: &'a Document,
         (primitive, place): (&'a Primitive, &'a str),
@@ -137,7 +137,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Vectors that morph targets, skins and transforms change together.
+/// Normals and tangents, which morph targets, skins and transforms change together with the positions.
 pub struct Frames {
     positions: Vec<Vec3>,
     pub normals: Option<Vec<Vec3>>,
@@ -191,7 +191,8 @@ impl Frames {
         Ok(placed)
     }
 
-    /// Transforms a vertex, its normal by the cofactors, which flat transforms have too.
+    /// Transforms a vertex. Its normal is transformed by the cofactor matrix, which exists even for singular
+    /// transforms.
     fn transform(&mut self, transform: &DAffine3, i: usize, position: &mut DVec3) {
         let DMat3 { x_axis, y_axis, z_axis } = transform.matrix3;
         *position = transform.transform_point3(*position);

@@ -1,4 +1,4 @@
-//! Downscaling of glTF images to the texture memory.
+//! Downscales glTF images to fit the texture memory.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,7 +8,7 @@ use super::super::texture::{levels, words};
 use super::super::validate::TEXEL_MEMORY;
 use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
 
-/// Maximum number of decoded texels, and addition per byte of the files: bounds the time.
+/// Limit on the number of decoded texels, which limits the time: a constant, plus an allowance per byte of the files.
 const TEXELS: (u64, u64) = (1 << 28, 64);
 /// Memory reserved for other textures and the environment, in bytes.
 const OTHERS: u64 = 128 << 20;
@@ -23,7 +23,7 @@ struct ImportedImage {
 }
 
 impl ImportedImage {
-    /// Returns the memory in bytes, halved until no side exceeds `longest`.
+    /// Returns the memory use in bytes if the image is halved until no side exceeds `longest`.
     fn bytes(&self, longest: u32) -> u64 {
         let Header { width, height, is_deep } = self.header;
         let halvings = (0..32).take_while(|i| width.max(height) >> i > longest).count();
@@ -33,7 +33,8 @@ impl ImportedImage {
     }
 }
 
-/// Returns the maximum side that fits, and the bytes in full; `None` if that fits. The error is the rule.
+/// Returns the maximum side at which all images fit, and their full size in bytes; `None` if they fit at full size. The
+/// error is the violated rule.
 pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option<(u32, u64)>, String> {
     let kept = kept(description, assets);
     let texels = |of: &ImportedImage| u64::from(of.header.width) * u64::from(of.header.height) * of.times;
@@ -43,7 +44,7 @@ pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option
     let most = TEXELS.0 + bytes * TEXELS.1;
     if texels > most {
         return Err(format!(
-            "the images of all glTF files have {texels} texels together; of files of {bytes} bytes they must be at most {most}"
+            "the images of all glTF files have {texels} texels in total; for files of {bytes} bytes, at most {most} are allowed"
         ));
     }
     let all = |longest: u32| kept.iter().map(|image| image.bytes(longest)).sum::<u64>();
@@ -66,7 +67,7 @@ fn kept(description: &Description, assets: &Assets) -> Vec<ImportedImage> {
             _ => None,
         })
         .collect();
-    // Encodings of each file (`None`: alpha), and whether it is filtered.
+    // For each file, the encodings in use (`None`: alpha), and whether the image is filtered.
     let mut files: BTreeMap<&str, (BTreeSet<Option<bool>>, bool)> = BTreeMap::new();
     for (name, texture) in &description.textures {
         if let TextureDescription::Image(image) = texture {
@@ -90,7 +91,7 @@ fn kept(description: &Description, assets: &Assets) -> Vec<ImportedImage> {
     kept.collect()
 }
 
-/// The decoder reports unreadable images.
+/// Returns the header; `None` for unreadable images, which the decoder reports.
 fn header(bytes: &[u8]) -> Option<Header> {
     let format = Format::of(bytes)?;
     let seen = Cell::new(None);
@@ -129,7 +130,7 @@ mod tests {
                 ..ImageTextureDescription::new(file)
             })
         };
-        // 180 MB with mip levels per encoding, however many textures.
+        // With mip levels, each encoding takes 180 MB, independent of the number of textures.
         for (name, encoding) in [("a", Encoding::Srgb), ("b", Encoding::Linear), ("c", Encoding::Srgb)] {
             description.textures.insert(name.to_owned(), texture("large", encoding));
         }

@@ -28,21 +28,21 @@ pub struct ExpandedScene {
     pub description: Description,
     pub assets: Assets,
     pub notes: Vec<Note>,
-    /// Must outlive the scene.
+    /// The imported files, which must outlive the scene.
     pub imported: Vec<Arc<Imported>>,
     origins: Vec<Origin>,
     /// Number of shapes per file.
     numbers: BTreeMap<String, usize>,
     prefixes: BTreeSet<String>,
-    /// Imported parts plus [`SHAPE`] per shape: of all files, and of repeated ones.
+    /// Number of imported parts, plus [`SHAPE`] per shape: for all files, and for repeated files only.
     brought: [usize; 2],
 }
 
-/// Maximum number of instances, meshes, materials and lights of all shapes.
+/// Maximum total number of instances, meshes, materials and lights of all shapes.
 const MAX_IMPORTED_INSTANCES: usize = 1 << 21;
-/// Maximum number of these of repeated files. Each takes 1 KiB or more.
+/// Maximum total number of these parts that come from repeated files. Each part takes at least 1 KiB.
 const MAX_REPEATED_IMPORTS: usize = 1 << 18;
-/// Cost of a shape in these counts.
+/// Amount that a shape adds to these counts.
 const SHAPE: usize = 16;
 
 struct Origin {
@@ -222,14 +222,14 @@ impl ExpandedScene {
                 1 => format!("{file}/"),
                 i => format!("{file} ({i})/"),
             };
-            // Another file may have this name.
+            // A different file may have the same name.
             if self.prefixes.insert(prefix.clone()) {
                 return prefix;
             }
         }
     }
 
-    /// Returns the names of a file's materials, some overridden.
+    /// Returns the names of a file's materials after the shape's overrides.
     fn materials(&mut self, gltf: &GltfDescription, imported: &Imported, prefix: &str) -> Result<Vec<String>, Problem> {
         let known: BTreeSet<&str> = imported.materials.iter().map(|material| &*material.name).collect();
         for (name, own) in &gltf.materials {
@@ -273,7 +273,7 @@ fn rows(map: &DAffine3) -> Vec<[f64; 4]> {
     vec![row(0), row(1), row(2)]
 }
 
-/// Transforms a light; its emission is unchanged.
+/// Transforms a light without changing the emission.
 fn moved(light: &LightDescription, map: &DAffine3) -> LightDescription {
     let turned = |direction: DVec3| map.transform_vector3(direction);
     let mut light = light.clone();

@@ -1,4 +1,4 @@
-//! Tests with files of another encoder and the output of its transcoder, and with damaged files.
+//! Tests with files of a reference encoder, compared with the output of its transcoder, and with damaged files.
 
 use std::fs;
 use std::path::PathBuf;
@@ -36,7 +36,7 @@ fn put<const N: usize>(bytes: &mut [u8], at: usize, value: [u8; N]) {
     bytes[at..at + N].copy_from_slice(&value);
 }
 
-/// Replaces a file's Zstandard frame; the declared texels stay.
+/// Replaces the Zstandard frame of a file; the declared size of the texels does not change.
 fn with_frame(frame: &[u8]) -> Vec<u8> {
     let mut bytes = file("zstandard-48x20");
     let level = long(&bytes, INDEX).unwrap() as usize;
@@ -58,7 +58,7 @@ fn files_decode_to_what_the_reference_makes_of_them() {
         assert_eq!(image.color().has_alpha(), has_alpha, "{name}");
         assert!(image.into_rgba8() == reference(name), "{name}");
     }
-    // Control: different images are not equal.
+    // Checks that different images are not equal.
     for [a, b] in [["etc1s-48x20", "zstandard-48x20"], ["etc1s-48x20", "etc1s-48x20-alpha"]] {
         assert!(decoded(&file(a)).unwrap().into_rgba8() != reference(b), "{a} {b}");
     }
@@ -126,7 +126,7 @@ fn headers_are_checked() {
         assert!(error.starts_with(start), "{name} {at} {value}: {error}");
         assert!(!start.is_empty() || error.is_empty(), "{name} {at} {value}: {error}");
     }
-    // Channels for red and green.
+    // A file with separate channels for red and green.
     let mut bytes = file("etc1s-48x20");
     let descriptor = short(&bytes, 48).unwrap() as usize;
     bytes[descriptor + 31] = 3;
@@ -150,7 +150,7 @@ fn zstandard_frames_must_have_the_declared_length() {
         frame
     };
     let error = |frame: &[u8]| decoded(&with_frame(frame)).unwrap_err();
-    // Windows of 1 KiB and 8 MiB; below, one of 16 MiB. Zeros are blocks of black texels.
+    // Windows of 1 KiB and 8 MiB; further below, a window of 16 MiB. Zeros are blocks of black texels.
     for frame in [
         frame(0, &[texels]),
         frame(13 << 3, &[texels]),

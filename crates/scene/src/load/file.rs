@@ -1,4 +1,4 @@
-//! Reads scene files with a limit on their size.
+//! Reads scene files whose size is limited.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -8,7 +8,7 @@ use crate::error::SceneError;
 use crate::parse::{NOT_UTF8, encoding, syntax_error};
 use wgray_image::blocking_path;
 
-/// Maximum size of a scene file in bytes: far above handwritten ones, far below the memory.
+/// Maximum size of a scene file in bytes: far larger than handwritten files, far smaller than the memory.
 const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// Returns the folder of a file.
@@ -24,7 +24,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     })?;
     String::from_utf8(bytes).map_err(|error| {
         let text = String::from_utf8_lossy(error.as_bytes());
-        // The lossy text equals the file up to this byte.
+        // Up to this byte, the lossy text is identical to the file.
         let valid = error.utf8_error().valid_up_to();
         let name = path.display().to_string();
         match encoding(error.as_bytes()) {

@@ -5,7 +5,7 @@ use crate::gltf::GltfError;
 use crate::problem::Problem;
 use crate::{Selection, View};
 
-/// The parts of a glTF file to render, and the view.
+/// The parts of a glTF file that are rendered, and the view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GltfChoice {
     /// The scene; `None` is the default scene of the file, or its first one.
@@ -37,7 +37,7 @@ impl GltfChoice {
         chosen.map(|(_, name)| name)
     }
 
-    /// Converts an error of the file, or of the option that selects something missing.
+    /// Converts an error to an error of the file, or of the option that selects a missing part.
     pub(super) fn error(&self, error: GltfError) -> SceneError {
         let given = |option: &str| match option {
             "gltf_scene" => self.scene.is_some(),

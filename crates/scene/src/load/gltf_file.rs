@@ -1,4 +1,4 @@
-//! glTF files as scenes: a shape of type `gltf` with a camera, and an environment if the file has no lights.
+//! Loads glTF files as scenes: a shape of type `gltf` with a camera, and an environment if the file has no lights.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::gltf::{GltfError, ImportOptions, Imported, ImportedCamera, ModelConte
 use crate::problem::Problem;
 use crate::{CameraDescription, Description, Framing, GltfDescription, Scene, Selection, framed};
 
-/// Sine of the smallest angle to +z at which a view is not vertical.
+/// Sine of the minimum angle to +z; views at smaller angles count as vertical.
 const VERTICAL: f64 = 1e-6;
 
 /// Returns true if a file name ends in `.gltf` or `.glb`.
@@ -31,7 +31,7 @@ impl Scene {
         self.imported.iter().any(|imported| imported.animations > 0)
     }
 
-    /// Returns the names in each glTF file.
+    /// Returns the names of the parts of each glTF file.
     pub fn models(&self) -> impl Iterator<Item = &ModelContents> {
         self.imported.iter().map(|imported| &imported.contents)
     }
@@ -42,7 +42,7 @@ impl Scene {
     }
 }
 
-/// Describes a glTF file as a scene. The caller keeps the import alive until the scene has it.
+/// Describes a glTF file as a scene. The caller must keep the import alive until the scene refers to it.
 pub(crate) fn describe(
     path: &Path,
     overrides: &Overrides,
@@ -121,7 +121,7 @@ pub(crate) fn describe(
     Ok((description, imported))
 }
 
-/// Makes orbits horizontal: `up` becomes +z unless the view is vertical. In glTF, it is perpendicular to the view.
+/// Makes orbits horizontal: `up` becomes +z unless the view is vertical. In glTF, `up` is perpendicular to the view.
 fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
     let (position, look_at, up) = match &mut camera {
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, &mut camera.up),
@@ -135,7 +135,7 @@ fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
     camera
 }
 
-/// Returns the selected camera, or the first.
+/// Returns the selected camera, or the first camera if none is selected.
 fn chosen<'a>(
     cameras: &'a [ImportedCamera],
     wanted: Option<&Selection>,

@@ -31,7 +31,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// Files that cannot be read, hold more than 64 MiB or are not UTF-8, and the errors of [`Scene::parse`].
+    /// The file cannot be read, has more than 64 MiB or is not UTF-8; or an error of [`Scene::parse`].
     pub fn load(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
         Scene::load_with(path, &Overrides::default())
     }
@@ -40,7 +40,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// The errors of [`Scene::load`], and invalid overrides.
+    /// The errors of [`Scene::load`]; also fails if an override is invalid.
     pub fn load_with(path: impl AsRef<Path>, overrides: &Overrides) -> Result<Scene, SceneError> {
         Scene::load_described(path, overrides).map(|(scene, _)| scene)
     }
@@ -50,7 +50,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// Those of [`Scene::load_with`].
+    /// The errors of [`Scene::load_with`].
     pub fn load_described(path: impl AsRef<Path>, overrides: &Overrides) -> Result<(Scene, Description), SceneError> {
         Scene::load_and_list(path.as_ref(), overrides, &mut BTreeSet::new())
     }
@@ -72,8 +72,8 @@ impl Scene {
         parse_beside(&text, &path.display().to_string(), folder_of(path), overrides, files)
     }
 
-    /// Parses and validates the text of a scene file. `origin` is its path in messages and for relative file names; the
-    /// text is JSON if it ends in `.json`.
+    /// Parses and validates the text of a scene file. `origin` is the path of the file, for messages and for relative
+    /// file names. The text is JSON if `origin` ends in `.json`.
     ///
     /// # Errors
     ///
@@ -86,7 +86,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// The errors of [`Scene::parse`], and invalid overrides.
+    /// The errors of [`Scene::parse`]; also fails if an override is invalid.
     pub fn parse_with(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
         let folder = folder_of(Path::new(origin));
         parse_beside(text, origin, folder, overrides, &mut BTreeSet::new()).map(|(scene, _)| scene)
@@ -104,7 +104,7 @@ fn load_gltf(
         description = description.defined(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
-    // Errors of the shape are those of the file.
+    // Errors of the shape are reported as errors of the file.
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let place = format!("{name}: ");
     let own = |message: &str| {
@@ -206,8 +206,8 @@ impl<'a> PendingScene<'a> {
         draft.overridden()
     }
 
-    /// Parses a text that differs from that of `before` only in the table at the first two segments of a path; only
-    /// this table if it has a header. Also returns the locations of the parts, if found.
+    /// Parses a text that differs from the text of `before` only in the table at the first two segments of a path.
+    /// Parses only this table if it has its own header. Also returns the locations of the parts, if found.
     pub fn change(
         text: &'a str,
         origin: &'a str,
@@ -227,7 +227,7 @@ impl<'a> PendingScene<'a> {
             defines,
             description: change.description,
         };
-        // Overrides outside of the parts are still applied, unless parsed again.
+        // Overrides outside of the parts are still in effect, unless the rest of the file was parsed again.
         if change.is_rest {
             draft = draft.overridden()?;
         }
@@ -245,7 +245,7 @@ impl<'a> PendingScene<'a> {
         Ok(self)
     }
 
-    /// Validates the scene. Adds its files to `files`, even if it fails.
+    /// Validates the scene. Adds the files of the scene to `files`, even if validation fails.
     pub fn check(self, files: &mut BTreeSet<PathBuf>) -> Result<(Scene, Description), SceneError> {
         let PendingScene {
             text,

@@ -23,14 +23,14 @@ const SAMPLES: u32 = 32;
 /// Radiance of the background: middle gray.
 const BACKGROUND: DVec3 = DVec3::splat(0.18);
 
-/// Maximum number of vertices that are framed one by one.
+/// Maximum number of vertices for which the camera frames the vertices; for larger meshes it frames the bounding box.
 const MAX_POINTS: usize = 1 << 20;
 
-/// Extensions of mesh files, and their usual up axis, as the formats define none: +y of viewers for OBJ and PLY, +z of
-/// 3D printers for STL.
+/// Extensions of mesh files with their usual up axis, because the formats do not define one: +y for OBJ and PLY, as in
+/// viewers, and +z for STL, as in 3D printing.
 const MESHES: [(&str, Up); 3] = [("obj", Up::Y), ("ply", Up::Y), ("stl", Up::Z)];
 
-/// Extensions of unsupported files, and the advice about them.
+/// Extensions of unsupported file types, with advice for the user.
 const UNSUPPORTED: [(&[&str], &str); 4] = [
     (
         &[
@@ -49,7 +49,7 @@ const UNSUPPORTED: [(&[&str], &str); 4] = [
     (&["bin"], "a buffer of a glTF file; render the .gltf file that names it"),
 ];
 
-/// Returns true if the extension is that of a mesh file: `.obj`, `.ply` or `.stl`.
+/// Returns true if the file has the extension of a mesh file: `.obj`, `.ply` or `.stl`.
 pub fn is_mesh(name: &Path) -> bool {
     up(name).is_some()
 }
@@ -68,7 +68,7 @@ fn up(name: &Path) -> Option<Up> {
     known.map(|(_, up)| up)
 }
 
-/// Rejects files with the extension of a format that cannot be a scene.
+/// Rejects files whose extension belongs to a format that cannot be a scene.
 pub(super) fn check_format(path: &Path) -> Result<(), SceneError> {
     let is_of = |endings: &[&str]| endings.iter().any(|ending| has_ending(path, ending));
     let Some((_, what)) = UNSUPPORTED.into_iter().find(|(endings, _)| is_of(endings)) else {
@@ -81,7 +81,7 @@ pub(super) fn check_format(path: &Path) -> Result<(), SceneError> {
     })
 }
 
-/// Returns a mesh file as a scene, and the mesh, which is kept until the scene has it.
+/// Describes a mesh file as a scene. Also returns the mesh, which must be kept alive until the scene refers to it.
 pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Description, Arc<Mesh>), SceneError> {
     let others = GltfChoice {
         view: None,
@@ -135,7 +135,7 @@ pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Descriptio
     ))
 }
 
-/// Returns a model as a scene without light.
+/// Describes a model as a scene without lights.
 pub(super) fn scene(
     overrides: &Overrides,
     (width, height): (u32, u32),
@@ -158,7 +158,7 @@ pub(super) fn scene(
     description
 }
 
-/// Returns the light of models that have none. The camera sees gray, unless an environment is selected.
+/// Returns the environment for models that have no lights. The camera sees gray, unless an environment is selected.
 pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, SceneError> {
     if overrides
         .integrator
@@ -173,7 +173,7 @@ pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, Sc
     })
 }
 
-/// Returns the vertices in the file's coordinates, or their bounding box's corners if many.
+/// Returns the vertices in file coordinates, or the corners of their bounding box if there are many.
 fn points(mesh: &Arc<Mesh>) -> Vec<DVec3> {
     match mesh.positions.len() <= MAX_POINTS {
         true => (mesh.positions.iter())

@@ -15,7 +15,8 @@ use crate::{
     SamplesDescription, Scene, ViewSettings, ViewTransform,
 };
 
-/// Values that override those of a file. An invalid one is a [`SceneError::Override`], which names the field.
+/// Values that override values of the scene file. An invalid override is reported as [`SceneError::Override`], which
+/// names the field.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
     /// Width and height of the image in pixels, each 1 to 65,536.
@@ -36,7 +37,7 @@ pub struct Overrides {
     pub max_depth: Option<u32>,
     /// Folder that must contain all files of the scene; `None` is the folder of the scene file.
     pub asset_root: Option<PathBuf>,
-    /// Frame of an animated camera; `None` is the camera outside of its path, or the first key.
+    /// Frame of an animated camera; `None` uses `[camera]`, and the first key for values that are missing there.
     pub frame: Option<f64>,
     /// The environment, for [`Integrator::Path`]. Keeps its visibility to the camera. A file with an absolute path may
     /// be anywhere.
@@ -50,13 +51,13 @@ pub struct Overrides {
     /// Number of frames of an orbit around the look-at point, 1 to 100,000, instead of the camera's path.
     /// [`Overrides::frame`] selects one, from 1.
     pub turntable: Option<u32>,
-    /// Damage to a file is an error, instead of a warning and a placeholder.
+    /// True to report damage to a file as an error, instead of using a placeholder with a warning.
     pub strict: bool,
     /// Presentation of a model file without a scene.
     pub presentation: Presentation,
     /// The parts of a glTF file to render.
     pub gltf: GltfChoice,
-    /// Values of any keys of the file, applied in order; the fields above take precedence.
+    /// Overrides of arbitrary keys of the file, applied in order; the fields above take precedence.
     pub define: Vec<Define>,
 }
 
@@ -74,7 +75,7 @@ impl Overrides {
         if self.integrator.is_some() {
             description.render.integrator = self.integrator;
         }
-        // First, as the environment and the background may determine the integrator.
+        // Applied first, because the environment and the background may determine the integrator.
         if let Some(environment) = &self.environment {
             surround(description, environment);
         }
@@ -109,7 +110,7 @@ impl Overrides {
 }
 
 impl Overrides {
-    /// Returns the option that overrides the value of a key of the file, or a part of it.
+    /// Returns the option that overrides the value of this key, or a part of the value.
     pub fn in_place_of(&self, key: &KeyPath) -> Option<String> {
         if let Some(define) = self.define.iter().find(|define| define.overrides_key(key)) {
             return Some(format!("--define {define}"));
@@ -156,8 +157,7 @@ fn set_count(samples: &mut SamplesDescription, count: Option<u32>, integrator: I
 }
 
 impl Overrides {
-    /// Returns the locations of the files of a scene in `folder`. They must be below `root`, or below the overridden
-    /// root.
+    /// Returns the file locations of a scene in `folder`. The files must be below `root`, or below the overridden root.
     pub fn assets(&self, folder: &Path, root: &Path) -> Assets {
         let mut assets = Assets::beside(folder);
         if let Some(root) = self.asset_root.as_deref().or((root != folder).then_some(root)) {
@@ -189,7 +189,7 @@ impl Overrides {
         if let Some(frame) = self.frame {
             scene.camera = scene.camera_at(frame)?;
         }
-        // Validation does not notice a requested default count.
+        // A count that equals the default looks like an absent count to the validation.
         let is_asked = self.light_samples.is_some() && scene.render.integrator.follows_paths();
         if is_asked && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
             scene.notes.push(LIGHT_SAMPLES.into());
@@ -210,7 +210,7 @@ light_samples = { pattern = 'random', count = 5 }
 ";
 
     #[test]
-    fn overrides_stand_in_for_the_files_values() {
+    fn overrides_replace_values_of_the_file() {
         let overrides = Overrides {
             size: Some((50, 40)),
             pixel_samples: Some(9),
@@ -243,7 +243,7 @@ light_samples = { pattern = 'random', count = 5 }
     }
 
     #[test]
-    fn an_integrator_brings_its_own_ranges() {
+    fn ranges_depend_on_the_overridden_integrator() {
         let load = |integrator, max_depth| {
             let overrides = Overrides {
                 integrator,
@@ -285,7 +285,7 @@ light_samples = { pattern = 'random', count = 5 }
     }
 
     #[test]
-    fn bad_overrides_are_told_by_their_names() {
+    fn invalid_overrides_are_reported_by_name() {
         let none = Overrides::default;
         for (overrides, expected) in [
             (

@@ -6,14 +6,15 @@ use std::sync::{Arc, PoisonError, RwLock, Weak};
 
 use super::Mesh;
 
-/// Values computed from the mesh that contains the cache, one per type. Comparisons ignore it, and clones are empty.
+/// Values computed from the mesh that contains the cache, one per type. Comparisons ignore the cache, and clones of it
+/// are empty.
 #[derive(Debug, Default)]
 pub(super) struct Cache(RwLock<Values>);
 
 #[derive(Debug, Default)]
 struct Values {
-    /// Their mesh. While this weak reference exists `Arc::get_mut` fails, and a mesh moved out of its `Arc` gets
-    /// another address: values are current where addresses agree.
+    /// The mesh of the values. While this weak reference exists, `Arc::get_mut` fails, and a mesh that is moved out of
+    /// its `Arc` gets a new address. The values remain valid while the address matches.
     mesh: Weak<Mesh>,
     by_type: HashMap<TypeId, Arc<dyn Any + Send + Sync>>,
 }
@@ -28,7 +29,8 @@ impl Values {
 }
 
 impl Cache {
-    /// `mesh` contains the cache. No lock is held during the computation, whose threads may need it as well.
+    /// Returns the value of type `T`, computed on the first call. `mesh` is the mesh that contains the cache. No lock
+    /// is held during the computation, because its threads may use the cache as well.
     pub fn get_or_init<T: Any + Send + Sync>(&self, mesh: &Arc<Mesh>, compute: impl FnOnce() -> T) -> Arc<T> {
         if let Some(value) = self.0.read().unwrap_or_else(PoisonError::into_inner).get(mesh) {
             return value;

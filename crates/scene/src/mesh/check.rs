@@ -1,4 +1,4 @@
-//! The rules of a mesh that was made in code.
+//! Checks the rules for meshes that are created in code.
 
 use std::fmt::Display;
 
@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::{MAX_COLOR, MAX_COORDINATE, MOST, Mesh};
 
-/// Maximum deviation of a unit vector's length.
+/// Maximum deviation of the length of a unit vector from 1.
 const UNIT_TOLERANCE: f32 = 1e-3;
 
-/// Returns the first broken rule, as field, value and rule.
+/// Returns the first violation as the error: field, value and rule.
 pub(super) fn check(mesh: &Mesh) -> Result<(), String> {
     let vertices = mesh.positions.len();
     if mesh.triangles.is_empty() {
@@ -79,7 +79,7 @@ fn groups(mesh: &Mesh) -> Result<(), String> {
     })
 }
 
-/// For a list that is empty or of vertices.
+/// Checks a list that must be empty or have one element per vertex.
 fn of_vertices<T: Sync>(
     name: &str,
     list: &[T],
@@ -95,7 +95,7 @@ fn of_vertices<T: Sync>(
     each(name, list, rule)
 }
 
-/// The error is that of the first element.
+/// Checks all elements; the error is about the first invalid element.
 fn each<T: Sync>(name: &str, list: &[T], rule: impl Fn(&T) -> Option<String> + Sync) -> Result<(), String> {
     let broken = |(i, element): (usize, &T)| rule(element).map(|message| format!("{name}[{i}]: {message}"));
     match list.par_iter().enumerate().find_map_first(broken) {

@@ -1,4 +1,4 @@
-//! Damage to mesh files for which a stand-in exists: it is reported, and the rest of the file is used.
+//! Damage to mesh files for which a stand-in exists. The damage is reported, and the rest of the file is used.
 
 use super::error::{Location, MeshFault};
 use crate::note::Note;
@@ -22,7 +22,7 @@ struct Damage {
 }
 
 impl Damages {
-    /// The message is made for the first of a kind only.
+    /// The message is only created for the first fault of each kind.
     #[cold]
     pub fn add(&mut self, stand_in: &'static str, fault: impl FnOnce() -> MeshFault) {
         match self.0.iter_mut().find(|damage| damage.stand_in == stand_in) {
@@ -35,7 +35,7 @@ impl Damages {
         }
     }
 
-    /// Returns the first fault of each kind, and all of them as notes.
+    /// Returns the first fault of each kind, and one note per kind that counts its faults.
     pub fn into_parts(self) -> (Vec<MeshFault>, Vec<Note>) {
         let notes = self.0.iter().map(Damage::note).collect();
         (self.0.into_iter().map(|damage| damage.first).collect(), notes)
@@ -55,7 +55,7 @@ impl Damage {
         };
         let more = match self.count {
             1 => String::new(),
-            count => format!(" ({} more like this)", count - 1),
+            count => format!(" ({} similar)", count - 1),
         };
         Note {
             line,

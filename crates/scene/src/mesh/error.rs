@@ -77,7 +77,7 @@ impl MeshError {
     }
 }
 
-/// An error without its file.
+/// An error that does not contain the path of its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct MeshFault {
     pub place: Location,
@@ -124,7 +124,7 @@ impl MeshFault {
     }
 }
 
-/// Quotes a word for a message, eliding the middle if long.
+/// Quotes a word for a message, with the middle elided if it is long.
 pub(super) fn shown(word: &[u8]) -> String {
     const LONGEST: usize = 60;
     if word.len() <= LONGEST {
@@ -137,7 +137,7 @@ pub(super) fn shown(word: &[u8]) -> String {
     )
 }
 
-/// Formats a number without long runs of zeros.
+/// Formats a number; very large and very small numbers in scientific notation.
 pub(super) fn shown_number(x: f64) -> String {
     match x == 0.0 || (1e-5..1e15).contains(&x.abs()) {
         true => format!("{x}"),

@@ -37,18 +37,19 @@ use crate::note::Note;
 const MAX_FILE_BYTES: u64 = 8 << 30;
 /// Maximum size of an MTL file in bytes.
 const MAX_LIBRARY_BYTES: u64 = 16 << 20;
-/// Maximum number of triangles and of vertices; three times as many fit 32-bit indices.
+/// Maximum number of triangles and of vertices; three times this number fits into 32-bit indices.
 const MOST: usize = 1 << 30;
 /// Maximum colour component of a vertex.
 const MAX_COLOR: f32 = 1e6;
 /// Maximum magnitude of a coordinate.
 pub(crate) const MAX_COORDINATE: f64 = 1e9;
 
-/// A triangle mesh with shared vertices. Positions are relative to [`Mesh::center`], for precision far from the
-/// origin.
+/// A triangle mesh with shared vertices. Positions are relative to [`Mesh::center`], which keeps them precise far from
+/// the origin.
 ///
-/// Meshes made in code are validated with their scene. The BVH is cached in the mesh on first use, and rebuilt after
-/// it was cloned or taken out of its `Arc`; `Arc::get_mut` returns `None` from then on.
+/// Meshes that are created in code are validated together with their scene. The BVH is cached in the mesh on first use;
+/// from then on, `Arc::get_mut` returns `None`. The BVH is rebuilt for a clone, and for a mesh that was moved out of
+/// its `Arc`.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Mesh {
@@ -60,16 +61,16 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, or empty.
     pub uvs: Vec<Vec2>,
-    /// Further sets of texture coordinates, from set 1.
+    /// Further sets of texture coordinates, starting with set 1.
     pub more_uvs: Vec<Vec<Vec2>>,
     /// Linear RGB (0 to 1e6) and opacity (0 to 1), or empty.
     pub colors: Vec<Vec4>,
-    /// Unit tangents in the direction of u, or empty. `w` is 1 or -1: v increases along w (normal × tangent). Zero
-    /// tangents are derived from the texture coordinates.
+    /// Unit tangents in the direction of u, or empty. `w` is 1 or -1: v increases along w (normal × tangent). Tangents
+    /// that are zero are derived from the texture coordinates.
     pub tangents: Vec<Vec4>,
-    /// Vertices of the triangles, counter-clockwise from outside.
+    /// Vertices of the triangles, counter-clockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Parts with separate materials; at least one.
+    /// Parts with separate materials; at least one part.
     pub groups: Vec<Group>,
     /// Group of each triangle; empty for a single group.
     pub group_of: Vec<u32>,
@@ -97,11 +98,11 @@ pub struct Group {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Library {
-    /// The file, in the folder of the mesh; it may not exist.
+    /// The file, in the folder of the mesh. The file may not exist.
     pub file: PathBuf,
     /// Materials in file order.
     pub materials: Vec<MtlMaterial>,
-    /// Why the file was not read.
+    /// The reason if the file was not read.
     pub problem: Option<String>,
 }
 
@@ -137,9 +138,9 @@ pub struct MtlMaterial {
     pub emission_map: Option<String>,
     /// Texture of the opacity: `map_d`.
     pub opacity_map: Option<String>,
-    /// Texture of heights, or normals of some exporters: `map_Bump` or `bump`.
+    /// Height map, or a normal map in files of some exporters: `map_Bump` or `bump`.
     pub bump_map: Option<String>,
-    /// Texture of normals: `norm`.
+    /// Normal map: `norm`.
     pub normal_map: Option<String>,
     /// Texture of the metallic factor: `map_Pm`.
     pub metallic_map: Option<String>,
@@ -147,7 +148,7 @@ pub struct MtlMaterial {
     pub roughness_map: Option<String>,
     /// Statements without effect: other maps, and options.
     pub others: Vec<String>,
-    /// Lines of keywords and statements without effect, from 1.
+    /// For each keyword and each statement without effect, its line, counted from 1.
     pub(crate) lines: BTreeMap<String, usize>,
 }
 
@@ -192,7 +193,7 @@ impl Mesh {
     ///   are ignored.
     /// - PLY files keep their vertices. Integer vertex colours are sRGB, floats linear.
     /// - STL files have a vertex for each position, and a group for each `solid`. Facet normals are only used for
-    ///   [`Normals::File`], and then separate vertices.
+    ///   [`Normals::File`], and each triangle then has separate vertices.
     ///
     /// Damaged parts are skipped. [`Mesh::notes`] has warnings about them and about other defects.
     pub fn load(path: &Path, normals: Option<Normals>) -> Result<Mesh, MeshError> {
@@ -227,7 +228,7 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// Reads the MTL files of a line: one whose name may have blanks, or several.
+    /// Reads the MTL files of a line: one file whose name may contain blanks, or several files.
     fn load_libraries(&mut self, mesh: &Path, names: &str) {
         let folder = match mesh.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -247,7 +248,7 @@ impl Mesh {
             file: file_beside(folder, name),
             ..Library::default()
         };
-        // Each file is read once, and their number is limited.
+        // Each file is read once, and the number of files is limited.
         let is_known = self.libraries.iter().any(|known| known.file == library.file);
         if is_known || self.libraries.len() >= obj::MAX_LIBRARIES {
             return;
@@ -276,12 +277,12 @@ impl Mesh {
 }
 
 impl Mesh {
-    /// Returns the value of type `T`, computed on the first call. A mesh has one value per type.
+    /// Returns the value of type `T`, computed on the first call. A mesh caches one value per type.
     pub fn cached<T: Any + Send + Sync>(self: &Arc<Self>, compute: impl FnOnce(&Mesh) -> T) -> Arc<T> {
         self.cache.get_or_init(self, || compute(self))
     }
 
-    /// Returns the first rule that the mesh violates; none for meshes from files.
+    /// Returns the first rule that the mesh violates. Meshes from files do not violate rules.
     pub(crate) fn broken_rule(self: &Arc<Self>) -> Option<String> {
         struct BrokenRule(Option<String>);
         self.cached(|mesh| BrokenRule(check::check(mesh).err())).0.clone()
@@ -345,7 +346,7 @@ fn read(
 
 /// Reads a file; `None` if it is too large.
 fn read_file(path: &Path, largest: u64) -> io::Result<Option<Vec<u8>>> {
-    // Opening a pipe waits for a writer.
+    // Checked before opening, because opening a pipe blocks until it has a writer.
     let data = fs::metadata(path)?;
     if !data.is_file() {
         return Err(io::Error::other("it must be a file"));
@@ -371,8 +372,8 @@ fn read_library(folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Resolves a file name in a folder. If missing, as with paths of another machine, tries its last component, then
-/// names in other case.
+/// Resolves a file name in a folder. If the file does not exist (for example, because the path is from another
+/// machine), tries the last path component, then a case-insensitive match.
 pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
     let slashes = name.replace('\\', "/"); // Windows paths
     let last = slashes.rsplit('/').next().unwrap_or(&slashes);
@@ -385,7 +386,7 @@ pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
         .unwrap_or_else(|| plain.clone())
 }
 
-/// Returns an existing file of the same name, ignoring case.
+/// Returns an existing file whose name matches, ignoring case.
 pub(crate) fn in_other_case(folder: &Path, path: &str) -> Option<PathBuf> {
     let (parents, name) = path.rsplit_once('/').unwrap_or(("", path));
     let mut folder = folder.to_owned();

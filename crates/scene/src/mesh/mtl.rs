@@ -5,11 +5,12 @@ use super::MtlMaterial;
 use super::error::{MeshFault, shown};
 use super::tokens::{Tokens, number};
 
-/// Maximum number of materials of a file, which take hundreds of bytes in memory but as few as nine in the file.
+/// Maximum number of materials of a file. A material takes hundreds of bytes in memory, but may take only nine bytes in
+/// the file.
 pub(super) const MAX_MATERIALS: usize = 1 << 16;
 /// Maximum number of reported invalid lines.
 const MAX_PROBLEMS: usize = 100;
-/// Maximum number of reported ineffective statements per material.
+/// Maximum number of reported statements without effect per material.
 const MAX_IGNORED: usize = 16;
 
 #[derive(Debug, Default)]
@@ -21,7 +22,7 @@ pub(super) struct Mtl {
     pub problem_count: usize,
 }
 
-/// Parses a file. Problems begin with the line; the error is of the whole file.
+/// Parses a file. Problems begin with the line number; the error concerns the whole file.
 pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
     let mut words = Tokens::new(bytes);
     let mut materials: Vec<MtlMaterial> = Vec::new();
@@ -82,7 +83,7 @@ const KEYWORDS: [(&str, &str); 24] = [
     ("tr", "Tr"),
 ];
 
-/// Applies a line. The error is the line, keyword and rule.
+/// Applies a line. The error contains the line, the keyword and the rule.
 fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Tokens) -> Result<(), String> {
     let is_keyword = |(lower, _): &&(&str, &str)| lower.as_bytes().eq_ignore_ascii_case(keyword);
     let Some((_, keyword)) = KEYWORDS.iter().find(is_keyword) else {
@@ -116,7 +117,8 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Tokens) -> Result
         "Ni" => material.index_of_refraction = Some(finite(words)?),
         "d" => material.opacity = Some(finite(words)?),
         "Tr" => {
-            // MeshLab writes 1 for opaque materials, and an invisible material has no use.
+            // A value of 1 counts as opaque: MeshLab writes 1 for opaque materials, and invisible materials would be
+            // useless.
             let opacity = 1.0 - finite(words)?;
             if opacity != 0.0 {
                 material.opacity = Some(opacity);
@@ -173,7 +175,7 @@ fn map_file(line: &str) -> (String, Vec<String>) {
             _ => 1,
         };
         for i in 0..numbers {
-            // The first number is required.
+            // Only the first number is required.
             if i == 0 || words.peek().is_some_and(|word| word.parse::<f64>().is_ok()) {
                 words.next();
             }

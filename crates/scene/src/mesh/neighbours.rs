@@ -1,4 +1,5 @@
-//! Mesh adjacency by point: vertices of equal position, whatever their other attributes.
+//! Mesh adjacency by points. A point consists of all vertices with equal positions, independent of their other
+//! attributes.
 
 use std::hash::BuildHasher;
 
@@ -15,7 +16,7 @@ pub(super) struct Neighbours {
 }
 
 impl Neighbours {
-    /// Positions must not contain -0.
+    /// Groups vertices into points. Positions must not contain -0.
     pub fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Neighbours {
         let (points, count) = points(positions);
         // Stable counting sort of corners by point.
@@ -43,12 +44,13 @@ impl Neighbours {
         self.starts.len() - 1
     }
 
-    /// Returns the triangles at a point, ascending.
+    /// Returns the triangles at a point, in ascending order.
     pub fn around(&self, point: usize) -> &[u32] {
         &self.around[self.starts[point] as usize..self.starts[point + 1] as usize]
     }
 
-    /// Finds non-manifold edges, inconsistent winding and duplicate triangles. Empty `group_of`: one group.
+    /// Finds non-manifold edges, inconsistent winding and duplicate triangles. If `group_of` is empty, all triangles
+    /// are in one group.
     pub fn edges(&self, triangles: &[[u32; 3]], group_of: &[u32]) -> Edges {
         (0..self.count())
             .into_par_iter()
@@ -57,7 +59,7 @@ impl Neighbours {
                 || (Edges::default(), Vec::new()),
                 |(mut edges, mut others), point| {
                     let (mut crowded, mut turned) = self.odd(triangles, point, &[], &mut others);
-                    // Edges are counted without duplicates, which make them irregular.
+                    // Edges are counted without duplicate triangles, which would make edges irregular.
                     if crowded + turned > 0 {
                         let repeated = self.repeated(triangles, group_of, point);
                         if !repeated.is_empty() {
@@ -82,7 +84,8 @@ impl Neighbours {
             })
     }
 
-    /// Counts crowded and turned edges with lower point `point`, without some sorted triangles.
+    /// Counts crowded and turned edges whose point with the lower index is `point`. Ignores the triangles of a sorted
+    /// list.
     #[inline]
     fn odd(
         &self,
@@ -115,7 +118,7 @@ impl Neighbours {
         })
     }
 
-    /// Returns the triangles at a point that repeat an earlier one's points, winding and group.
+    /// Returns the triangles at a point that have the same points, winding and group as an earlier triangle.
     fn repeated(&self, triangles: &[[u32; 3]], group_of: &[u32], point: usize) -> Vec<u32> {
         let mut all: Vec<_> = (self.around(point).iter())
             .map(|triangle| {
@@ -147,9 +150,9 @@ impl Neighbours {
 pub(super) struct Edges {
     /// Edges of more than two triangles.
     pub crowded: usize,
-    /// Same direction in both triangles.
+    /// Edges that have the same direction in both triangles.
     pub turned: usize,
-    /// Repeat an earlier triangle's points, winding and group. Unsorted; not counted in the edges.
+    /// Triangles with the same points, winding and group as an earlier triangle. Unsorted; ignored when counting edges.
     pub repeated: Vec<u32>,
 }
 
@@ -212,12 +215,12 @@ mod tests {
 
     #[test]
     fn repeated_triangles_are_found() {
-        // Vertex 4 is at vertex 0.
+        // Vertex 4 has the position of vertex 0.
         let triangles = [[0, 1, 2], [0, 2, 3], [1, 2, 4], [2, 0, 1], [3, 0, 2]];
         assert_eq!(odd(&triangles, &[]), (0, 0, vec![2, 3, 4]));
-        // In different groups they are not duplicates: two edges with three triangles, and one with four.
+        // Triangles in different groups are not duplicates: two edges with three triangles, and one with four.
         assert_eq!(odd(&triangles, &[0, 1, 1, 0, 1]), (1, 2, vec![3, 4]));
-        // With opposite winding they are not duplicates.
+        // Triangles with opposite winding are not duplicates.
         assert_eq!(odd(&[[0, 1, 2], [2, 1, 0], [1, 2, 0]], &[]), (0, 0, vec![2]));
     }
 

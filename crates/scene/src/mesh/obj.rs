@@ -1,8 +1,8 @@
 //! Wavefront OBJ files (Wavefront Technologies, "Advanced Visualizer Manual", appendix B, 1995), without smoothing
 //! groups (`s`).
 //!
-//! The crate `tobj` 4 does not join lines at backslashes, reports no lines, and takes 0.6 s for a million triangles; a
-//! whole load takes 0.25 s here.
+//! The crate `tobj` 4 does not join lines at backslashes, reports no lines, and takes 0.6 s for a million triangles;
+//! loading with this reader takes 0.25 s in total.
 
 use std::collections::{BTreeMap, HashMap};
 use std::hash::BuildHasher;
@@ -48,7 +48,7 @@ struct Reader {
     positions: Vec<DVec3>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
-    /// Colour of each position, or empty.
+    /// The colour of each position, or empty.
     colors: Vec<Vec4>,
     vertices: Vertices,
     /// Corners of the current face.
@@ -149,7 +149,7 @@ impl Reader {
         self.draft.face(&self.face, words.place())
     }
 
-    /// Reads the colour after a position, in sRGB as of MeshLab and Blender.
+    /// Reads the colour after a position, which is sRGB as written by MeshLab and Blender.
     fn color(&mut self, words: &mut Tokens) {
         let mut values = [0.0; 3];
         let mut count = 0;
@@ -159,7 +159,7 @@ impl Reader {
             }
             count += 1;
         }
-        // One number is a weight; viewers ignore a fourth one, opacity.
+        // A single number is a weight. A fourth number is an opacity, which viewers ignore.
         if count < 3 {
             if !self.colors.is_empty() {
                 self.colors.push(Vec4::ONE);
@@ -298,7 +298,7 @@ fn has_room(count: usize, words: &Tokens) -> Result<(), MeshFault> {
     }
 }
 
-/// Parses an index among `count` elements, returned from 0; `None` if not an integer.
+/// Parses an index into `count` elements and returns it counted from 0; `None` if the text is not an integer.
 #[inline]
 fn index(part: &[u8], count: usize, what: &str) -> Option<Result<u32, String>> {
     let (is_negative, digits) = match part {
@@ -315,7 +315,7 @@ fn index(part: &[u8], count: usize, what: &str) -> Option<Result<u32, String>> {
         }
         n = n.saturating_mul(10).saturating_add(usize::from(digit - b'0'));
     }
-    // 1 to `count`, in either direction.
+    // Valid indices are 1 to `count`, and -1 to -`count`.
     let found = n.wrapping_sub(1) < count;
     Some(match (found, is_negative) {
         (true, false) => Ok((n - 1) as u32),
@@ -340,7 +340,7 @@ fn no_corner(word: &[u8]) -> String {
 #[derive(Default)]
 struct Vertices {
     corners: Vec<[u32; 3]>,
-    /// First vertex of each position.
+    /// The first vertex of each position.
     first: Vec<u32>,
     others: HashTable<u32>,
     hasher: DefaultHashBuilder,

@@ -1,8 +1,8 @@
 //! Triangulation of polygons.
 //!
-//! Readers store each polygon as a fan from its first corner. A fan that leaves the polygon is replaced by ear clipping
-//! in the polygon's plane, whose normal is Newell's: the sum of the fan's cross products (Tampieri, "Newell's Method
-//! for Computing the Plane Equation of a Polygon", Graphics Gems III, 1992).
+//! Readers store each polygon as a fan from its first corner. A fan that extends outside of the polygon is replaced by
+//! ear clipping in the polygon's plane. The normal of the plane is Newell's normal, the sum of the fan's cross products
+//! (Tampieri, "Newell's Method for Computing the Plane Equation of a Polygon", Graphics Gems III, 1992).
 
 use earcut::Earcut;
 use glam::DVec3;
@@ -10,11 +10,12 @@ use rayon::prelude::*;
 
 use super::raw_mesh::{RawMesh, counted};
 
-/// Largest area of a kept fan outside of the polygon, relative to its area.
+/// Maximum area by which a fan that is kept extends outside of the polygon, relative to the polygon's area.
 const AREA_TOLERANCE: f64 = 1e-6;
-/// Largest deviation of a planar polygon's corners from the plane, relative to the distance of the farthest corner.
+/// Maximum deviation of a planar polygon's corners from the plane, relative to the distance of the farthest corner.
 const PLANE_TOLERANCE: f64 = 0.05;
-/// Largest normal of a polygon whose parts cancel, relative to the fan's cross products.
+/// Maximum length of Newell's normal, relative to the fan's cross products, at which the parts of a polygon are said to
+/// cancel.
 const CANCELLATION: f64 = 1e-6;
 /// Maximum number of corners for ear clipping, which takes quadratic time at worst.
 const MAX_CORNERS: usize = 1 << 14;
@@ -32,9 +33,9 @@ struct Form {
     normal: DVec3,
     /// A corner has no position.
     is_damaged: bool,
-    /// The fan leaves the polygon.
+    /// The fan extends outside of the polygon.
     is_concave: bool,
-    /// The areas of its parts cancel, so that it has no plane.
+    /// The areas of the polygon's parts cancel, so the polygon has no plane.
     cancels: bool,
     is_planar: bool,
 }
@@ -111,7 +112,7 @@ fn form(fan: &[[u32; 3]], positions: &[DVec3]) -> Form {
     }
 }
 
-/// Makes all triangles of a fan refer to its corner without a position, to remove the whole face.
+/// Makes all triangles of a fan refer to the corner that has no position, so that the whole face is removed.
 fn mark_damaged(fan: &mut [[u32; 3]], positions: &[DVec3]) {
     let is_bad = |vertex: &u32| !positions[*vertex as usize].is_finite();
     if let Some(bad) = fan.iter().flatten().copied().find(is_bad) {
@@ -128,8 +129,8 @@ struct Clipper {
 }
 
 impl Clipper {
-    /// Replaces a fan by the triangles of its polygon. Returns false if it intersects itself: the triangles then do not
-    /// cover exactly its area.
+    /// Replaces a fan by the triangles of the polygon. Returns false if the polygon intersects itself; the triangles
+    /// then do not cover exactly its area.
     fn clip(&mut self, fan: &mut [[u32; 3]], normal: DVec3, positions: &[DVec3]) -> bool {
         self.corners.clear();
         self.corners.extend([fan[0][0], fan[0][1]]);
@@ -153,7 +154,7 @@ impl Clipper {
             let [a, b, c] = [of[0], of[1], of[2]];
             let area = area(point(a), point(b), point(c));
             covered += area.abs();
-            // Counter-clockwise, as the polygon is.
+            // Counter-clockwise, like the polygon.
             let ordered = if area < 0.0 { [a, c, b] } else { [a, b, c] };
             ordered.map(|i| self.corners[i as usize])
         });

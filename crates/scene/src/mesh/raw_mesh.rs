@@ -25,10 +25,10 @@ pub(crate) struct RawMesh {
     /// Fans of polygons with more than three corners.
     pub(super) polygons: Vec<Polygon>,
     pub groups: Vec<Group>,
-    /// First triangle and group of each run.
+    /// The first triangle and the group of each run of triangles.
     pub runs: Vec<(usize, u32)>,
     pub notes: Vec<Note>,
-    /// Why a file has none.
+    /// The reason if the file has no triangles.
     pub(super) without_triangles: Option<&'static str>,
     pub(super) damages: Damages,
 }
@@ -41,7 +41,8 @@ impl RawMesh {
         }
     }
 
-    /// Builds the mesh with its normals; `None` without area. The error is the rule.
+    /// Builds the mesh with its normals; `None` if the mesh has zero area. The error is the message of the violated
+    /// constraint.
     pub(crate) fn finish(self) -> Result<Option<Mesh>, String> {
         match build::build_mesh(self, None) {
             Ok(mesh) => Ok(Some(mesh)),
@@ -76,7 +77,7 @@ pub(super) fn counted(count: usize, one: &str, several: &str) -> Note {
     format!("{count} {}", if count == 1 { one } else { several }).into()
 }
 
-/// Checks a coordinate. -0 becomes +0, for equal bits. The error is the value and the rule.
+/// Checks a coordinate. -0 becomes +0, so that equal coordinates have equal bits. The error is the value and the rule.
 #[inline]
 pub(super) fn coordinate(x: f64) -> Result<f64, String> {
     if x.abs() <= MAX_COORDINATE {
@@ -95,12 +96,12 @@ pub(super) fn texture_coordinate(x: f64) -> Result<f32, String> {
     }
 }
 
-/// Normalizes a vector; invalid ones become zero.
+/// Normalizes a vector; invalid vectors become zero.
 pub(crate) fn unit(normal: DVec3) -> Vec3 {
     let largest = normal.abs().max_element();
     if !(largest > 0.0 && normal.is_finite()) {
         return Vec3::ZERO;
     }
-    // Scaled, as squares can overflow or underflow.
+    // Scaled first, because squares can overflow or underflow.
     (normal / largest).normalize().as_vec3()
 }

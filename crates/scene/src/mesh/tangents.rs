@@ -1,9 +1,10 @@
 //! Vertex tangents for normal maps of smooth meshes.
 //!
-//! The tangents of a triangle are the derivatives of its position by u and v. A vertex has the mean of its triangles',
-//! projected to the plane of its normal, jointly normalized and weighted by angle (Mikkelsen, "Simulation of Wrinkled
-//! Surfaces Revisited", University of Copenhagen, 2008; MikkTSpace of glTF). Unlike there, the derivative by v is kept,
-//! to rotate textures where the two are not perpendicular. Tangents of the mesh are used unchanged.
+//! The tangents of a triangle are the derivatives of the position with respect to u and v. The tangents of a vertex are
+//! the mean of the tangents of its triangles, projected to the plane of the vertex normal, jointly normalized and
+//! weighted by angle (Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", University of Copenhagen, 2008;
+//! MikkTSpace of glTF). Unlike in MikkTSpace, the derivative with respect to v is kept, so that textures are rotated
+//! correctly where the two derivatives are not perpendicular. Tangents from the mesh file are used unchanged.
 
 use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
@@ -11,32 +12,32 @@ use rayon::prelude::*;
 use super::Mesh;
 use super::neighbours::Neighbours;
 
-/// Maximum number of vertices at a point to join, which compares all pairs.
+/// Maximum number of vertices at a point that are joined; joining compares all pairs.
 const MAX_JOINED: usize = 64;
-/// Cosine of the maximum angle between equal normals: 1 degree.
+/// Cosine of the maximum angle between normals that count as equal: 1 degree.
 const ONE_NORMAL: f64 = 0.9998;
 /// Cosine of the maximum angle between joined tangents: 60 degrees.
 const ONE_DIRECTION: f64 = 0.5;
-/// Tolerance of integer offsets between texture coordinates, which files round.
+/// Tolerance for integer offsets between texture coordinates, because files contain rounded coordinates.
 const WHOLE: f64 = 1e-4;
 
-/// Tangents of a mesh; vertices are split between triangles with plain and mirrored texture.
+/// Tangents of a mesh; vertices that are shared by plain and mirrored triangles are split.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VertexTangents {
-    /// Triangles; mirrored ones use the copies.
+    /// Triangles; mirrored triangles use the copies.
     pub triangles: Vec<[u32; 3]>,
-    /// Originals of the copies, which are numbered after all vertices.
+    /// The original vertex of each copy; copies are numbered after all vertices.
     pub copies: Vec<u32>,
-    /// Tangents of vertices, then copies.
+    /// Tangents of the vertices, then of the copies.
     pub tangents: Vec<Tangents>,
 }
 
-/// Derivatives of the position, scaled to a sum of squares of 1; zero if undefined.
+/// Derivatives of the position, scaled so that the sum of their squared lengths is 1; zero if undefined.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tangents {
-    /// Derivative by u.
+    /// Derivative with respect to u.
     pub u: Vec3,
-    /// Derivative by v.
+    /// Derivative with respect to v.
     pub v: Vec3,
 }
 
@@ -69,7 +70,7 @@ impl VertexTangents {
     }
 }
 
-/// Converts a glTF tangent (glTF 2.0, 3.7.2.1); `None` if zero.
+/// Converts a glTF tangent (glTF 2.0, 3.7.2.1); `None` if the tangent is zero.
 fn given(tangent: Vec4, normal: Vec3) -> Option<Tangents> {
     let u = tangent.truncate().as_dvec3().try_normalize()?;
     let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
@@ -86,7 +87,8 @@ fn texture_area([a, b, c]: [DVec2; 3]) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
-/// Splits vertices of plain and mirrored triangles. Returns the triangles, and the originals of copies.
+/// Splits vertices that are shared by plain and mirrored triangles. Returns the triangles, and the original vertex of
+/// each copy.
 fn parted(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
     const PLAIN: u8 = 1;
     const MIRRORED: u8 = 2;
@@ -120,7 +122,7 @@ fn parted(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
     (triangles, copies)
 }
 
-/// Sum over a vertex's triangles.
+/// Sums over the triangles of a vertex.
 #[derive(Clone, Copy, Debug)]
 struct Sum {
     vertex: u32,
@@ -142,8 +144,8 @@ impl Sum {
         }
     }
 
-    /// Returns true if a repeating texture is continuous between two vertices at a point, as where u jumps from 1 to 0
-    /// on a sphere. Atlas charts keep their own tangents, as in MikkTSpace.
+    /// Returns true if a repeating texture is continuous between two vertices at a point, for example where u jumps
+    /// from 1 to 0 on a sphere. Charts of an atlas keep separate tangents, as in MikkTSpace.
     fn goes_on_in(&self, other: &Sum) -> bool {
         let apart = self.uv - other.uv;
         let repeats = (apart - apart.round()).abs().max_element() < WHOLE;
@@ -165,7 +167,7 @@ impl Sum {
     }
 }
 
-/// Returns the contribution of corner k; `None` without texture area.
+/// Returns the contribution of corner k; `None` if the triangle has no area in texture space.
 fn at_corner(mesh: &Mesh, triangle: [u32; 3], k: usize, vertex: u32) -> Option<Sum> {
     let corners = [0, 1, 2].map(|i| triangle[(k + i) % 3] as usize);
     let [p, next, previous] = corners.map(|corner| mesh.positions[corner].as_dvec3());

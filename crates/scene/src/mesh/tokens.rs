@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::error::{Location, MeshFault, shown};
 
-/// Returns UTF-8, converted from UTF-16 with a byte order mark.
+/// Returns the text as UTF-8; UTF-16 with a byte order mark is converted.
 pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     let unit: fn([u8; 2]) -> u16 = match bytes {
         [0xfe, 0xff, ..] => u16::from_be_bytes,
@@ -17,7 +17,8 @@ pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text.into_bytes())
 }
 
-/// Words between blanks. `#` at the start of a word begins a comment; a backslash at the end of a line continues it.
+/// Words between blanks. `#` at the start of a word begins a comment; a backslash at the end of a line joins the next
+/// line.
 pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -79,7 +80,7 @@ impl<'a> Tokens<'a> {
         &self.bytes[start..self.at]
     }
 
-    /// Returns the start of the next line, if joined by this backslash.
+    /// Returns the start of the next line if this backslash joins it.
     fn joined(&self, backslash: usize) -> Option<usize> {
         match self.bytes[backslash + 1..] {
             [] => Some(backslash + 1),
@@ -105,7 +106,7 @@ impl<'a> Tokens<'a> {
         true
     }
 
-    /// Returns the rest of the line, single-spaced. Names may contain `#`.
+    /// Returns the rest of the line; words are separated by single blanks. Names may contain `#`.
     pub fn name(&mut self) -> String {
         let mut name = String::new();
         loop {
@@ -128,7 +129,7 @@ impl<'a> Tokens<'a> {
         self.skip_line()
     }
 
-    /// Advances to the next line, ignoring a backslash.
+    /// Advances to the next line, even if the line ends with a backslash.
     pub fn skip_line(&mut self) -> bool {
         let rest = &self.bytes[self.at..];
         match rest.iter().position(|byte| *byte == self.end) {
@@ -157,7 +158,7 @@ impl<'a> Tokens<'a> {
         lines.filter(|line| line.iter().any(|byte| *byte > b' ')).count()
     }
 
-    /// Reads a number. `what` names it in errors.
+    /// Reads a number. `what` is the name of the number in errors.
     #[inline]
     pub fn number(&mut self, what: &str) -> Result<f64, MeshFault> {
         match self.on_line() {

@@ -48,7 +48,7 @@ impl Description {
         }
     }
 
-    /// Returns the camera of a text, without overrides.
+    /// Parses only the camera of a text, without overrides.
     pub fn parse_camera(text: &str, origin: &str) -> Result<CameraDescription, SceneError> {
         let parts = Parts::of(text);
         let rest = parts.read_rest().map_err(|broken| broken.into_error(text, origin))?;
@@ -80,7 +80,7 @@ impl Places {
     }
 }
 
-/// Parses a changed part; `None` if not a standalone table.
+/// Parses a changed part; `None` if the part is not a standalone table.
 fn read_changed_part(
     parts: &Parts,
     part: &Part,
@@ -116,7 +116,7 @@ fn replace<T>(place: Option<&mut T>, table: Table, read: fn(Table) -> Read<T>) -
     place.map(|place| read(table).map(|new| *place = new))
 }
 
-/// Parses a change outside of the parts; `None` if it contains elements of parts.
+/// Parses a change outside of the parts; `None` if this text contains elements of sections that are split into parts.
 fn read_changed_rest(
     parts: &Parts,
     defines: &mut Defines,
@@ -141,7 +141,7 @@ fn read_changed_rest(
 /// A standalone part of a text: a table with its header, or everything outside of such tables.
 pub struct Piece<'a> {
     pub text: Cow<'a, str>,
-    /// Path in the piece of the requested value.
+    /// Path of the requested value within the piece.
     pub path: KeyPath,
     place: Result<usize, Rest>,
 }
@@ -165,7 +165,7 @@ impl<'a> Pieces<'a> {
         Pieces(Parts::of(text))
     }
 
-    /// Returns the pieces of a text whose parts are known.
+    /// Returns the pieces of a text whose parts have already been located.
     pub fn known(text: &'a str, places: &'a Places) -> Pieces<'a> {
         let parts = places.0.as_slice().into();
         Pieces(Parts { text, parts })

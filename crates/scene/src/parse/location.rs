@@ -9,7 +9,7 @@ use crate::error::SceneError;
 use crate::key_path::{KeyPath, Segment};
 use crate::problem::{Problem, Problems};
 
-/// Returns the error of invalid values, of the text or of a define.
+/// Converts problems of values to an error, located in the text or at a define.
 pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) -> SceneError {
     if let Some(error) = problems.of_define(defines) {
         return error;
@@ -23,7 +23,7 @@ pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) 
     problems.into_error(|problem| keys.place(&problem.key), invalid)
 }
 
-/// Returns the line, from 1, of the camera's path.
+/// Returns the line of the camera's path, counted from 1.
 pub fn line_of_path(text: &str) -> usize {
     let path = KeyPath(["camera", "path"].map(Segment::from).to_vec());
     line_number(text, Keys::of(text).place(&path))
@@ -31,7 +31,7 @@ pub fn line_of_path(text: &str) -> usize {
 
 enum Keys<'a> {
     Whole(DeValue<'a>),
-    /// Parts of a text too large to parse at once.
+    /// The parts of a text that is too large to parse as a whole.
     Parts(Parts<'a>),
 }
 
@@ -43,7 +43,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// Returns the byte offset of the key at a path, or of the innermost table that exists.
+    /// Returns the byte offset of the key at a path, or of the innermost existing table that would contain it.
     fn place(&self, path: &KeyPath) -> usize {
         let parts = match self {
             Keys::Whole(document) => return place_in(document, path),
@@ -59,7 +59,7 @@ impl<'a> Keys<'a> {
     }
 }
 
-/// Returns a text with the locations of its keys; an empty table if it cannot be parsed.
+/// Parses a text, keeping the locations of keys; returns an empty table if the text cannot be parsed.
 fn document(text: &str) -> DeValue<'_> {
     DeValue::Table(
         DeTable::parse(text)

@@ -33,7 +33,7 @@ pub use syntax::{NOT_UTF8, encoding, syntax_error};
 pub use table::{read_for, segments};
 
 impl Description {
-    /// Returns the description with the defined values.
+    /// Returns the description with the defines applied.
     pub(crate) fn defined(&self, defines: &mut Defines) -> Result<Description, Problem> {
         let mut file = Table::try_from(self).map_err(|error| Problem::new(error.to_string()))?;
         defines.put(&[], &mut file, |_| false).at("define")?;
@@ -63,7 +63,7 @@ impl Description {
     }
 }
 
-/// Returns true if a scene of this name is in JSON.
+/// Returns true if a scene file with this name is in JSON.
 pub fn is_course(name: &Path) -> bool {
     let extension = name.extension();
     extension.is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
@@ -152,7 +152,7 @@ fn with_section(problem: Problem) -> Problem {
     let [Segment::Key(key)] = problem.key.0.as_slice() else {
         return problem;
     };
-    // Names of options, and of other renderers.
+    // Suggests keys for names of options and for names that other renderers use.
     let name = match key.as_str() {
         "spp" | "samples" => "pixel_samples",
         "bounces" | "depth" => "max_depth",
@@ -175,15 +175,15 @@ fn with_section(problem: Problem) -> Problem {
 
 fn has_key<T: DeserializeOwned>(name: &str) -> bool {
     let table = Table::from_iter([(name.to_owned(), Value::from(0))]);
-    // An unknown key is reported before a missing one and a wrong type.
+    // Unknown keys are reported before missing keys and wrong types.
     let error = tables::read::<T>(table).err();
     !error.is_some_and(|error| error.inner().message().starts_with("unknown field"))
 }
 
-/// Parses a camera. Missing values are those of the first key of its path that has one.
+/// Parses a camera. A missing value is taken from the first key of the path that has it.
 fn read_camera(mut camera: Table) -> Read<CameraDescription> {
     if let Some(Value::Table(path)) = camera.get("path") {
-        // First: errors in keys are reported there.
+        // The path is parsed first, so that errors in keys are reported at the keys.
         let path: CameraPathDescription = read(path.clone()).at("path")?;
         let point = |point: DVec3| Value::from(point.to_array().to_vec());
         let first = |of: fn(&CameraKeyDescription) -> Option<DVec3>| path.keys.iter().find_map(of).map(point);
@@ -270,7 +270,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
         return Ok(None); // a whole list, or a name or index that does not exist
     }
     let read = both(found.end(()), read_file(rest)).map(|((), mut all)| {
-        // Kinds are in the parts or the rest.
+        // Each section is either in the parts or in the rest.
         if has(Kind::Textures) {
             all.textures = textures;
         }

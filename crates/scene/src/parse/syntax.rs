@@ -6,7 +6,7 @@ use wgray_image::sanitize::escape_control;
 
 pub const NOT_UTF8: &str = "not valid UTF-8";
 
-/// Returns the message about UTF-16, recognized by its byte order mark.
+/// Returns a message if the bytes are UTF-16, which is recognized by the byte order mark.
 pub fn encoding(bytes: &[u8]) -> Option<String> {
     let name = match bytes {
         [0xff, 0xfe, ..] => "UTF-16 (little-endian)",
@@ -57,7 +57,7 @@ fn line_start(text: &str, at: usize) -> usize {
     text[..at].rfind('\n').map_or(0, |newline| newline + 1)
 }
 
-/// Returns the line, from 1, of a byte offset.
+/// Returns the line of a byte offset, counted from 1.
 pub(super) fn line_number(text: &str, at: usize) -> usize {
     let newlines = text.bytes().take(at).filter(|&byte| byte == b'\n');
     1 + newlines.count()

@@ -1,4 +1,4 @@
-//! Values of tables, with all errors of a table at once.
+//! Parses the values of tables; reports all errors of a table at once.
 
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
@@ -50,8 +50,8 @@ pub(super) fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) ->
     }
 }
 
-/// Parses a table, whose key `type` was removed if it is `tagged`. serde stops at the first error, whose value is
-/// removed to parse again.
+/// Parses a table; if it is `tagged`, its key `type` was removed. serde stops at the first error, so the invalid value
+/// is removed and the table is parsed again.
 fn read_keys<T>(
     mut table: Table,
     tagged: bool,
@@ -88,7 +88,7 @@ fn read_keys<T>(
     }
 }
 
-/// Returns true if a key is missing because of an error at another one, removed or misspelled.
+/// Returns true if a key may be missing because of a different error: its value was removed, or its name is misspelled.
 fn explains(other: &[Segment], missing: &[Segment]) -> bool {
     let table = &missing[..missing.len().saturating_sub(1)];
     other.starts_with(missing) || other.split_last().is_some_and(|(_, others)| others == table)
@@ -119,7 +119,7 @@ pub(super) fn remove(table: &mut Table, path: &[Segment]) -> bool {
     inner.is_some_and(|inner| inner.remove(key).is_some())
 }
 
-/// Maximum keys in a message; no table has more.
+/// Maximum number of keys in a message; no table has more.
 const MAX_KEYS: usize = 64;
 
 /// Formats a value as TOML on one line, truncated if it is long.
@@ -127,7 +127,7 @@ fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
 
-/// Lists the allowed names. serde only does for strings: the value is replaced by one.
+/// Lists the allowed names. serde lists them only if the value is a string, so the value is replaced by a string.
 fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
     if !error.inner().message().ends_with(NAMES_EXPECTED) {
         return error;
@@ -154,12 +154,12 @@ fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<Re
 /// End of serde's message about a value that must name a variant.
 const NAMES_EXPECTED: &str = ", expected string only";
 
-/// Converts serde's error about `table`, whose key `type` was removed if it is `tagged`.
+/// Converts serde's error about `table`; if it is `tagged`, its key `type` was removed.
 fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator) -> Problem {
     let mut path = segments(error.path());
     let value = find(table, &path);
     let message = error.inner().message();
-    // serde has the name and the rule only as text.
+    // serde provides the name and the rule only as text.
     let quoted = |text: &str| {
         text.split('`')
             .skip(1)
@@ -235,7 +235,7 @@ pub fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
     steps.collect()
 }
 
-/// Returns an integer key's rule, without limits that depend on other keys.
+/// Returns the rule for an integer key, without limits that depend on other keys.
 fn whole(key: Option<&Segment>, integrator: Integrator) -> String {
     if key == Some(&Segment::from("blades")) {
         return format!("0 or a whole number from {} to {}", BLADES.0, BLADES.1);

@@ -343,7 +343,8 @@ fn rows(heading: &str) -> Vec<&'static str> {
     names.collect()
 }
 
-/// Checks that the page's rows are the keys allowed at the end of the text, by the error of an unknown key.
+/// Checks that the rows of the page are the keys that are allowed at the end of the text. The allowed keys are taken
+/// from the error message for an unknown key.
 fn check_keys(text: &str, heading: &str) {
     let message = message(&format!("{text}\n'?' = 1"));
     let (_, keys) = message
@@ -394,7 +395,7 @@ fn the_page_has_the_defaults_of_a_render() {
         .filter(|(_, default)| default != "none")
         .map(|(key, default)| format!("{key} = {default}\n"))
         .collect();
-    // Keys of the path integrator have no value in the default description.
+    // In the default description, keys of the path integrator have no value.
     let (text, of_paths) = text.split_at(text.find("rr_depth").unwrap());
     let written: RenderDescription = toml::from_str(text).unwrap();
     assert_eq!(written, RenderDescription::default());
@@ -426,7 +427,7 @@ fn a_key_that_is_not_in_the_page_is_noticed() {
 }
 
 #[test]
-fn a_number_of_samples_stands_for_a_table() {
+fn sample_counts_can_be_numbers_or_tables() {
     let scene = |render: &str| {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\

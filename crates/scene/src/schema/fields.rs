@@ -1,4 +1,4 @@
-//! Editable values of an object of a scene file, with kind, unit, range and default from the schema.
+//! Editable values of an object in a scene file, with the kind, unit, range and default from the schema.
 
 use std::sync::OnceLock;
 
@@ -11,12 +11,12 @@ use super::{SPLIT, definition, of_files};
 use crate::CameraDescription;
 use crate::key_path::{KeyPath, Segment, cut};
 
-/// A value that is shown, and can be edited unless it is fixed.
+/// A value that is displayed, and can be edited unless `fixed` is set.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Field {
     /// Path from the top of the file.
     pub path: String,
-    /// Path from the object.
+    /// Path relative to the object.
     pub name: String,
     /// Kind of the value.
     pub kind: Kind,
@@ -37,20 +37,20 @@ pub struct Field {
     /// Range of invalid values, both ends excluded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<(f64, f64)>,
-    /// True if it must be a square number.
+    /// True if the value must be a square number.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub squares: bool,
-    /// Slider's range around the value, or an emitter color's largest component.
+    /// Range of a slider around the value, or around the largest component of an emitter color.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slider: Option<Slider>,
-    /// The allowed names, truncated if they are many.
+    /// The allowed names, truncated if there are many.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub choices: Vec<String>,
     /// Description of the key.
     pub about: String,
     /// True if the key must not be removed.
     pub required: bool,
-    /// Reason why it cannot be edited.
+    /// The reason if the value cannot be edited.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fixed: Option<String>,
 }
@@ -87,7 +87,7 @@ pub struct Names {
 }
 
 const MAX_CHOICES: usize = 200;
-/// Maximum number of elements of a list of lists or tables that get fields.
+/// In a list of lists or tables, maximum number of elements that get fields.
 const MAX_ELEMENTS: usize = 32;
 
 impl Names {
@@ -121,7 +121,7 @@ impl Names {
     }
 }
 
-/// Returns the fields of an object (`[shapes, 3]`, `[camera]`) with this table; none for other values.
+/// Returns the fields of an object (`[shapes, 3]`, `[camera]`) with this table; no fields for other values.
 pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
     static SCHEMA: OnceLock<Json> = OnceLock::new();
     let whole = SCHEMA.get_or_init(of_files);
@@ -203,7 +203,7 @@ impl FieldList<'_> {
             Some("string") => self.add(Kind::Text, chosen, path, &place),
             _ => {}
         }
-        // A number that can also be any text has no slider.
+        // A number that may also be arbitrary text has no slider.
         let is_free = |branch: &&Json| branch.get("type") == Some(&json!("string")) && branch.get("enum").is_none();
         if branches.len() > 1
             && branches.iter().any(is_free)
@@ -221,7 +221,7 @@ impl FieldList<'_> {
             if of_key.get("const").is_some() {
                 continue; // `type`
             }
-            // A missing table can be created by one key only.
+            // A missing table can only be created if a single key suffices.
             if table.is_none() && required.iter().any(|name| name != key) {
                 continue;
             }
@@ -345,7 +345,7 @@ impl FieldList<'_> {
     }
 }
 
-/// Returns the keys that a table must keep: those that all satisfied alternatives require.
+/// Returns the keys that must not be removed from a table: the keys that all satisfied alternatives require.
 fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
     let keys_of = |schema: &'a Json| -> Vec<&'a str> {
         let list = schema.get("required").and_then(Json::as_array).into_iter().flatten();
@@ -369,7 +369,7 @@ fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
     required
 }
 
-/// Reason why a text cannot be edited: it may name a file.
+/// The reason why text cannot be edited: it may be a file name.
 const FREE_TEXT: &str = "names and files can only be changed in the scene file";
 
 impl Field {
@@ -377,7 +377,7 @@ impl Field {
     ///
     /// # Errors
     ///
-    /// A value of the wrong kind. Ranges are validated with the scene.
+    /// The value has the wrong kind. Ranges are validated together with the scene.
     pub fn value_of(&self, given: &Json, names: &Names) -> Result<Value, String> {
         if let Some(why) = &self.fixed {
             return Err(why.clone());
@@ -422,7 +422,7 @@ fn alternatives<'a>(schema: &'a Json, found: &mut Vec<&'a Json>) {
     }
 }
 
-/// Returns the alternative for a value or its default, else the first.
+/// Returns the alternative that matches the value or its default; otherwise, the first alternative.
 fn choose<'a>(branches: &[&'a Json], place: &FieldContext) -> Option<&'a Json> {
     let named = |branch: &Json, names: &[&str]| {
         let name = branch.get("type").and_then(Json::as_str);
@@ -445,10 +445,10 @@ fn choose<'a>(branches: &[&'a Json], place: &FieldContext) -> Option<&'a Json> {
     branches.iter().find(|branch| named(branch, types)).copied()
 }
 
-/// Start of the words of colors.
+/// Start of the description of a color kind.
 const COLOR: &str = "linear red";
 
-/// Returns the words of a kind, and its range.
+/// Returns the description of a kind, and its range.
 fn kind_of(schema: &Json) -> (&str, &str) {
     let title = schema.get("title").and_then(Json::as_str).unwrap_or_default();
     title.split_once(SPLIT).unwrap_or((title, ""))

@@ -1,4 +1,4 @@
-//! Ranges of numbers from the schema, and of the sliders that edit them.
+//! Ranges of numbers from the schema, and ranges of the sliders that edit the numbers.
 
 use serde::Serialize;
 use serde_json::Value as Json;
@@ -9,11 +9,11 @@ pub struct Slider {
     pub to: f64,
     /// Step of a linear slider.
     pub step: f64,
-    /// True if equal distances are equal factors.
+    /// True if equal distances on the slider correspond to equal factors.
     pub logarithmic: bool,
 }
 
-/// Distance of displayed from excluded ends, relative to the width.
+/// Distance between displayed ends and excluded ends of a range, relative to the width of the range.
 const INSIDE: f64 = 1e-3;
 
 fn ends(schema: &Json) -> Option<(f64, f64)> {
@@ -45,11 +45,11 @@ pub(super) fn gap_of(schema: &Json) -> Option<(f64, f64)> {
     Some(if a.0 < b.0 { (a.1, b.0) } else { (b.1, a.0) })
 }
 
-/// Maximum width of a linear range.
+/// Maximum width of a range for a linear slider.
 const WIDE: f64 = 1000.0;
-/// Minimum ratio of a logarithmic range.
+/// Minimum ratio of the ends of a range for a logarithmic slider.
 const RATIO: f64 = 50.0;
-/// Maximum factor from the value to an end.
+/// Maximum factor between the value and an end of the range.
 const FACTOR: f64 = 100.0;
 
 pub(super) fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Option<f64>) -> Option<Slider> {

@@ -8,7 +8,7 @@ use crate::limits::{APERTURES, BLADES, F_NUMBERS, FOVS, FRAMES, LENGTHS, TURNS};
 use crate::problem::{At, Collector, Problem, Problems, both};
 use crate::{Camera, CameraDescription, CameraKeyDescription, Lens, PerspectiveDescription, Projection};
 
-/// Minimum distance of keys in frames, which keeps slopes finite.
+/// Minimum distance between keys in frames; keeps slopes finite.
 const CLOSEST: f64 = 1e-6;
 /// Up vector of a vertical view along the default `up`.
 const VERTICAL_UP: DVec3 = DVec3::Y;
@@ -23,13 +23,14 @@ impl CameraDescription {
         camera(self, VERTICAL_UP).map_err(|problems| problems.first)
     }
 
-    /// Validates the camera at a frame of its path. A view along `up` is an error: another `up` would be a jump.
+    /// Validates the camera at a frame of its path. A view along `up` is an error, because replacing `up` at this frame
+    /// would make the image jump.
     pub(crate) fn validate_frame(&self) -> Result<Camera, Problem> {
         camera(self, DVec3::Z).map_err(|problems| problems.first)
     }
 }
 
-/// Returns the camera. `vertical_up` replaces the default `up`, +z, of a view along it.
+/// Returns the camera. `vertical_up` replaces the default `up`, +z, if the view is along +z.
 fn camera(description: &CameraDescription, vertical_up: DVec3) -> Result<Camera, Problems> {
     let (position, look_at, up) = match description {
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, camera.up),
@@ -127,7 +128,7 @@ pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Opti
         found.value(key(each, description, before).at(i));
         before = Some(each.frame);
     }
-    // First, because the camera may use their values.
+    // Errors in keys are returned first, because the camera may use the values of keys.
     found.end(()).at("keys").at("path")?;
     let still = camera(description, VERTICAL_UP)?;
     let moving = CameraPath::of(description);
@@ -139,7 +140,7 @@ pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Opti
     Ok((still, moving))
 }
 
-/// Validates a key, whose frame must exceed the previous one's.
+/// Validates a key; its frame must be greater than the frame of the previous key.
 fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f64>) -> Checked<()> {
     let CameraKeyDescription {
         frame,
@@ -199,7 +200,7 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
     )
 }
 
-/// Joins names, with a word before the last: "a", "b" or "c".
+/// Joins names, with `word` before the last name: "a", "b" or "c".
 fn all_of(names: &[&str], word: &str) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
     match quoted.split_last() {
@@ -227,7 +228,7 @@ mod tests {
     const STILL: &str = "[camera]\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nfov = 40\n";
 
     #[test]
-    fn each_value_goes_through_the_keys_that_have_it() {
+    fn each_value_is_interpolated_between_the_keys_that_have_it() {
         let scene = scene(&format!(
             "{STILL}[camera.path]\nkeys = [{{ frame = 1, position = [2, -4, 0] }}, {{ frame = 2, fov = 20 }}, \
              {{ frame = 5, position = [4, -8, 4], fov = 50 }}, {{ frame = 6, up = [1, 0, 0] }}]"
@@ -278,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_frame_the_camera_is_that_of_the_first_keys() {
+    fn without_a_frame_the_first_keys_provide_missing_values() {
         let path = "[camera.path]\ninterpolation = 'smooth'\nkeys = [{ frame = 3, look_at = [1, 0, 0] }, \
                     { frame = 4, position = [0, -4, 2], fov = 30, look_at = [2, 0, 0] }]\n";
         let standalone_prim = scene(path).unwrap();
@@ -321,7 +322,7 @@ mod tests {
             let message = at(Some(frame)).unwrap_err().to_string();
             assert_eq!(message, format!("frame: {frame} must be finite"));
         }
-        // A camera built in code has no line.
+        // A camera that was created in code has no line.
         let keys = [[0.0, -4.0, 0.0], [0.0, 4.0, 0.0]].map(|position| CameraKeyDescription {
             position: Some(position.into()),
             ..CameraKeyDescription::new(position[1])
@@ -339,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_keys_are_told_with_place_and_rule() {
+    fn invalid_keys_are_reported_with_location_and_rule() {
         let start = "[camera.path]\nkeys = [\n{ frame = 1, position = [0, -4, 0] },\n";
         for (path, expected) in [
             (

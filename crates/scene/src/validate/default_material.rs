@@ -7,11 +7,12 @@ use super::principled::dielectric;
 
 /// Albedo.
 const GRAY: f64 = 0.8;
-/// Phong exponent, without effect as the specular factor is black, and roughness under `path`.
+/// Phong exponent. It has no effect with `phong`, because the specular factor is black; with `path` it determines the
+/// roughness.
 const SHININESS: f64 = 16.0;
 const ROUGHNESS: f64 = 0.5;
 
-/// For meshes without and with vertex colors, which `phong` ignores.
+/// Returns the default materials of meshes without and with vertex colors; `phong` ignores the colors.
 pub(super) fn default_materials(integrator: Integrator) -> [Material; 2] {
     [false, true].map(|has_colors| Material {
         reflection: match integrator.follows_paths() {

@@ -17,7 +17,7 @@ use super::{At, Checked, Description, Environment, Integrator, Problem, between,
 const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
 
-/// From its section or the background, if it emits or is visible.
+/// Returns the environment of its section or of the background, if it emits light or is visible.
 pub(super) fn environment(
     description: &Description,
     integrator: Integrator,
@@ -95,7 +95,7 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
     }
 }
 
-/// The keys apply to nothing else.
+/// Returns the parameters of the sky; its keys are errors for other environments.
 fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     let is_sky = description.name == Some(EnvironmentName::Sky);
     let value = |key: &str, value: Option<f64>, default: f64, limits: (f64, f64)| {

@@ -1,4 +1,4 @@
-//! Images of textures and of the environment, each read once, within a limit on the memory of all texels.
+//! Images of textures and of the environment, each read once, with a limit on the total memory of the texels.
 
 use std::sync::Arc;
 
@@ -8,18 +8,18 @@ use crate::image_file::{AssetKey, File, Part};
 use crate::texture::{levels, words, words_around};
 use crate::{Assets, Image, ImageTextureDescription, Texels};
 
-/// Memory limit of all texels in their render format, in bytes.
+/// Limit on the total memory of all texels in their render format, in bytes.
 pub(crate) const TEXEL_MEMORY: u64 = 1 << 30;
 
 pub(super) struct Images<'a> {
     pub(super) assets: &'a Assets,
-    /// False if the scene is invalid: 1 x 1 images replace files.
+    /// False if the scene is invalid; images of 1 x 1 texels then replace the files.
     pub(super) reads_files: bool,
     /// Images by location, each with its size in 32-bit words.
     files: BTreeMap<AssetKey, Vec<(File, u64)>>,
-    /// Size of all images in bytes.
+    /// Total size of all images in bytes.
     taken: u64,
-    /// About damaged files, without duplicates.
+    /// Warnings about damaged files, without duplicates.
     pub(super) notes: Vec<String>,
 }
 
@@ -52,14 +52,14 @@ impl<'a> Images<'a> {
         })
     }
 
-    /// Returns the environment map, separate from a texture of the same file.
+    /// Returns the environment map, which is stored separately from a texture with the same file.
     pub(super) fn around(&mut self, file: &str) -> Checked<Arc<Image>> {
         let others = self.taken;
         let image = self.with_words(file, Part::Colors(None), |header| {
             words_around(header.width, header.height)
         })?;
         let words = words_around(image.width, image.height);
-        // The file was counted as that of a texture.
+        // The size of the file was counted as the size of a texture.
         if self.taken - others < 4 * words {
             let bytes = others + 4 * words;
             if bytes > TEXEL_MEMORY {
@@ -79,7 +79,7 @@ impl<'a> Images<'a> {
         Ok(())
     }
 
-    /// Returns an image. `wanted` is its size in 32-bit words.
+    /// Returns an image. `wanted` returns the size of the image in 32-bit words.
     fn with_words(&mut self, file: &str, part: Part, wanted: impl Fn(Header) -> u64) -> Checked<Arc<Image>> {
         let place = self.assets.find(file)?;
         if !self.reads_files {

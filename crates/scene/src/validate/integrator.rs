@@ -1,17 +1,18 @@
-//! The integrator of a scene that names none: `path` if the scene uses a key that needs it, else `phong`.
+//! The integrator of a scene that does not specify one: `path` if the scene uses a key that needs it, otherwise
+//! `phong`.
 
 use super::super::key_path::{KeyPath, Segment};
 use super::super::{Description, Integrator, MaterialDescription, ShapeDescription};
 
 impl Description {
-    /// Returns the integrator of `[render]`, else [`Integrator::Path`] if any key needs it.
+    /// Returns the integrator of `[render]`. If it is not specified, returns [`Integrator::Path`] if any key needs it.
     pub fn integrator(&self) -> Integrator {
         let needed = || needs_path(self).map_or(Integrator::Phong, |_| Integrator::Path);
         self.render.integrator.unwrap_or_else(needed)
     }
 }
 
-/// Returns the note that the path tracer was chosen, and why.
+/// Returns a note if the path tracer was chosen because of a key.
 pub(crate) fn note(description: &Description) -> Option<String> {
     if description.render.integrator.is_some() {
         return None;
@@ -86,7 +87,7 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
         assert_eq!((scene.render.integrator, scene.notes), (Integrator::Phong, vec![]));
     }
 
-    /// The integrator changes what other settings may be.
+    /// The integrator determines the valid values of other settings.
     #[test]
     fn the_settings_are_those_of_the_chosen_integrator() {
         let scene = load(
@@ -128,7 +129,7 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
                 .message
                 .starts_with("render.integrator is not set; using \"path\", which materials.red.emission requires")
         );
-        // A named one is kept, without a note.
+        // A specified integrator is kept, and there is no note.
         let named = load("environment.color = [1, 1, 1]\n", &define("render.integrator=path"));
         assert!(
             !named.notes.iter().any(|note| note.message.contains("integrator: ")),
@@ -138,7 +139,7 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
     }
 
     #[test]
-    fn a_description_keeps_that_no_integrator_is_named() {
+    fn an_unspecified_integrator_stays_unspecified() {
         let text = format!("{SCENE}environment.color = [1, 1, 1]\n");
         let description = crate::Description::parse(&text, "s.toml").unwrap();
         assert_eq!(

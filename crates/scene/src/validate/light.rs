@@ -45,7 +45,7 @@ fn spot(light: &SpotLightDescription) -> Checked<Light> {
     })
 }
 
-/// From `direction` or `look_at`.
+/// Returns the direction of a spot light, from `direction` or `look_at`.
 fn direction(light: &SpotLightDescription, position: DVec3) -> Checked<DVec3> {
     match (light.direction, light.look_at) {
         (Some(direction), None) => unit(direction).at("direction"),

@@ -18,7 +18,7 @@ impl Textures<'_> {
         };
         needs_path(self.integrator)?;
         let color = self.color(emission)?;
-        // The factor alone would make all of the surface an emitter.
+        // If the texture were ignored, the factor would make the whole surface an emitter.
         let is_replaced = matches!(color, Color::Texture(texture) if self.replaced.contains(&texture));
         Ok(if is_replaced { Color::BLACK } else { color })
     }

@@ -28,7 +28,7 @@ pub(super) struct SceneLookup<'a> {
     pub names: &'a BTreeMap<&'a str, usize>,
     pub looks: SceneMaterials<'a>,
     pub assets: &'a Assets,
-    /// False if the scene is invalid: meshes are not needed.
+    /// False if the scene is invalid; meshes are then not needed.
     pub reads_files: bool,
     pub suggestions: Suggestions,
 }
@@ -41,7 +41,7 @@ impl SceneLookup<'_> {
 }
 
 pub(super) struct NamedMesh<'a> {
-    /// `None` if it is invalid, or not needed.
+    /// The mesh; `None` if it is invalid or not needed.
     mesh: Option<Arc<Mesh>>,
     description: &'a MeshFileDescription,
 }
@@ -106,7 +106,7 @@ pub(super) fn instance(
     placed(mesh.clone(), file.up, &file.file, &placement, known)
 }
 
-/// Checks that the words of groups have 32-bit indices.
+/// Checks that 32-bit indices suffice for the data of groups.
 pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
     let groups = shapes.iter().map(|shape| match &shape.geometry {
         Geometry::Mesh { materials, .. } => materials.len(),
@@ -114,7 +114,7 @@ pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
     });
     let groups: usize = groups.sum();
     check(groups <= MAX_GROUPS, || {
-        format!("the meshes have {groups} groups together; they must be at most {MAX_GROUPS}")
+        format!("the meshes have {groups} groups in total; at most {MAX_GROUPS} are allowed")
     })
 }
 
@@ -142,7 +142,7 @@ pub(super) fn notes(
     notes.into_iter().collect()
 }
 
-/// Returns a mesh, or `None` if no files are read.
+/// Returns a mesh; `None` if files are not read.
 fn load(file: &str, normals: Option<Normals>, known: &mut SceneLookup) -> Checked<Option<Arc<Mesh>>> {
     if let Some(mesh) = known.assets.meshes.get(file) {
         return match mesh.broken_rule() {
@@ -167,7 +167,7 @@ fn load(file: &str, normals: Option<Normals>, known: &mut SceneLookup) -> Checke
     Ok(Some(mesh))
 }
 
-/// Returns a placed mesh; without one, validates the placement.
+/// Returns the mesh with its placement. If there is no mesh, only validates the placement.
 fn placed(
     mesh: Option<Arc<Mesh>>,
     up: Up,
@@ -217,7 +217,7 @@ fn placed(
     }))
 }
 
-/// Returns the material index of each group: from the scene, else from the mesh's file.
+/// Returns the material index of each group: from the scene, or else from the mesh's file.
 fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut SceneLookup) -> Checked<Vec<usize>> {
     let named = |name: &String| -> Checked<usize> {
         let index = known.material(name)?;
@@ -282,14 +282,14 @@ fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String
                     let name = library.file.file_name().unwrap_or_default().to_string_lossy();
                     format!("its MTL file {:?} cannot be read: {problem}", cut(&name))
                 }
-                None => "its MTL files do not have it".to_owned(),
+                None => "not defined in its MTL files".to_owned(),
             }
         }
     };
     format!("{file}: no material {names}: {why}")
 }
 
-/// Returns a group's own name, and that of its material in the file.
+/// Returns the names of a group: its own name, and the name of its material in the file.
 fn names(group: &Group) -> impl Iterator<Item = &str> {
     std::iter::once(group.name.as_str()).chain(group.material.as_deref())
 }

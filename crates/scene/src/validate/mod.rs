@@ -46,7 +46,7 @@ pub(crate) use self::integrator::note as integrator_note;
 pub(super) use self::mesh::{placement, turned_up};
 pub(super) use self::path::LIGHT_SAMPLES;
 
-/// Default of the first bounce with Russian roulette.
+/// Default for the first bounce with Russian roulette.
 const RR_DEPTH: u32 = 5;
 /// Sine of the minimum angle between directions; minimum height of a triangle or tetrahedron relative to its longest
 /// edge.
@@ -55,7 +55,7 @@ const FLATTEST: f64 = 1e-6;
 type Checked<T> = Result<T, Problem>;
 
 impl Description {
-    /// Validates the sections without file names.
+    /// Validates the sections that contain no file names.
     pub(crate) fn settings(&self, integrator: Integrator) -> Result<Settings, Problems> {
         let image = both(
             image(&self.image).at("image"),
@@ -75,8 +75,8 @@ impl Description {
         })
     }
 
-    /// Validates a description without glTF files. With invalid settings, no files are read, but all other values
-    /// validated.
+    /// Validates a description without glTF files. If the settings are invalid, no files are read, but all other values
+    /// are still validated.
     pub(crate) fn validate_plain(
         &self,
         settings: Result<Settings, Problems>,
@@ -84,7 +84,7 @@ impl Description {
         assets: &Assets,
         files: &mut BTreeSet<PathBuf>,
     ) -> Result<Scene, Problems> {
-        // The map is sorted: materials have their names' indices.
+        // The map is sorted, so the index of a material is the index of its name.
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
         let reads_files = settings.is_ok();
@@ -349,7 +349,7 @@ fn clamp(most: f64) -> Checked<f64> {
     between(most, CLAMPS)
 }
 
-/// Validates the value of an optional key of the path integrator.
+/// Validates an optional key that only the path integrator supports.
 fn of_path<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<T>) -> Checked<Option<T>> {
     let Some(value) = value else { return Ok(None) };
     path::needs_path(integrator)?;

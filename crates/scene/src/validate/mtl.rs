@@ -1,4 +1,4 @@
-//! Materials of the MTL files of meshes, for groups to which the scene assigns none.
+//! Materials of the MTL files of meshes, for groups to which the scene does not assign a material.
 
 mod principled;
 
@@ -18,37 +18,37 @@ use super::texture::image_texture;
 use super::{Checked, Problem, number, show};
 use crate::mesh::{Mesh, MtlMaterial, file_beside};
 
-/// Default values: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995; the exponent of a scene's own
-/// materials.
+/// Default values: `Kd` from Ramey, Rose and Tyerman, "MTL material format", 1995; the exponent is the default for
+/// materials of scene files.
 const DIFFUSE: f64 = 0.8;
 const NS: f64 = 16.0;
 
-/// Maximum length, in characters, of the reason why a map is not used.
+/// Maximum length in characters of the reason why a map is not used.
 const MAX_MAP_MESSAGE: usize = 300;
 
-/// The scene's own materials, then those of meshes.
+/// The scene's own materials, then the materials of meshes.
 pub(super) struct SceneMaterials<'a> {
     pub names: Vec<String>,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
     pub files: &'a mut BTreeSet<PathBuf>,
     images: Images<'a>,
-    /// The folder that paths in messages are relative to, without symbolic links.
+    /// The folder to which paths in messages are relative, without symbolic links.
     folder: PathBuf,
-    /// The materials of each mesh, by its address.
+    /// The materials of each mesh, by the address of the mesh.
     meshes: HashMap<usize, GroupMaterials>,
     integrator: Integrator,
-    /// The materials by their file, line and attributes.
+    /// The indices of materials, by file, line and traits.
     known: HashMap<(PathBuf, usize, Traits), usize>,
     /// The textures of maps.
     maps: BTreeMap<(AssetKey, Part), usize>,
-    /// The first warning about each keyword of a file, and the number of its materials.
+    /// For each keyword of a file, the first warning, and the number of materials with such a warning.
     warnings: BTreeMap<(PathBuf, String), (String, usize)>,
-    /// The default material for meshes without and with colors, and its index once used.
+    /// The default material for meshes without and with colors, and the index of this material once it is used.
     defaults: [(Material, Option<usize>); 2],
-    /// Notes about materials that mesh files name and no file describes.
+    /// Notes about materials that mesh files refer to, but no file defines.
     pub unmatched: BTreeSet<String>,
-    /// The first damaged image, if damage is refused.
+    /// The first damaged image, if damage is an error.
     damage: Option<Problem>,
 }
 
@@ -60,9 +60,9 @@ struct Traits {
 }
 
 struct GroupMaterials {
-    /// For each group the file and material in it, if any.
+    /// For each group, the index of the MTL file and of the material in this file, if any.
     places: Vec<Option<(usize, usize)>>,
-    /// For each group the scene's material, once requested.
+    /// For each group, the index of the material in the scene, once requested.
     materials: Vec<Option<usize>>,
 }
 
@@ -103,7 +103,7 @@ impl<'a> SceneMaterials<'a> {
         })
     }
 
-    /// Registers a mesh and the files that it names, whether or not they are used.
+    /// Registers a mesh and the files that it refers to, whether or not these files are used.
     pub fn know(&mut self, mesh: &Arc<Mesh>) {
         let address = Arc::as_ptr(mesh).addr();
         if self.meshes.contains_key(&address) {
@@ -121,7 +121,7 @@ impl<'a> SceneMaterials<'a> {
         }
     }
 
-    /// Returns the material that a mesh's file gives to a group.
+    /// Returns the material that the mesh's file assigns to a group.
     pub fn of_group(&mut self, mesh: &Arc<Mesh>, group: usize) -> Option<usize> {
         let address = Arc::as_ptr(mesh).addr();
         let described = self.meshes.get(&address)?;
@@ -155,7 +155,8 @@ impl<'a> SceneMaterials<'a> {
         Some(material)
     }
 
-    /// Warns of a group without a material, or returns an error ([`Assets::tolerate`](super::super::Assets::tolerate)).
+    /// Warns about a group without a material, or returns an error
+    /// ([`Assets::tolerate`](super::super::Assets::tolerate)).
     pub fn without_material(&mut self, damage: Problem) -> Checked<()> {
         let note = self.images.assets.tolerate(damage, "a gray material is used instead")?;
         self.unmatched.insert(note);
@@ -171,7 +172,7 @@ impl<'a> SceneMaterials<'a> {
         self.images.notes.into_iter().chain(self.unmatched).chain(warnings)
     }
 
-    /// Returns a Phong material. Exporters write anything as `Ka`: ambient light uses `Kd`.
+    /// Returns a Phong material. Ambient light uses `Kd`, because exporters write arbitrary values for `Ka`.
     fn phong(&mut self, own: &MtlMaterial, file: &Path, has_uvs: bool) -> Material {
         let mut warnings = Warnings::default();
         let mut color = |name: &'static str, color: Option<[f64; 3]>, default: f64| {
@@ -188,7 +189,7 @@ impl<'a> SceneMaterials<'a> {
             inside
         };
         let diffuse = color("Kd", own.diffuse, DIFFUSE);
-        // Models 0 and 1 have no highlights.
+        // The illumination models 0 and 1 have no highlights.
         let specular = match own.illumination {
             Some(0 | 1) => DVec3::ZERO,
             _ => color("Ks", own.specular, 0.0),
@@ -240,7 +241,7 @@ impl<'a> SceneMaterials<'a> {
         self.damage.take()
     }
 
-    /// Records warnings about a material, and damage if it is refused.
+    /// Records warnings about a material; also records damage if damage is an error.
     fn warn(&mut self, own: &MtlMaterial, file: &Path, warnings: Warnings) {
         let is_strict = self.images.assets.strict;
         for Warning {
@@ -294,7 +295,7 @@ struct Warning {
     message: String,
     /// The stand-in for a map that cannot be used.
     stand_in: Option<&'static str>,
-    /// True for a damaged or missing file, which can be refused.
+    /// True for a damaged or missing file, which is an error in strict mode.
     is_damage: bool,
 }
 
@@ -360,7 +361,7 @@ impl GroupMaterials {
     }
 }
 
-/// Returns the path of a file that an MTL file names.
+/// Returns the path of a file that an MTL file refers to.
 fn beside(library: &Path, name: &str) -> PathBuf {
     file_beside(library.parent().unwrap_or(Path::new("")), name)
 }

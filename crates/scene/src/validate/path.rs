@@ -8,7 +8,7 @@ use super::{Checked, Color, DVec3, Material, Texture, check, cut, number};
 
 /// Maximum number of materials in a warning.
 const MAX_NAMES: usize = 8;
-/// Tolerance of a sum of two fractions, for rounding.
+/// Tolerance for rounding errors in a sum of two fractions.
 const ROUNDING: f64 = 1e-9;
 
 pub(crate) const LIGHT_SAMPLES: &str =
@@ -69,7 +69,7 @@ fn too_bright(names: &[String], materials: &[Material], textures: &[Texture]) ->
     let bright: Vec<(&String, f64)> = (names.iter().zip(materials))
         .filter_map(|(name, material)| Some((name, share(material)?)))
         .collect();
-    // Hundredths, because sums such as 0.7 + 0.4 have many digits.
+    // Rounded to hundredths, because sums such as 0.7 + 0.4 have many digits.
     let shown = bright.iter().map(|(name, share)| {
         let share = number(((share - ROUNDING) * 100.0).ceil() / 100.0);
         format!("{:?} ({share})", cut(name))
@@ -87,7 +87,7 @@ fn unused_alpha(names: &[String], materials: &[Material]) -> Option<String> {
     let rule = "has no effect without alpha_mode = \"mask\" or \"blend\"";
     Some(format!(
         "materials: alpha {rule}: {}",
-        that(names, materials, is_unused)?
+        matching_names(names, materials, is_unused)?
     ))
 }
 
@@ -98,19 +98,20 @@ fn unused_cutoff(names: &[String], materials: &[Material]) -> Option<String> {
     let rule = "has no effect without alpha_mode = \"mask\"";
     Some(format!(
         "materials: alpha_cutoff {rule}: {}",
-        that(names, materials, is_unused)?
+        matching_names(names, materials, is_unused)?
     ))
 }
 
-fn that(names: &[String], materials: &[Material], is_true: impl Fn(&Principled) -> bool) -> Option<String> {
+/// Returns the names of the `principled` materials that satisfy `predicate`.
+fn matching_names(names: &[String], materials: &[Material], predicate: impl Fn(&Principled) -> bool) -> Option<String> {
     let found = (names.iter().zip(materials)).filter(|(_, material)| match &material.reflection {
-        Reflection::Principled(principled) => is_true(principled),
+        Reflection::Principled(principled) => predicate(principled),
         _ => false,
     });
     several(found.map(|(name, _)| format!("{:?}", cut(name))))
 }
 
-/// Joins names as `a, b and c`, truncated; `None` if empty.
+/// Joins names as `a, b and c`, truncated if there are many; `None` if there are no names.
 fn several(mut all: impl Iterator<Item = String>) -> Option<String> {
     let mut shown: Vec<String> = all.by_ref().take(MAX_NAMES).collect();
     match all.count() {

@@ -48,7 +48,7 @@ impl Textures<'_> {
     }
 }
 
-/// Other values are defaults.
+/// Returns a dielectric; all other values are defaults.
 pub(super) fn dielectric(base_color: Color, roughness: f64) -> Principled {
     Principled {
         base_color,
@@ -76,7 +76,7 @@ pub(super) fn dielectric(base_color: Color, roughness: f64) -> Principled {
     }
 }
 
-/// Returns the coefficient per unit of length for a transmittance of `color` over a distance.
+/// Returns the absorption coefficient per unit of length that gives the transmittance `color` over a distance.
 fn absorption(color: DVec3, distance: Option<f64>) -> Checked<DVec3> {
     for x in color.to_array() {
         between(x, SHARES).at("attenuation_color")?;

@@ -5,7 +5,7 @@ use super::super::{CylinderDescription, EllipsoidDescription, Geometry, Parallel
 use super::mesh::{self, SceneLookup, placement};
 use super::{Checked, DVec3, FLATTEST, LENGTHS, check, length, number, path, point, show, show_all, unit};
 
-/// Returns a shape; `None` if it has a file that is not read.
+/// Returns a shape; `None` if the shape needs a file that is not read.
 pub(super) fn shape(description: &ShapeDescription, known: &mut SceneLookup) -> Checked<Option<Shape>> {
     let (geometry, name) = match description {
         ShapeDescription::Rectangle(shape) => {
@@ -34,7 +34,7 @@ pub(super) fn shape(description: &ShapeDescription, known: &mut SceneLookup) -> 
         ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Mesh(shape) => return mesh::mesh(shape, known),
-        // Expanded, unless there are problems.
+        // Already expanded, unless there are problems.
         ShapeDescription::Gltf(shape) => {
             placement(shape.translate, shape.rotate, shape.scale, shape.matrix.as_ref())?;
             return known.assets.find(&shape.file).at("file").map(|_| None);
@@ -147,14 +147,14 @@ fn tetrahedron(vertices: [DVec3; 4]) -> Checked<Geometry> {
         format!("{} must not lie in one plane", show_all(&vertices))
     })?;
     if volume < 0.0 {
-        // Without the swap, normals would point inwards.
+        // If the vertices were not swapped, normals would point inwards.
         (v1, v2) = (v2, v1);
     }
     let faces = vec![[v0, v2, v1], [v0, v1, v3], [v1, v2, v3], [v0, v3, v2]];
     Ok(Geometry::Triangles(faces))
 }
 
-/// Checks each vertex, then that they differ.
+/// Checks each vertex, then checks that the vertices differ. Returns the length of the longest edge.
 fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
     for (i, &vertex) in vertices.iter().enumerate() {
         point(vertex).at(i)?;
@@ -167,13 +167,13 @@ fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
     Ok(longest)
 }
 
-/// Returns the unit vectors of u and v: the tangent, made orthogonal to the normal, and normal x tangent. Without a
-/// tangent u is along x, or along y if the normal is nearly along x.
+/// Returns the unit vectors of u and v: the tangent, made orthogonal to the normal, and normal x tangent. If there is
+/// no tangent, u is along x, or along y if the normal is nearly along x.
 fn frame(normal: DVec3, tangent: Option<DVec3>) -> Checked<(DVec3, DVec3)> {
     across(unit(normal).at("normal")?, normal, tangent, "the normal")
 }
 
-/// Like [`frame`], for a unit normal `n`, in messages `name` and `given`.
+/// Like [`frame`], for a unit normal `n`, which messages show as `name` and `given`.
 fn across(n: DVec3, given: DVec3, tangent: Option<DVec3>, name: &str) -> Checked<(DVec3, DVec3)> {
     let tangent = tangent.unwrap_or(if n.x.abs() < 0.9 { DVec3::X } else { DVec3::Y });
     let t = unit(tangent).at("tangent")?;

@@ -1,4 +1,4 @@
-//! Tests of a valid scene, and of the errors of all invalid values.
+//! Tests of a valid scene, and of the errors for all invalid values.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,7 +7,7 @@ use super::super::{Camera, Material, Projection, Reflection, SceneError};
 use super::*;
 use crate::{Geometry, Parallelogram};
 
-/// All features. Each line is unique, so that tests can replace it.
+/// A scene with all features. Each line is unique, so that tests can replace it.
 const GOOD: &str = r#"
 [image]
 width = 8
@@ -367,7 +367,7 @@ const BAD: &[(&str, &str, &str)] = &[
 ];
 
 #[test]
-fn bad_values_are_told_with_line_key_value_and_rule() {
+fn invalid_values_are_reported_with_line_key_value_and_rule() {
     for &(line, bad, rule) in BAD {
         let text = with(line, bad);
         let place = text[..text.find(bad).unwrap()].lines().count() + 1;
@@ -456,7 +456,7 @@ fn the_page_has_the_limits() {
 }
 
 #[test]
-fn a_disk_has_the_radii_that_lengths_have() {
+fn disks_accept_the_radii_of_the_range_of_lengths() {
     let scene = |radius: &str, normal: &str| {
         let text = format!(
             "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\
@@ -480,7 +480,7 @@ fn a_disk_has_the_radii_that_lengths_have() {
 }
 
 #[test]
-fn a_cylinder_has_the_radii_and_heights_that_lengths_have() {
+fn cylinders_accept_radii_and_heights_of_the_range_of_lengths() {
     let scene = |start: f64, end: f64, rest: &str| {
         let [start, end] = [start, end].map(|x| format!("{x:?}").to_lowercase());
         let text = format!(
@@ -712,7 +712,7 @@ material = 'm'
             error.to_string().lines().count()
         }
     };
-    // The image is missing, or its description is invalid; materials and shapes are valid.
+    // The image is missing, or the description of the image is invalid; materials and shapes are valid.
     let texture = |more: &str| format!("[textures.t]\n{image}{more}\n{uses}");
     assert_eq!(count(&texture("")), 0, "a warning");
     assert_eq!(count(&texture("max_anisotropy = 99")), 1);
@@ -801,7 +801,7 @@ radius = 1
             "s.toml:12: shapes[0].material: 7 must be a string",
         ]
     );
-    // Also with an unknown section.
+    // Also if there is an unknown section.
     let found = errors(&format!("{SMALL}{text}[shape]\n[environment]\nrotate = 'x'\n"));
     assert_eq!(found.len(), 9, "{found:#?}");
     assert_eq!(found[7], "s.toml:14: shape: unknown key; did you mean \"shapes\"?");
@@ -818,7 +818,7 @@ radius = 1
 }
 
 #[test]
-fn of_many_errors_the_first_are_reported() {
+fn only_the_first_of_many_errors_are_reported() {
     let shape = "[[shapes]]\ntype = 'sphere'\nmaterial = 'none'\ncenter = [0, 0, 0]\nradius = 1\n";
     for (count, last) in [
         (20, None),

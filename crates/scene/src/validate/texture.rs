@@ -15,7 +15,8 @@ use crate::{
     ValueDescription,
 };
 
-/// Returns the textures, and the indices of constant ones: a damaged image's factor, or any color if invalid or unread.
+/// Returns the textures, and the indices of textures that were replaced by a constant: the factor of a damaged image,
+/// or an arbitrary color if the image is invalid or was not read.
 pub(super) fn textures(
     descriptions: &BTreeMap<String, TextureDescription>,
     images: &mut Images,
@@ -132,14 +133,14 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
     ])
 }
 
-/// Textures, by which the references of materials are resolved.
+/// The textures to which references of materials are resolved.
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],
-    /// Alpha textures, which follow the others, or errors, by name.
+    /// By name, the index of the alpha texture, which follows the other textures, or the error.
     pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
     pub(super) replaced: BTreeSet<usize>,
-    /// Determines the valid materials.
+    /// The integrator, which determines the valid materials.
     pub(super) integrator: Integrator,
     pub(super) suggestions: Suggestions,
 }
@@ -182,7 +183,7 @@ impl Textures<'_> {
 
     fn find_name(&self, name: &str) -> Checked<usize> {
         let unknown = || Problem::new(self.suggestions.unknown("texture", name, self.names.iter().copied()));
-        // Keys of a map are sorted.
+        // The names are sorted, because they are the keys of a map.
         self.names.binary_search(&name).map_err(|_| unknown())
     }
 
@@ -193,7 +194,7 @@ impl Textures<'_> {
         })
     }
 
-    /// Validates a factor that must conserve energy.
+    /// Validates a color factor that must conserve energy.
     pub(super) fn tint(&self, description: &ColorDescription) -> Checked<Color> {
         if let ColorDescription::Plain(tint) = description {
             for x in tint.to_array() {
@@ -284,7 +285,7 @@ impl Textures<'_> {
     }
 }
 
-/// For products from 0 to 1.
+/// Checks the factor of an image whose products must be from 0 to 1.
 fn bounded_factor(factor: f64) -> Checked<()> {
     check(factor <= 1.0, || {
         format!("the texture's factor of {} must be from 0 to 1 here", number(factor))

@@ -49,7 +49,7 @@ fn any_source_of_light_suffices() {
     }
     let unused = "[materials.lit]\ntype = 'diffuse'\ncolor = [0, 0, 0]\nemission = [1, 1, 1]\n";
     assert_eq!(warnings(&format!("{dark}{unused}")), [NO_LIGHT]);
-    // The Phong integrator has an ambient term instead of emission.
+    // The Phong integrator supports an ambient term instead of emission.
     let phong = |ambient: &str, own: &str| {
         format!(
             "{CAMERA}[render]\nambient = {ambient}\n[materials.gray]\ntype = 'phong'\ncolor = [1, 1, 1]\nambient = {own}\n{sphere}"
@@ -62,8 +62,8 @@ fn any_source_of_light_suffices() {
 
 #[test]
 fn spheres_just_outside_of_the_view_are_reported_and_those_at_its_edge_are_not() {
-    // At depth 10 the view is 40 x 20 without the filter's margin; a sphere at a slanted side is at most sqrt(3) away
-    // in the box test.
+    // At depth 10, the view is 40 x 20, not including the filter's margin; a sphere at a slanted side is at most
+    // sqrt(3) away in the box test.
     let seen = [
         [0.0, 0.0, 0.0],
         [19.0, 0.0, 0.0],
@@ -87,7 +87,7 @@ fn spheres_just_outside_of_the_view_are_reported_and_those_at_its_edge_are_not()
     for center in unseen {
         assert_eq!(warnings(&scene(center)), [NOT_IN_VIEW], "{center:?}");
     }
-    // A shape in view suffices. A panorama sees all directions.
+    // A single shape in view suffices. A panorama sees all directions.
     let two = format!("{}{}", scene(unseen[0]), sphere(seen[0]));
     assert_eq!(warnings(&two), [""; 0]);
     let panorama = scene(unseen[4]).replace("fov = 90", "type = 'panorama'");

@@ -1,4 +1,4 @@
-//! OpenEXR decoding: all channels of all parts, each in its own type, at the highest resolution level.
+//! OpenEXR decoding: all channels of all parts at the highest resolution level. Each channel keeps its value type.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -60,7 +60,7 @@ pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture,
         planes.push(part);
     }
     let chunks = reader.filter_chunks(false, |_, _, block| (block.level.x(), block.level.y()) == (0, 0))?;
-    // A file may contain one block twice and lack another one.
+    // A file may contain a block twice and omit another block.
     let (mut seen, mut area) = (BTreeSet::new(), 0);
     chunks.decompress_parallel(false, |_, block| {
         let damaged = || Error::Invalid("block".into());
@@ -128,7 +128,7 @@ fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
 }
 
 fn empty(columns: u32, rows: u32, samples: SampleType) -> Result<Plane, Unreadable> {
-    /// Allocates zeros, which are mapped on first use: a header may claim any size.
+    /// Allocates zeros. Memory is mapped on first use, because a header may claim any size.
     fn zeros<T: Clone + Default>(width: u64, height: u64) -> Result<Vec<T>, Unreadable> {
         let count = width * height;
         drop(room::<T>(width, height, count)?);

@@ -46,7 +46,7 @@ pub struct Channel {
     pub plane: Arc<Plane>,
 }
 
-/// Values of a channel by rows, from the top.
+/// Values of a channel in row-major order, top row first.
 #[derive(Clone, Debug)]
 pub enum Plane {
     /// 255 is 1.
@@ -83,7 +83,8 @@ impl Plane {
         value[0]
     }
 
-    /// Returns true if both planes store equal integers in these pixels. Floats and different types always yield false.
+    /// Returns true if both planes store equal integers in these pixels. For floats and for planes of different types,
+    /// always returns false.
     pub fn is_plainly(&self, other: &Plane, pixels: Range<usize>) -> bool {
         match (self, other) {
             (Plane::Bytes(a), Plane::Bytes(b)) => a[pixels.clone()] == b[pixels],
@@ -106,7 +107,7 @@ impl Picture {
         self.width as usize * self.height as usize
     }
 
-    /// Returns the channel with a name.
+    /// Returns the channel with this name.
     pub fn channel(&self, name: &str) -> Option<&Arc<Plane>> {
         let channel = self.channels.iter().find(|channel| channel.name == name)?;
         Some(&channel.plane)
@@ -122,7 +123,8 @@ impl Picture {
         }
     }
 
-    /// Converts linear values to the PNG of 8 or 16 `bits` that `wgray render` writes; `None` without colors.
+    /// Converts linear values to the PNG of 8 or 16 `bits` that `wgray render` writes; `None` if the image has no
+    /// colors.
     pub fn displayed(&self, bits: u8) -> Option<Picture> {
         let colors = self.colors()?;
         let alpha = self.channel("A");
@@ -158,7 +160,7 @@ impl Picture {
     }
 }
 
-/// Encodes a plane as in a PNG. Colors are divided by alpha and gamma-encoded (1/2.2).
+/// Encodes a plane like a PNG. Colors are divided by alpha and gamma-encoded (1/2.2).
 fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8, is_color: bool) -> Plane {
     const CHUNK: usize = 4096;
     let (mut values, mut shares) = ([0.0; CHUNK], [1.0; CHUNK]);
@@ -170,7 +172,7 @@ fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8,
             alpha.values(start..start + count, &mut shares[..count]);
         }
         for (value, share) in values[..count].iter().zip(&shares) {
-            // In `f32` as in a render, for equal bytes.
+            // Uses `f32`, like the PNG encoder of a render, so that the bytes are equal.
             let (value, share) = (*value as f32, *share as f32);
             let value = match alpha {
                 Some(_) if !(share > 0.0) => 0.0,

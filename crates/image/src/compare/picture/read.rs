@@ -14,17 +14,18 @@ use crate::memory::fallible;
 /// Memory limit of a decoder in addition to the image, in bytes.
 const BESIDE: usize = 64 << 20;
 
-/// Maximum pixels per byte of a JPEG: each block of 8 x 8 takes a bit at least, and covers up to 32 x 32 pixels.
+/// Maximum pixels per byte of a JPEG: each block of 8 x 8 values takes at least one bit and covers up to 32 x 32
+/// pixels.
 const MAX_JPEG_PIXELS_PER_BYTE: u64 = 8 * 32 * 32;
 
-/// Maximum bytes of an image's values, plus bytes per byte of its file, which may be 65,536 x 65,536 zeros.
+/// Limit on the decoded size in bytes: a constant, plus an allowance per byte of the file. A small file may decode to
+/// 65,536 x 65,536 zeros.
 const MAX_BYTES: (u64, u64) = (1 << 30, 256);
 
 /// Why a file cannot be read as an image.
 #[derive(Debug, thiserror::Error)]
 pub enum Unreadable {
-    /// The file cannot be opened or read.
-    // Not marked as the source, since its text is in the message already.
+    /// The file cannot be opened or read. Not marked as the source, because the message already contains its text.
     #[error("cannot be read: {0}")]
     Io(io::Error),
     /// The path is a directory.
@@ -102,7 +103,7 @@ impl Picture {
             return Err(Unreadable::Folder);
         }
         if !data.is_file() {
-            // Decoders seek, which pipes cannot.
+            // Decoders seek, but pipes do not support seeking.
             let mut bytes = Vec::new();
             file.read_to_end(&mut bytes)?;
             return Picture::decode(bytes, u64::MAX);
@@ -135,7 +136,7 @@ fn decode(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadab
     }
 }
 
-/// Rejects images with too many pixels, or far larger than their file.
+/// Rejects images with too many pixels, or with values that take far more memory than the file.
 pub(super) fn check(
     most_pixels: u64,
     length: u64,
@@ -233,7 +234,7 @@ fn png(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable>
     Ok(planes.picture(width, height))
 }
 
-/// Display values, one plane per sample of a pixel; `words` if they have 16 bits.
+/// Display values, one plane per sample of a pixel. 16-bit samples use `words`, 8-bit samples use bytes.
 struct Planes {
     samples: usize,
     bytes: Vec<Vec<u8>>,

@@ -29,7 +29,7 @@ fn every_component_type_is_read() {
     assert_eq!(of(5122, 4, false), [256.0, -32641.0, -127.0, -32768.0]);
     assert_eq!(of(5123, 4, false), [256.0, 32895.0, 65409.0, 32768.0]);
     assert_eq!(of(5125, 2, false), [2_155_807_000.0, 2_147_549_057.0]);
-    // By the formulas of section 3.6.2.2, in f64.
+    // Computed with the formulas of section 3.6.2.2, in f64.
     let near = |found: Vec<f32>, wanted: &[f64]| {
         assert_eq!(found.len(), wanted.len());
         for (found, wanted) in found.iter().zip(wanted) {
@@ -188,7 +188,7 @@ fn indices_are_whole_numbers() {
         let message = error_of(accessor(&bytes, description.clone()).indices(0));
         assert!(message.starts_with("accessors[0]: element 1 is "), "{message}");
         assert!(message.contains("restart"), "{message}");
-        // One less is a valid index.
+        // The next smaller value is a valid index.
         bytes[size] = 0xfe;
         assert_eq!(accessor(&bytes, description).indices(0).unwrap().len(), 2);
     }
@@ -221,7 +221,7 @@ fn sparse(base: bool, indices: &[u8], count: usize) -> Result<Vec<[f32; 2]>, Str
 }
 
 #[test]
-fn sparse_elements_stand_in_for_others() {
+fn sparse_elements_replace_elements() {
     let base = [[0.0, 1.0], [2.0, 3.0], [4.0, 5.0], [6.0, 7.0]];
     let replaced = [[0.0, 1.0], [10.0, 11.0], [4.0, 5.0], [12.0, 13.0]];
     assert_eq!(sparse(true, &[1, 3], 2).unwrap(), replaced);
@@ -256,7 +256,7 @@ fn an_accessor_without_bytes_is_zero() {
         "accessors[0].count: 4294967295 elements without a bufferView; there must be at most 4194304"
     );
     assert!(of(u64::MAX).vectors::<2>(0).is_err());
-    // Except if an unsupported extension holds the data.
+    // This does not apply if an unsupported extension contains the data.
     let hidden = json!({ "componentType": 5126, "count": 2, "type": "VEC2", "extensions": { "X_bytes": {} } });
     assert_eq!(
         error_of(accessor(&[0], hidden).vectors::<2>(0)),
@@ -265,7 +265,7 @@ fn an_accessor_without_bytes_is_zero() {
 }
 
 #[test]
-fn no_length_offset_or_count_leaves_the_bytes() {
+fn lengths_offsets_and_counts_are_checked_against_the_buffer() {
     let bytes = floats(&[1.0; 6]);
     let with = |changes: &[(&str, Value)]| {
         let mut description = json!({ "bufferView": 0, "componentType": 5126, "count": 2, "type": "VEC3" });

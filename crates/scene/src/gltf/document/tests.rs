@@ -298,7 +298,7 @@ fn indices_and_enumerations_are_validated() {
     ] {
         let error = with(key, json!(99));
         assert!(error.starts_with(&format!("a: {place}")), "{key}: {error}");
-        // 64-bit values are not truncated, and other types are errors.
+        // 64-bit values must not be truncated, and other types must be errors.
         for value in [
             json!(1u64 << 32),
             json!(-1),
@@ -400,7 +400,7 @@ fn extensions_are_refused_or_told_by_their_names() {
     let many: Vec<String> = (0..1000).map(|i| format!("X_{i}")).collect();
     let many: Vec<&str> = many.iter().map(String::as_str).collect();
     assert_eq!(with(&[], &many).unwrap().len(), 21);
-    // Data in an extension only.
+    // Data that is only present in an extension.
     let (mut json, binary) = small();
     let draco = json!({ "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } });
     json["meshes"][0]["primitives"][0]["extensions"] = draco;
@@ -498,7 +498,7 @@ fn changed_bytes_do_not_panic() {
             }
         }
     }
-    // Both outcomes are frequent.
+    // Both outcomes must be frequent.
     assert!(good > 1000 && bad > 1000, "{good} {bad}");
 }
 

@@ -2,9 +2,9 @@
 
 use super::{TOO_LONG, TOO_SHORT};
 
-/// Elements of a group, with deltas of one width.
+/// Number of elements in a group; the deltas of a group have the same width.
 const GROUP: usize = 16;
-/// Maximum elements of a block.
+/// Maximum number of elements in a block.
 const BLOCK: usize = 256;
 
 /// Delta widths in bits by group header: version 0, and control modes 0 and 1.
@@ -44,7 +44,7 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
         };
     }
     let most = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
-    // A block has at least one byte per channel: bounds the memory.
+    // Each block takes at least one byte per channel, which limits the memory use.
     if count.div_ceil(most).saturating_mul(stride / 4) > data.len() {
         return Err(TOO_SHORT);
     }
@@ -93,7 +93,7 @@ fn take<'a>(data: &mut &'a [u8], count: usize) -> Result<&'a [u8], &'static str>
     Ok(taken)
 }
 
-/// Decodes the deltas of a group. All ones are an escape to a following byte.
+/// Decodes the deltas of a group. A delta with all bits set is an escape code: the value follows as a byte.
 fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str> {
     let mut deltas = [0; GROUP];
     if width == 0 {
@@ -110,7 +110,7 @@ fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str>
         let i = i as u32;
         let byte = packed[(i / each) as usize];
         let place = i % each;
-        // Single bits start at the lowest of a byte, wider deltas at the highest.
+        // Single-bit deltas start at the lowest bit of a byte, wider deltas at the highest bit.
         let shift = if width == 1 { place } else { 8 - width * (place + 1) };
         *delta = byte >> shift & most;
     }
@@ -122,7 +122,7 @@ fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str>
     Ok(deltas)
 }
 
-/// Decodes a channel of a block; returns its last element.
+/// Decodes a channel of a block; returns the last element.
 fn undo(
     kind: Channel,
     deltas: &[[u8; BLOCK]; 4],

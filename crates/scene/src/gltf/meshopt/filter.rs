@@ -1,6 +1,6 @@
 //! Filters of decoded meshopt attributes (`KHR_meshopt_compression`, appendix B).
 
-/// A filter; its stride is valid.
+/// A filter with a validated stride.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Filter {
     None,
@@ -11,7 +11,7 @@ pub(super) enum Filter {
 }
 
 impl Filter {
-    /// Filters in place. Results of invalid values are unspecified.
+    /// Applies the filter in place. Results of invalid values are unspecified.
     pub fn apply(self, bytes: &mut [u8], stride: usize) {
         match (self, stride) {
             (Filter::None, _) => {}
@@ -103,7 +103,7 @@ fn quaternion(v: [i16; 4]) -> [i16; 4] {
 
 fn exponential(value: i32) -> f32 {
     let (exponent, mantissa) = (value >> 24, value << 8 >> 8);
-    // Without subnormals; the specification has -100 to 100.
+    // The clamped exponent avoids subnormal numbers; the specification allows -100 to 100.
     let power = f32::from_bits(((exponent.max(-126) + 127) as u32) << 23);
     power * mantissa as f32
 }

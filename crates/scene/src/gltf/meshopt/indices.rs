@@ -55,7 +55,7 @@ pub(super) fn indices(stream: &[u8], count: usize, size: usize) -> Result<Vec<u8
     }
 }
 
-/// Decodes a zigzag-encoded integer, whose sign is in the lowest bit.
+/// Decodes a zigzag-encoded integer, which has its sign in the lowest bit.
 fn unfolded(number: u32) -> u32 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }

@@ -1,7 +1,7 @@
 //! Buffer views compressed with `EXT_meshopt_compression` or its superset `KHR_meshopt_compression` (Khronos Group,
 //! specifications of the extensions).
 //!
-//! The crate `meshopt-rs` 0.1.2 only has version 0 of the bitstream, and does not check filters.
+//! The crate `meshopt-rs` 0.1.2 only supports version 0 of the bitstream, and does not check filters.
 
 mod attributes;
 mod filter;
@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 use self::filter::Filter;
 use super::error::{GltfFault, plain, shown};
 
-/// In order of precedence.
+/// Names of the extension, in order of precedence.
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,7 +104,11 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
         return fault("count", &extension.count, &rule);
     }
     let Ok(count) = usize::try_from(extension.count) else {
-        return fault("count", &extension.count, "must be a size that this machine can have");
+        return fault(
+            "count",
+            &extension.count,
+            "must fit into the address space of this machine",
+        );
     };
     Ok(Some(Compressed {
         name,

@@ -74,7 +74,7 @@ fn streams_decode_to_what_the_reference_makes_of_them() {
         let wanted = STANDARD.decode(wanted).unwrap();
         assert_eq!(found.len(), wanted.len());
         if how.filter == super::Filter::Exponential {
-            // Exact, except for the sign of zeros.
+            // Values must be equal, except for the sign of zeros.
             let floats = |bytes: &[u8]| -> Vec<f32> {
                 let words = bytes.as_chunks::<4>().0.iter();
                 words.map(|word| f32::from_le_bytes(*word)).collect()
@@ -82,7 +82,7 @@ fn streams_decode_to_what_the_reference_makes_of_them() {
             assert_eq!(floats(&found), floats(&wanted), "{name}");
             continue;
         }
-        // Within one unit in the last place, by the specification.
+        // The specification allows a difference of one unit in the last place.
         let is_color = how.filter == super::Filter::Color;
         let numbers = |bytes: &[u8]| -> Vec<i32> {
             match (how.stride, is_color) {
@@ -154,7 +154,7 @@ fn damaged_streams_do_not_panic() {
     let (mut good, mut bad) = (0, 0);
     for Stream { name, how, bytes, .. } in streams() {
         for length in 0..bytes.len() {
-            // The tail of a truncated stream is misplaced.
+            // In a truncated stream, the tail is at the wrong position.
             if how.decode(&bytes[..length]).is_ok() {
                 panic!("{name}: {length} of {} bytes", bytes.len());
             }

@@ -1,4 +1,4 @@
-//! PLY values: ASCII, or binary of either byte order.
+//! PLY values: ASCII, or binary with either byte order.
 
 use super::super::error::{Location, MeshFault, shown};
 use super::super::tokens::{self, Tokens};
@@ -10,7 +10,7 @@ pub(super) trait Values {
     fn fewest_bytes(&self, scalar: Scalar) -> usize;
     fn left(&self) -> usize;
     fn place(&mut self) -> Location;
-    /// Ends a row. Returns its line if that has more values.
+    /// Ends a row. Returns the line of the row if it has unread values.
     fn end_row(&mut self) -> Option<Location> {
         None
     }
@@ -37,7 +37,7 @@ impl Values for Ascii<'_> {
         (0..count).try_for_each(|_| self.next(scalar).map(|_| ()))
     }
 
-    /// A digit and a separator, which `left` includes for the last value.
+    /// A value has at least a digit and a separator; `left` includes a separator for the last value.
     fn fewest_bytes(&self, _: Scalar) -> usize {
         2
     }

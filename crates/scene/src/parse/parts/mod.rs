@@ -1,5 +1,5 @@
-//! Scene files in parts that are parsed one at a time, because the parser needs about 30 times the memory of a text. A
-//! part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]`, `[textures.NAME]`, `[meshes.NAME]` or
+//! Splits scene files into parts that are parsed one at a time, because parsing needs about 30 times the memory of the
+//! text. A part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]`, `[textures.NAME]`, `[meshes.NAME]` or
 //! `[[instances]]`; everything else is one part.
 
 use std::borrow::Cow;
@@ -48,7 +48,7 @@ impl Kind {
         }
     }
 
-    /// Returns true if the tables have names.
+    /// Returns true if the tables of this section have names.
     fn is_map(self) -> bool {
         matches!(self, Kind::Textures | Kind::Materials | Kind::Meshes)
     }
@@ -62,7 +62,7 @@ pub struct Part {
     pub place: Range<usize>,
 }
 
-/// The parts of a text. Each is a standalone TOML document.
+/// The parts of a text. Each part is a standalone TOML document.
 pub struct Parts<'a> {
     pub text: &'a str,
     pub parts: Cow<'a, [Part]>,
@@ -103,7 +103,7 @@ impl SyntaxFault {
         syntax_error(text, origin, self.at, &message)
     }
 
-    /// Returns the error of a text that must be parsed as a whole but is too large.
+    /// Returns the error for a text that must be parsed as a whole but is too large.
     pub fn whole(text: &str) -> SyntaxFault {
         let size = text.len() as f64 / f64::from(1 << 20);
         let rule =
@@ -120,7 +120,7 @@ impl SyntaxFault {
 #[derive(Default)]
 pub struct Rest {
     pub text: String,
-    /// Starts of pieces, here and in the whole text.
+    /// The start offset of each piece, in this document and in the whole text.
     pieces: Vec<(usize, usize)>,
 }
 
@@ -133,7 +133,7 @@ impl Rest {
     }
 }
 
-/// A part's name, if any, and table.
+/// The name of a part, if any, and its table.
 pub type Named = (Option<String>, Table);
 
 impl<'a> Parts<'a> {
@@ -204,7 +204,8 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// Parses a part; `None` if it is not one element of its section: then the file must be parsed as a whole.
+    /// Parses a part; `None` if the part is not a single element of its section; the file must then be parsed as a
+    /// whole.
     pub fn read(&self, part: &Part) -> Result<Option<Named>, SyntaxFault> {
         let document = toml::from_str(self.text(part)).map_err(|error| SyntaxFault::of(part.place.start, &error));
         let mut document: Table = document?;
@@ -238,7 +239,7 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// Returns the part that contains a path, and the path in it.
+    /// Returns the part that contains a path, and the path relative to the part.
     pub fn find(&self, path: &KeyPath) -> Option<(&Part, KeyPath)> {
         let [Segment::Key(first), second, rest @ ..] = path.0.as_slice() else {
             return None;

@@ -1,4 +1,4 @@
-//! Tests that parsing a text by parts and as a whole gives the same result.
+//! Tests that parsing a text in parts and as a whole gives the same result.
 
 use super::*;
 use crate::Description;
@@ -41,7 +41,7 @@ fn valid_files_parse_equally_by_parts() {
     let text = "[materials.z]\ntype = 'phong'\n[materials.z.color]\ntexture = \"\"\"\n[[shapes]]\n\"\"\"\n";
     let render = "[render]\nseed = 3\n[render.pixel_samples]\ncount = 4\n";
     let pieces = [POINT, SPHERE, RED, BLUE, sub, image, nested, text, render];
-    // Every order of three pieces; late subtables and duplicate tables are errors.
+    // All orders of three pieces; misplaced subtables and duplicate tables are errors.
     for a in pieces {
         for b in pieces {
             for c in pieces {
@@ -72,7 +72,7 @@ fn invalid_files_have_equal_errors_by_parts() {
         render = "[render]\nseed = 3\n"
     );
     assert_same(&good);
-    // Every line removed, duplicated, truncated, or with an insertion before it.
+    // Each line is removed, duplicated or truncated, or text is inserted before it.
     let lines: Vec<&str> = good.lines().collect();
     for i in 0..lines.len() {
         let line = lines[i];

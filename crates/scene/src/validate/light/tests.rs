@@ -1,4 +1,4 @@
-//! Tests of spot lights at both ends of their ranges.
+//! Tests of spot lights at both ends of the parameter ranges.
 
 use crate::{Light, Scene};
 

@@ -287,7 +287,7 @@ fn errors_in_mesh_files_have_their_own_location() {
         ("far.obj", "\"far.obj\" reaches to "),
         ("small.obj", ""),
     ] {
-        // At least scaled by 2, and moved three times as far.
+        // The transform scales at least by 2, and moves three times as far.
         let text = GOOD.replacen("file = \"one.obj\"", &format!("file = \"{file}\""), 1);
         match parse_in(&folder, &text) {
             Ok(_) => assert_eq!(expected, ""),
@@ -355,7 +355,7 @@ fn groups_are_counted() {
     let error = few_groups(&[shape(MAX_GROUPS / 2), shape(MAX_GROUPS / 2 + 1)]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "the meshes have 16777217 groups together; they must be at most 16777216"
+        "the meshes have 16777217 groups in total; at most 16777216 are allowed"
     );
 }
 
@@ -367,7 +367,7 @@ fn group_names_take_precedence_over_material_names() {
     assert_eq!(groups(&scene, 2), [1, 2, 2]);
     let changed = "material = 'red'\nmaterials = { wall = 'white' }";
     assert_eq!(groups(&parse(&with(LINE_OF_MATERIALS, changed)).unwrap(), 2), [1, 2, 1]);
-    // The name of a group takes precedence over that of its material.
+    // The name of a group takes precedence over the name of its material.
     let changed = "material = 'red'\nmaterials = { brick = 'white', door = 'red' }";
     assert_eq!(groups(&parse(&with(LINE_OF_MATERIALS, changed)).unwrap(), 2), [1, 2, 1]);
 }
@@ -437,7 +437,7 @@ fn rotations_apply_in_the_order_of_the_axes() {
     let text = with("rotate = [0, 0, 90]", "rotate = [90, 0, 90]").replace("scale = 2\n", "");
     let scene = parse(&text).unwrap();
     let turned = |p: [f64; 3]| to_world(&scene, 0).transform_vector3(p.into());
-    // About x, y becomes z; then about z, x becomes y.
+    // The rotation about x maps y to z; then, the rotation about z maps x to y.
     assert_eq!(turned([0.0, 1.0, 0.0]), DVec3::Z);
     assert_eq!(turned([1.0, 0.0, 0.0]), DVec3::Y);
     assert_eq!(turned([0.0, 0.0, 1.0]), DVec3::X);
@@ -458,7 +458,7 @@ fn another_axis_may_be_up() {
         let text = with(LINE_OF_MATRIX, &format!("up = '{up}'"));
         let map = to_world(&parse(&text).unwrap(), 1);
         assert_eq!((map.x_axis, map.y_axis, map.z_axis), (x, y, z), "{up}");
-        // No reflection.
+        // The transform is not a reflection.
         assert_eq!(map.matrix3.determinant(), 1.0);
         // The other transforms are applied after the rotation.
         let text = with(

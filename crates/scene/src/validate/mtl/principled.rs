@@ -1,5 +1,5 @@
-//! Conversion of MTL materials to `principled` under `path`, with the extensions of Exocortex, "Extending the Wavefront
-//! MTL format for physically based rendering", which Blender also writes.
+//! Conversion of MTL materials to `principled` for the integrator `path`, with the extensions of Exocortex, "Extending
+//! the Wavefront MTL format for physically based rendering", which Blender also writes.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ use crate::mesh::MtlMaterial;
 const SPECULAR: f64 = 2.0;
 
 impl SceneMaterials<'_> {
-    /// Exporters write anything as `Ka`: it is ignored.
+    /// Returns a principled material. Ignores `Ka`, because exporters write arbitrary values for it.
     pub(super) fn principled(&mut self, own: &MtlMaterial, file: &Path, traits: Traits) -> Material {
         let mut warnings = Warnings::default();
         let clamped = |warnings: &mut Warnings, name: &'static str, color: [f64; 3], limit: f64| {
@@ -55,7 +55,7 @@ impl SceneMaterials<'_> {
         };
         let roughness = match (own.roughness, own.shininess) {
             (Some(roughness), _) => share(&mut warnings, "Pr", roughness),
-            // Its highlight is as wide as that of the Blinn-Phong exponent.
+            // The highlight is as wide as with the Blinn-Phong exponent.
             (None, Some(exponent)) => (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25),
             (None, None) => 1.0,
         };
@@ -105,7 +105,7 @@ impl SceneMaterials<'_> {
         }
     }
 
-    /// Returns the opacity by `map_d`: the alpha of its image, else its red.
+    /// Returns the opacity of `map_d`: the alpha channel of the image, or the red channel if there is no alpha channel.
     fn opacity(&mut self, own: &MtlMaterial, file: &Path, traits: Traits, warnings: &mut Warnings) -> Option<Value> {
         let path = beside(file, own.opacity_map.as_ref()?);
         if let Ok(texture) = self.map(&path, Part::Alpha, traits.has_uvs) {
@@ -116,7 +116,7 @@ impl SceneMaterials<'_> {
         Some(Value::Texture(texture, Channel::R))
     }
 
-    /// Returns whether an image has normals: gray ones have heights, which are not supported.
+    /// Returns true if an image contains normals. Gray images contain heights, which are not supported.
     fn has_directions(&self, texture: usize, warnings: &mut Warnings) -> bool {
         let has_colors = match &self.textures[texture].kind {
             TextureKind::Image { image, .. } => match &image.texels {

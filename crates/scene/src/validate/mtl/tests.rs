@@ -1,4 +1,4 @@
-//! Tests of materials from MTL files, and their warnings.
+//! Tests of materials from MTL files, and of warnings about them.
 
 use std::fs;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 2 4\nv 0 0 5\nv 1 0 5\nv 
 struct TestFolder(TempDir);
 
 impl TestFolder {
-    /// The mesh in the folder `in`.
+    /// Writes the mesh to the folder `in`.
     fn new(mtl: &str) -> TestFolder {
         let place = TestFolder(tempfile::tempdir().unwrap());
         fs::create_dir(place.path("in")).unwrap();
@@ -59,7 +59,7 @@ fn named<'a>(scene: &'a Scene, name: &str) -> &'a Material {
     &scene.materials[i]
 }
 
-/// Ambient, diffuse, specular, exponent.
+/// Returns the ambient, diffuse and specular factors and the exponent.
 fn phong(material: &Material) -> (Color, Color, Color, f64) {
     assert_eq!((material.emission, material.normal_map), (Color::BLACK, None));
     match material.reflection {
@@ -89,7 +89,7 @@ fn groups_have_the_materials_of_their_file() {
         phong(named(&scene, "red")),
         (red, red, plain(0.125, 0.125, 0.125), 96.5)
     );
-    // Defaults of the file; its illumination model has no highlights.
+    // The defaults of MTL files; the illumination model of the file has no highlights.
     let gray = plain(0.8, 0.8, 0.8);
     assert_eq!(phong(named(&scene, "blue")), (gray, gray, plain(0.0, 0.0, 0.0), 16.0));
 }
@@ -205,7 +205,7 @@ fn unsupported_statements_cause_one_warning() {
             "{notes:?}"
         );
     }
-    // Without effect, like a line without a file name.
+    // A keyword that has no effect, like a line without a file name.
     let place = TestFolder::new(
         "newmtl red\nKs 0\nNs 0\nd 1\nTr 0\nKe 0 0 0\nmap_Ka a.png\nPr 1\nNi 1.5\nillum 2\nnewmtl blue\n",
     );
@@ -229,7 +229,7 @@ fn missing_materials_get_a_default() {
     let note = |rest: &str| format!("in/a.obj: no material {rest}; a gray material is used instead");
     let notes = |keys: &str| place.scene(&format!("{MESH}{keys}")).unwrap().notes;
     let scene = place.scene(MESH).unwrap();
-    assert_eq!(scene.notes, [note("\"blue\": its MTL files do not have it")]);
+    assert_eq!(scene.notes, [note("\"blue\": not defined in its MTL files")]);
     assert_eq!(names(&scene, 0), ["red", "red", "default"]);
     let gray = Color::Plain(DVec3::splat(0.8));
     assert_eq!(phong(named(&scene, "default")).1, gray);

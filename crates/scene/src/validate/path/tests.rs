@@ -1,4 +1,4 @@
-//! Tests of scenes of the path tracer, and of keys that only one integrator supports.
+//! Tests of scenes for the path tracer, and of keys that only one integrator supports.
 
 mod messages;
 mod notes;
@@ -12,7 +12,7 @@ use super::super::super::{
     ValueDescription,
 };
 
-/// All features. Each line is unique: tests replace it.
+/// A scene with all features. Each line is unique, so that tests can replace it.
 const GOOD: &str = r#"
 image = { width = 4, height = 4 }
 camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
@@ -92,7 +92,7 @@ fn plain(r: f64, g: f64, b: f64) -> Color {
 }
 
 #[test]
-fn a_scene_of_paths_is_what_its_file_says() {
+fn a_path_tracer_scene_has_the_values_of_its_file() {
     let scene = parse(GOOD).unwrap();
     assert_eq!(scene.notes, Vec::<String>::new());
     let render = scene.render;
@@ -256,7 +256,7 @@ fn metals_have_an_index_by_name_or_by_numbers() {
 }
 
 #[test]
-fn what_is_absent_has_defaults() {
+fn absent_keys_have_defaults() {
     let absent = [
         "max_depth = 3",
         "rr_depth = 2",
@@ -291,7 +291,7 @@ fn what_is_absent_has_defaults() {
 }
 
 #[test]
-fn the_background_is_the_surroundings() {
+fn the_background_becomes_the_environment() {
     let environment = "[environment]\ncolor = [0.5, 0.25, 0]";
     let dark = parse(&with(environment, "")).unwrap();
     assert_eq!((dark.render.background, dark.environment), (DVec3::ZERO, None));
@@ -313,7 +313,7 @@ fn the_background_is_the_surroundings() {
     assert_eq!(parse(&text).unwrap(), parse(GOOD).unwrap());
     let black = parse(&with("color = [0.5, 0.25, 0]", "color = [0, 0, 0]")).unwrap();
     assert_eq!(black.environment, None);
-    // Phong has only a background.
+    // The Phong integrator only has a background.
     let text = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n\
                 render = { background = [1, 1, 1] }\n";
     let scene = parse(text).unwrap();

@@ -184,7 +184,7 @@ const BAD: &[(&str, &str, &str)] = &[
 ];
 
 #[test]
-fn bad_values_are_told_with_line_key_value_and_rule() {
+fn invalid_values_are_reported_with_line_key_value_and_rule() {
     for &(line, bad, expected) in BAD {
         let text = with(line, bad);
         let place = text[..text.find(bad).unwrap()].lines().count() + 1;
@@ -291,7 +291,7 @@ fn path_tracer_features_are_rejected_under_phong() {
             "render.integrator is not set; using \"path\", which {key} requires. Set it in the scene to silence this warning"
         );
         assert_eq!(scene.notes[0], note);
-        // An overridden integrator counts.
+        // The overridden integrator is used.
         let overrides = |integrator| Overrides {
             integrator: Some(integrator),
             ..Overrides::default()

@@ -9,7 +9,7 @@ fn notes(text: &str) -> Vec<String> {
 }
 
 #[test]
-fn what_paths_ignore_is_told() {
+fn keys_that_the_path_tracer_ignores_cause_notes() {
     for (added, expected) in [
         (
             "ambient = [0, 0.1, 0]",
@@ -35,7 +35,7 @@ fn what_paths_ignore_is_told() {
         let text = GOOD.replace("[render]", &format!("[render]\n{same}"));
         assert_eq!(notes(&text), Vec::<String>::new());
     }
-    // The option causes one warning, whatever its value.
+    // The option causes one warning, independent of its value.
     for count in [16, 9] {
         let overrides = Overrides {
             light_samples: Some(count),
@@ -44,7 +44,7 @@ fn what_paths_ignore_is_told() {
         let scene = Scene::parse_with(GOOD, "s.toml", &overrides).unwrap();
         assert_eq!(scene.notes, [LIGHT_SAMPLES]);
     }
-    // Phong supports all of it.
+    // The Phong integrator supports all of these keys.
     let text = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n\
                 materials.a = { type = 'phong', color = [1, 1, 1] }\n\
                 render = { ambient = [1, 1, 1], shadows = 'transparent', light_samples = { count = 4 } }\n";
@@ -52,7 +52,7 @@ fn what_paths_ignore_is_told() {
 }
 
 #[test]
-fn phong_materials_that_are_too_bright_are_told() {
+fn too_bright_phong_materials_cause_a_note() {
     const RULE: &str =
         "materials: diffuse + specular are scaled down to 1 with integrator = \"path\", which conserves energy: ";
     let (diffuse, specular) = ("diffuse = [0.5, 0, 0]", "specular = [0.5, 0.5, 0.5]");
@@ -73,7 +73,7 @@ fn phong_materials_that_are_too_bright_are_told() {
             .collect();
         assert_eq!(notes(&text), expected, "{changed}");
     }
-    // Many materials share a warning.
+    // Many materials share one warning.
     let materials: String = (0..10)
         .map(|i| format!("[materials.m{i}]\ntype = 'phong'\ncolor = [0.{i}, 0.8, 0]\n"))
         .collect();
@@ -83,7 +83,7 @@ fn phong_materials_that_are_too_bright_are_told() {
 }
 
 #[test]
-fn alpha_that_nothing_asks_is_told() {
+fn unused_alpha_causes_a_note() {
     let leaf = |keys: &str| {
         notes(&with(
             "[materials.clay]",
