@@ -1,5 +1,5 @@
-// The GGX microfacet distribution. In local vectors z is along the normal, x and y along the axes of the two `alpha`,
-// which are at least SMALLEST_ALPHA.
+// The GGX microfacet distribution. In local vectors z is along the normal, x and y along the axes of the two `alpha`.
+// Each `alpha` is at least SMALLEST_ALPHA.
 
 // Returns the density of normals, per solid angle and area: Trowbridge and Reitz, "Average irregularity representation
 // of a rough surface for ray reflection", JOSA 65(5), 1975. Unlike 1 - cos^2, the tangential components of m are exact

@@ -8,7 +8,7 @@ fn mean_above(m: vec4f, r: vec4f) -> vec4f {
 
 // Returns the importances of the children for p, up to a factor: section 4.1, where each cosine is the mean height of
 // the bounding sphere above the plane of emitter or surface, divided by the distance. The mean height is at least 0.03
-// of the radius, since spheres are wider than their contents. A tenth of the squared radius is added to the squared
+// of the radius: a sphere overestimates the extent of its emitters. A tenth of the squared radius is added to the squared
 // distance. n is the surface normal, or 0 if light may arrive from both sides. Importances are positive where light can
 // arrive, with a margin for rounding.
 fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {

@@ -44,7 +44,7 @@ pub struct Object {
     /// A note.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
-    /// The reason if there is no object.
+    /// Why the selection has no object.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gone: Option<String>,
 }

@@ -34,7 +34,7 @@ const PING_INTERVAL: Duration = Duration::from_secs(15);
 
 #[derive(Debug, PartialEq)]
 enum Request {
-    /// Acknowledges this frame and all earlier frames. There is no answer.
+    /// Acknowledges this frame and all earlier frames; the server does not reply.
     Acknowledge(u64),
     Question(Question),
     Command(Command),

@@ -221,7 +221,7 @@ pub enum Light {
         /// Position.
         position: DVec3,
         /// Color. With [`Integrator::Path`], the intensity (power per unit solid angle) with inverse-square falloff;
-        /// otherwise, there is no falloff.
+        /// otherwise without falloff.
         color: DVec3,
     },
     /// A directional light, invisible to the camera.

@@ -28,8 +28,8 @@ export class Picture {
     this.swapped = false; // whether a flicker shows the second image
     this.motion = new Motion();
     this.wheeled = 0; // time of the last wheel event
-    // Scale in screen pixels per image pixel, or null to fit the image to the panel; and the image point at the center
-    // of a panel.
+    // Scale in screen pixels per image pixel, or null to fit the image to the panel; and the image point at a panel's
+    // center.
     this.scale = null;
     this.middle = [0, 0];
     this.cursor = null;

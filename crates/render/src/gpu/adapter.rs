@@ -119,7 +119,7 @@ pub(super) fn fitting(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<u
 }
 
 pub(super) fn enumerate() -> Vec<wgpu::Adapter> {
-    // wgpu may panic while a driver is being reset. Then there is no adapter.
+    // wgpu may panic while a driver is being reset; the list is empty in this case.
     let adapters = catch_panic(|| {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))

@@ -47,3 +47,66 @@ impl PipelineCache {
         pipelines.push_back((key, pipeline.clone()));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::compose::RENDER;
+    use crate::gpu::{AdapterChoice, choose};
+
+    fn key(text: &str, samples: u32, exact: Option<Rounding>) -> Key {
+        let mut source = Source::default();
+        source.append("a.wgsl", text);
+        let constants = Specialization {
+            pixel_samples: samples,
+            ..Specialization::default()
+        };
+        Key::new(&RENDER, &source, &constants, exact)
+    }
+
+    #[test]
+    fn keys_differ_by_text_constants_and_rounding() {
+        let known = key("a", 1, None);
+        assert_eq!(known, key("a", 1, None));
+        for other in [
+            key("b", 1, None),
+            key("a", 2, None),
+            key("a", 1, Some(Rounding::Device)),
+            key("a", 1, Some(Rounding::Software)),
+        ] {
+            assert_ne!(known, other);
+        }
+    }
+
+    #[test]
+    fn the_least_recently_used_pipeline_is_dropped() {
+        let device = match choose(&AdapterChoice::Auto) {
+            Ok(device) => device,
+            Err(_) if std::env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some() => return,
+            Err(error) => panic!("{error}"),
+        };
+        let (wgpu, _) = device.wgpu();
+        let module = wgpu.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: None,
+            source: wgpu::ShaderSource::Wgsl("@compute @workgroup_size(1) fn main() {}".into()),
+        });
+        let pipeline = wgpu.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: None,
+            layout: None,
+            module: &module,
+            entry_point: None,
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        let keys: Vec<Key> = (0..=CAPACITY as u32).map(|i| key("a", i, None)).collect();
+        let cache = PipelineCache::default();
+        for key in &keys[..CAPACITY] {
+            cache.add(*key, &pipeline);
+        }
+        assert_eq!(cache.get(keys[0]).as_ref(), Some(&pipeline));
+        cache.add(keys[CAPACITY], &pipeline);
+        let cached: Vec<bool> = keys.iter().map(|key| cache.get(*key).is_some()).collect();
+        let wanted: Vec<bool> = (0..=CAPACITY).map(|i| i != 1).collect();
+        assert_eq!(cached, wanted);
+    }
+}

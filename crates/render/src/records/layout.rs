@@ -51,7 +51,7 @@ records! {
         pub radiance: Vec3,
         /// `t_max` of shadow rays to a point on a surface, relative to its distance.
         pub t_max: f32,
-        /// World-space direction to the center of the map. This and all following fields are 0 if there is no map.
+        /// World-space direction to the center of the map. 0 without a map, like all following fields.
         pub x: Vec3,
         /// Offset of the texels: three floats each, in row-major order, top row first. The first and last row contain
         /// the means at the poles.
@@ -173,7 +173,7 @@ records! {
         pub thin: u32,
         /// 1 if invisible to the camera, [`CULL_BACKFACE`] if only its back faces are, else 0.
         pub camera_visibility: u32,
-        /// 1 + offset of the anisotropic albedo table in the texels; 0 if there is no table.
+        /// 1 + offset of the anisotropic albedo table in the texels, or 0 without a table.
         pub aniso_table: u32,
         /// [`COLORS_OF_BASE`], [`COLORS_OF_EMISSION`] or [`NO_COLORS`].
         pub vertex_colors: u32,

@@ -129,7 +129,7 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
                 .message
                 .starts_with("render.integrator is not set; using \"path\", which materials.red.emission requires")
         );
-        // A specified integrator is kept, and there is no note.
+        // A specified integrator is kept without a note.
         let named = load("environment.color = [1, 1, 1]\n", &define("render.integrator=path"));
         assert!(
             !named.notes.iter().any(|note| note.message.contains("integrator: ")),

@@ -1,5 +1,5 @@
-//! Twin of `shaders/integrators/path.wgsl`. Functions update the path state in place; copying its 300 bytes took 11 %
-//! of a render's time.
+//! Twin of `shaders/integrators/path.wgsl`. Functions update the path state in place; copies of its 300 bytes took 11 %
+//! of the render time.
 
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
