@@ -10,12 +10,6 @@ fn cylinder_levels(q: Primitive, from_anchor: vec3f) -> vec2f {
     return vec2f(side, max(top, bottom));
 }
 
-// Corrects the rounding of levels on the surface: the larger one becomes `on`, the other at most `on`.
-fn levels_on_surface(levels: vec2f, on: f32) -> vec2f {
-    let on_side = levels.x >= levels.y;
-    return vec2f(select(min(levels.x, on), on, on_side), select(on, min(levels.y, on), on_side));
-}
-
 // Returns the interval of s, from x to y, where o + s d is inside; empty unless x < y. `levels` are the levels of o.
 fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
     // Side, with `ellipsoid_discriminant` in two dimensions.
@@ -51,17 +45,12 @@ fn intersect_cylinder(q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> 
     let d = vector_to_local(q, ray.direction);
     let free = cylinder_levels(q, from_anchor);
     let levels = select(free, levels_on_surface(free, 0.0), from_inside);
-    let inside = cylinder_interval(from_anchor - q.middle, d, levels);
-    let t = select(inside.y, inside.x, inside.x > 0.0);
-    return select(limit, t, (inside.x < inside.y) & (t > 0.0) & (t < limit));
+    return nearest_end(cylinder_interval(from_anchor - q.middle, d, levels), limit);
 }
 
 // Returns true if the surface cuts the local segment o + s d, s in (0, t_max).
 fn cylinder_occludes(o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
-    let inside = cylinder_interval(o, d, levels);
-    let enters = (inside.x > 0.0) & (inside.x < t_max);
-    let leaves = (inside.y > 0.0) & (inside.y < t_max);
-    return (inside.x < inside.y) & (enters | leaves);
+    return interval_occludes(cylinder_interval(o, d, levels), t_max);
 }
 
 // Returns false on the side.

@@ -21,16 +21,16 @@ fn longitude(local: vec3f) -> f32 {
     return select(turn, turn + 1.0, turn < 0.0);
 }
 
-// Returns the distance of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray goes inside from the
+// Returns the distance of the nearest hit in (0, limit), else `limit`. With `from_inside` the ray goes inside from the
 // surface: the hit is the chord's other end. The nearer root avoids cancellation: Haines, Guenther and Akenine-Moeller,
 // "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.
-fn intersect_ellipsoid(q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
+fn intersect_ellipsoid(q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let o = from_anchor - q.middle;
     let d = vector_to_local(q, ray.direction);
     let a = dot(d, d);
     let b = dot(o, d);
-    let start = select(ellipsoid_level(q, from_anchor), 0.0, inside_prim);
+    let start = select(ellipsoid_level(q, from_anchor), 0.0, from_inside);
     let discriminant = ellipsoid_discriminant(o, d, start);
     let root = sqrt(max(discriminant, 0.0));
     let sum = select(-b - root, root - b, b < 0.0);

@@ -22,6 +22,7 @@ pub static SHARED: &[File] = files![
     "ellipsoid.wgsl",
     "plane.wgsl",
     "disk.wgsl",
+    "solid.wgsl",
     "cylinder.wgsl",
     "primitive.wgsl",
     "camera.wgsl",

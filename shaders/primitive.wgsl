@@ -1,8 +1,8 @@
 // Dispatch by the kind of a primitive, which may be a compile-time constant.
 
-// Returns the t of the nearest hit in (0, limit), else `limit`. With `inside_prim` the ray goes inside from the
+// Returns the t of the nearest hit in (0, limit), else `limit`. With `from_inside` the ray goes inside from the
 // primitive.
-fn intersect(kind: u32, q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
+fn intersect(kind: u32, q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
     }
@@ -10,13 +10,13 @@ fn intersect(kind: u32, q: Primitive, inside_prim: bool, ray: Ray, limit: f32) -
         return intersect_triangle(q, ray, limit);
     }
     if kind == ELLIPSOID {
-        return intersect_ellipsoid(q, inside_prim, ray, limit);
+        return intersect_ellipsoid(q, from_inside, ray, limit);
     }
     if kind == DISK {
         return intersect_disk(q, ray, limit);
     }
     if kind == CYLINDER {
-        return intersect_cylinder(q, inside_prim, ray, limit);
+        return intersect_cylinder(q, from_inside, ray, limit);
     }
     return intersect_plane(q, ray, limit);
 }
@@ -51,14 +51,14 @@ fn is_centered(kind: u32) -> bool {
     return (kind == RECTANGLE) | (kind == DISK);
 }
 
-// Returns the levels of a local point for `occludes`, negative inside; y is for cylinders only. With `inside_prim` a
+// Returns the levels of a local point for `occludes`, negative inside; y is for cylinders only. With `from_inside` a
 // point on the surface counts as barely inside: segments inwards are occluded if they end outside.
-fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, inside_prim: bool) -> vec2f {
+fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, from_inside: bool) -> vec2f {
     if kind == CYLINDER {
         let levels = cylinder_levels(q, from_anchor);
-        return select(levels, levels_on_surface(levels, -1e-30), inside_prim);
+        return select(levels, levels_on_surface(levels, -1e-30), from_inside);
     }
-    return vec2f(select(ellipsoid_level(q, from_anchor), -1e-30, inside_prim), 0.0);
+    return vec2f(select(ellipsoid_level(q, from_anchor), -1e-30, from_inside), 0.0);
 }
 
 // Returns the world-space gradient, at a local point, of a function that is 0 on the primitive: z, (x^2 + y^2 + z^2 -

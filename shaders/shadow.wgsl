@@ -10,12 +10,12 @@ struct SampleBlock {
     key: vec2u,
 }
 
-// Returns the mask of samples that the primitive occludes from p. `kind` is a compile-time constant. With `inside_prim`
+// Returns the mask of samples that the primitive occludes from p. `kind` is a compile-time constant. With `from_inside`
 // p is on a solid seen from inside (`solid_levels`).
-fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, light: Light, block: SampleBlock) -> u32 {
+fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, from_inside: bool, light: Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
-    let levels = solid_levels(kind, q, from_anchor, inside_prim);
+    let levels = solid_levels(kind, q, from_anchor, from_inside);
     let to = segments_to_local(q, segments_to_light(light, p));
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {
@@ -26,9 +26,9 @@ fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, light: L
 }
 
 // Returns true if the primitive occludes p + s to, s in (0, t_max).
-fn occludes_segment(kind: u32, q: Primitive, p: vec3f, inside_prim: bool, to: vec3f, t_max: f32) -> bool {
+fn occludes_segment(kind: u32, q: Primitive, p: vec3f, from_inside: bool, to: vec3f, t_max: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
-    let levels = solid_levels(kind, q, from_anchor, inside_prim);
+    let levels = solid_levels(kind, q, from_anchor, from_inside);
     return occludes(kind, from_anchor - q.middle, vector_to_local(q, to), levels, t_max);
 }
 

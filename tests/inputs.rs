@@ -20,8 +20,9 @@ use wgray_render::cpu::slab::{ray_interval, slabs};
 use wgray_render::cpu::surface::Surface;
 use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type};
 use wgray_render::records::{
-    BOX_PAD, CYLINDER, Camera, ELLIPSOID, INFINITE_T, Instance, KINDS, Light, LightNode, MIN_SHEEN_ROUGHNESS, Material,
-    NO_INDEX, NO_PRIMITIVE, Node, Primitive, SMALLEST_ALPHA, Sphere, Texture,
+    BOX_PAD, CYLINDER, Camera, DISK, ELLIPSOID, INFINITE_T, Instance, KINDS, Light, LightNode, MIN_SHEEN_ROUGHNESS,
+    Material, NO_INDEX, NO_PRIMITIVE, Node, PRIMITIVE_KINDS, Primitive, RECTANGLE, SMALLEST_ALPHA, Sphere, TRIANGLE,
+    Texture,
 };
 
 use crate::kernel::{Function, scalars};
@@ -70,7 +71,7 @@ pub fn inputs(function: &Function, calls: usize, seed: u64) -> Vec<u32> {
 }
 
 fn call(function: &Function, random: &Random, words: &mut Vec<u32>) {
-    let situation = Situation::new(random);
+    let situation = Situation::new(function.name(), random);
     let manner = random.below(12);
     let mut before = 0.0;
     for (name, ty) in function.arguments() {
@@ -300,30 +301,35 @@ const OF_FACES: &[&str] = &[
 ];
 
 impl Situation {
-    fn new(random: &Random) -> Situation {
+    /// Returns a situation for a function. A function with a kind of primitive in its name gets this kind.
+    fn new(function: &str, random: &Random) -> Situation {
         let center = DVec3::from_array([(); 3].map(|()| random.between(-2.0, 2.0))) * random.pick(&[0.0, 1.0, 100.0]);
         let scale = random.magnitude(-3.0, 3.0);
         let mut columns = DMat3::from_cols(vector(random), vector(random), vector(random)) * scale;
         if random.once_in(4) {
             columns = DMat3::from_diagonal(DVec3::splat(scale)); // axis-aligned
         }
-        let kind = random.below(KINDS);
+        let any_kind = random.below(KINDS);
+        let named = PRIMITIVE_KINDS
+            .iter()
+            .position(|kind| function.contains(&kind.name.to_lowercase()));
+        let kind = named.map_or(any_kind, |kind| kind as u32);
         // the anchor of a solid is on or near its surface
         let (mut middle, mut level) = (DVec3::ZERO, -1.0);
         if kind == ELLIPSOID && random.once_in(2) {
-            middle = -local_point(random).normalize_or(DVec3::Z) * random.pick(&[1.0, 1.0, 1.1]);
+            middle = -local_point(kind, random).normalize_or(DVec3::Z) * random.pick(&[1.0, 1.0, 1.1]);
             level = middle.length_squared() - 1.0;
         }
         if kind == CYLINDER {
             columns = cylinder_columns(random, scale);
             if random.once_in(2) {
-                let at = local_point(random);
+                let at = local_point(kind, random);
                 middle = -at.truncate().normalize_or(DVec2::X).extend(at.z.clamp(-1.0, 1.0));
                 level = middle.truncate().length_squared() - 1.0;
             }
         }
         let rows = columns.inverse().transpose();
-        let local = local_point(random);
+        let local = local_point(kind, random);
         let away = vector(random) * random.pick(&[0.3, 1.0, 3.0, 300.0]);
         let local_start = if random.once_in(8) {
             local + DVec3::new(away.x, away.y, 0.0)
@@ -655,18 +661,26 @@ fn color(random: &Random) -> Vec3 {
     Vec3::from_array([(); 3].map(|()| random.unit() as f32))
 }
 
-/// Returns a point in local space on or near a canonical shape, sometimes at an edge or a corner.
-fn local_point(random: &Random) -> DVec3 {
+/// Returns a point in local space on or near a primitive of a kind, sometimes at an edge or a corner.
+fn local_point(kind: u32, random: &Random) -> DVec3 {
     let coordinate = || random.between(-1.2, 1.2);
     let p = DVec3::new(coordinate(), coordinate(), coordinate());
-    match random.below(11) {
-        0 | 1 => DVec3::new(p.x, p.y, 0.0),
-        2 | 3 => p.normalize(),
-        4 => DVec3::new(random.pick(&[-1.0, 0.0, 1.0]), p.y, 0.0),
-        5 => DVec3::new(random.pick(&[-1.0, 0.0, 1.0]), random.pick(&[-1.0, 0.0, 1.0]), 0.0),
-        6 => DVec3::new(p.x.abs(), 1.0 - p.x.abs(), 0.0),
-        7..=9 => DVec3::new(random.between(0.0, 0.6), random.between(0.0, 0.6), 0.0),
-        _ => p,
+    let side = || random.pick(&[-1.0, 0.0, 1.0]);
+    let around = p.truncate().normalize_or(DVec2::X);
+    let case = random.below(5);
+    match (kind, case) {
+        (_, 0) => p,
+        (RECTANGLE, 1) => DVec3::new(side(), p.y, 0.0),
+        (RECTANGLE, 2) => DVec3::new(side(), side(), 0.0),
+        (TRIANGLE, 1) => DVec3::new(p.x.abs(), 1.0 - p.x.abs(), 0.0),
+        (TRIANGLE, 2) => DVec3::new(0.0, p.y, 0.0),
+        (TRIANGLE, _) => DVec3::new(random.between(0.0, 0.6), random.between(0.0, 0.6), 0.0),
+        (ELLIPSOID, _) => p.normalize_or(DVec3::Z),
+        (DISK, 1) => around.extend(0.0),
+        (CYLINDER, 1) => around.extend(side()),
+        (CYLINDER, 2) => p.truncate().extend(random.pick(&[-1.0, 1.0])),
+        (CYLINDER, _) => around.extend(p.z),
+        _ => DVec3::new(p.x, p.y, 0.0),
     }
 }
 

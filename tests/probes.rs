@@ -13,7 +13,7 @@ use wgray_render::cpu::camera::{camera_derivative, camera_differential, camera_r
 use wgray_render::cpu::cylinder::{
     cap_side, cylinder_bitangent, cylinder_gradient, cylinder_gradient_derivative, cylinder_height, cylinder_interval,
     cylinder_levels, cylinder_occludes, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder,
-    is_on_cap, levels_on_surface,
+    is_on_cap,
 };
 use wgray_render::cpu::dielectric::{DielectricSample, dielectric_sample, eta_of, refracts_inwards, transmittance};
 use wgray_render::cpu::differential::{
@@ -105,6 +105,7 @@ use wgray_render::cpu::shadow::{
 use wgray_render::cpu::slab::{
     RayInterval, Slabs, box_interval, interval_hits, inverse_of, ray_interval, ray_interval_box, slabs,
 };
+use wgray_render::cpu::solid::{interval_occludes, levels_on_surface, nearest_end};
 use wgray_render::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use wgray_render::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
 use wgray_render::cpu::texel::{
@@ -217,11 +218,13 @@ probes! {
     triangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool;
     ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32;
     ellipsoid_discriminant(o: Vec3, d: Vec3, start: f32) -> f32;
-    intersect_ellipsoid(q: &Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32;
+    intersect_ellipsoid(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32;
     ellipsoid_occludes(o: Vec3, d: Vec3, start: f32, t_max: f32) -> bool;
     longitude(local: Vec3) -> f32;
-    cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2;
     levels_on_surface(levels: Vec2, on: f32) -> Vec2;
+    nearest_end(interval: Vec2, limit: f32) -> f32;
+    interval_occludes(interval: Vec2, t_max: f32) -> bool;
+    cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2;
     cylinder_interval(o: Vec3, d: Vec3, levels: Vec2) -> Vec2;
     intersect_cylinder(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32;
     cylinder_occludes(o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool;
@@ -242,7 +245,7 @@ probes! {
     largest(v: Vec3) -> f32;
     surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface;
     with_coordinates(surface: Surface, q: &Primitive) -> Surface;
-    intersect(kind: u32, q: &Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32;
+    intersect(kind: u32, q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32;
     is_solid(kind: u32) -> bool;
     is_centered(kind: u32) -> bool;
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
@@ -256,11 +259,11 @@ probes! {
     light_child(shares: Vec4, random: f32) -> u32;
     segments_to_local(q: &Primitive, to: LightSegments) -> LightSegments;
     segment(to: LightSegments, at: Vec2) -> Vec3;
-    occlusion_mask(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, light: &Light, block: SampleBlock) -> u32;
+    occlusion_mask(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, light: &Light, block: SampleBlock) -> u32;
     block_sample(block: SampleBlock, i: u32) -> Vec2;
-    occludes_segment(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, to: Vec3, t_max: f32) -> bool;
+    occludes_segment(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, to: Vec3, t_max: f32) -> bool;
     occludes(kind: u32, o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool;
-    solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, inside_prim: bool) -> Vec2;
+    solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, from_inside: bool) -> Vec2;
     solid_gradient(kind: u32, local: Vec3) -> Vec3;
     solid_gradient_derivative(kind: u32, local: Vec3, d: Vec3) -> Vec3;
     primitive_height(q: &Primitive, from_anchor: Vec3) -> f32;

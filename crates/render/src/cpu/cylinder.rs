@@ -7,6 +7,7 @@ use glam::{Vec2, Vec3};
 use super::ellipsoid::longitude;
 use super::math::{max, min};
 use super::ray::{Ray, vector_to_local};
+use super::solid::{interval_occludes, levels_on_surface, nearest_end};
 use crate::records::{INFINITE_T, Primitive};
 
 pub fn cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2 {
@@ -16,14 +17,6 @@ pub fn cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2 {
     let top = from_anchor.z - (q.middle.z + 1.0);
     let bottom = (q.middle.z - 1.0) - from_anchor.z;
     Vec2::new(side, max(top, bottom))
-}
-
-pub fn levels_on_surface(levels: Vec2, on: f32) -> Vec2 {
-    if levels.x >= levels.y {
-        Vec2::new(on, min(levels.y, on))
-    } else {
-        Vec2::new(min(levels.x, on), on)
-    }
 }
 
 pub fn cylinder_interval(o: Vec3, d: Vec3, levels: Vec2) -> Vec2 {
@@ -70,20 +63,11 @@ pub fn intersect_cylinder(q: &Primitive, from_inside: bool, ray: Ray, limit: f32
     } else {
         free
     };
-    let inside = cylinder_interval(from_anchor - q.middle, d, levels);
-    let t = if inside.x > 0.0 { inside.x } else { inside.y };
-    if (inside.x < inside.y) & (t > 0.0) & (t < limit) {
-        t
-    } else {
-        limit
-    }
+    nearest_end(cylinder_interval(from_anchor - q.middle, d, levels), limit)
 }
 
 pub fn cylinder_occludes(o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool {
-    let inside = cylinder_interval(o, d, levels);
-    let enters = (inside.x > 0.0) & (inside.x < t_max);
-    let leaves = (inside.y > 0.0) & (inside.y < t_max);
-    (inside.x < inside.y) & (enters | leaves)
+    interval_occludes(cylinder_interval(o, d, levels), t_max)
 }
 
 pub fn is_on_cap(local: Vec3) -> bool {

@@ -28,13 +28,13 @@ pub fn longitude(local: Vec3) -> f32 {
     if turn < 0.0 { turn + 1.0 } else { turn }
 }
 
-pub fn intersect_ellipsoid(q: &Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
+pub fn intersect_ellipsoid(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let o = from_anchor - q.middle;
     let d = vector_to_local(q, ray.direction);
     let a = dot(d, d);
     let b = dot(o, d);
-    let start = if inside_prim {
+    let start = if from_inside {
         0.0
     } else {
         ellipsoid_level(q, from_anchor)

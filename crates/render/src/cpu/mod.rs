@@ -57,6 +57,7 @@ pub mod scattering;
 pub mod sequence;
 pub mod shadow;
 pub mod slab;
+pub mod solid;
 pub mod specular;
 pub mod surface;
 pub mod texel;

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::cylinder::{
     cylinder_bitangent, cylinder_gradient, cylinder_gradient_derivative, cylinder_height, cylinder_levels,
-    cylinder_occludes, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder, levels_on_surface,
+    cylinder_occludes, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder,
 };
 use super::disk::{disk_occludes, intersect_disk};
 use super::ellipsoid::{ellipsoid_level, ellipsoid_occludes, intersect_ellipsoid, longitude};
@@ -14,11 +14,12 @@ use super::math::{atan2, max, normalize};
 use super::plane::{intersect_plane, plane_occludes};
 use super::ray::Ray;
 use super::rectangle::{intersect_rectangle, rectangle_occludes};
+use super::solid::levels_on_surface;
 use super::triangle::{intersect_triangle, triangle_occludes};
 use crate::records::{CYLINDER, DISK, ELLIPSOID, Primitive, RECTANGLE, SOLID_KINDS, TRIANGLE};
 
 #[inline(always)] // compiled for each kind
-pub fn intersect(kind: u32, q: &Primitive, inside_prim: bool, ray: Ray, limit: f32) -> f32 {
+pub fn intersect(kind: u32, q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
     }
@@ -26,13 +27,13 @@ pub fn intersect(kind: u32, q: &Primitive, inside_prim: bool, ray: Ray, limit: f
         return intersect_triangle(q, ray, limit);
     }
     if kind == ELLIPSOID {
-        return intersect_ellipsoid(q, inside_prim, ray, limit);
+        return intersect_ellipsoid(q, from_inside, ray, limit);
     }
     if kind == DISK {
         return intersect_disk(q, ray, limit);
     }
     if kind == CYLINDER {
-        return intersect_cylinder(q, inside_prim, ray, limit);
+        return intersect_cylinder(q, from_inside, ray, limit);
     }
     intersect_plane(q, ray, limit)
 }
@@ -66,17 +67,17 @@ pub fn is_centered(kind: u32) -> bool {
 }
 
 #[inline(always)] // compiled for each kind
-pub fn solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, inside_prim: bool) -> Vec2 {
+pub fn solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, from_inside: bool) -> Vec2 {
     if kind == CYLINDER {
         let levels = cylinder_levels(q, from_anchor);
-        return if inside_prim {
+        return if from_inside {
             levels_on_surface(levels, -1e-30)
         } else {
             levels
         };
     }
     Vec2::new(
-        if inside_prim {
+        if from_inside {
             -1e-30
         } else {
             ellipsoid_level(q, from_anchor)

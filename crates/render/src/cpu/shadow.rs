@@ -21,10 +21,10 @@ pub struct SampleBlock {
 }
 
 #[inline(always)] // compiled for each kind
-pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, light: &Light, block: SampleBlock) -> u32 {
+pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, light: &Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
-    let levels = solid_levels(kind, q, from_anchor, inside_prim);
+    let levels = solid_levels(kind, q, from_anchor, from_inside);
     let to = Samples::of(block).segments(*LEVEL, segments_to_local(q, segments_to_light(light, p)));
     let mut bits = 0;
     for i in 0..to.count {
@@ -38,9 +38,9 @@ pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, ligh
 }
 
 #[inline(always)] // compiled for each kind
-pub fn occludes_segment(kind: u32, q: &Primitive, p: Vec3, inside_prim: bool, to: Vec3, t_max: f32) -> bool {
+pub fn occludes_segment(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, to: Vec3, t_max: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
-    let levels = solid_levels(kind, q, from_anchor, inside_prim);
+    let levels = solid_levels(kind, q, from_anchor, from_inside);
     occludes(kind, from_anchor - q.middle, vector_to_local(q, to), levels, t_max)
 }
 

@@ -49,10 +49,10 @@ pub fn item_tests() -> String {
                 "hit",
             ),
             (
-                "occluded_by_primitive_item(item: BvhItem, p: vec3f, inside_prim: bool, light: Light, block: SampleBlock) -> u32",
+                "occluded_by_primitive_item(item: BvhItem, p: vec3f, from_inside: bool, light: Light, block: SampleBlock) -> u32",
                 "var bits = 0u;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
-        bits = occlusion_mask(KIND, primitives[item.index], p, inside_prim, light, block);
+        bits = occlusion_mask(KIND, primitives[item.index], p, from_inside, light, block);
     }",
                 "bits",
             ),
